@@ -1,0 +1,50 @@
+"""The one place that chooses between a compiled loop and its NumPy twin.
+
+Every compiled function has a plain twin that defines it. Importing Numba costs about half a second,
+so small work stays with the twin. The environment variable ``KINEME_COMPILED`` forces the choice:
+``always``, ``never`` or ``auto`` (default).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from kineme.errors import SpecificationError
+
+CHOICES = ("auto", "always", "never")
+
+# Elementary operations that take NumPy about as long as importing Numba and loading a cached
+# kernel (0.6 s), and, once Numba is there, about as long as one dispatch.
+_REPAYS_IMPORT = 100_000_000
+_REPAYS_CALL = 10_000
+
+
+def use_compiled(n_operations: int) -> bool:
+    """Whether a job of about `n_operations` elementary operations should run compiled."""
+    choice = os.environ.get("KINEME_COMPILED", "auto")
+    if choice not in CHOICES:
+        raise SpecificationError(
+            f"expected the environment variable KINEME_COMPILED to be one of {CHOICES}, got {choice!r}; "
+            "unset it to let kineme choose"
+        )
+    if choice != "auto":
+        return choice == "always"
+    return n_operations >= (_REPAYS_CALL if "numba" in sys.modules else _REPAYS_IMPORT)
+
+
+def jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile one thread's loop: cached on disk where possible, without the GIL.
+
+    Only reassociation and contraction of floating-point operations are allowed, so NaN and infinity
+    keep their meaning and validation can be compiled too.
+    """
+    from numba import njit
+
+    options: dict[str, Any] = {"nogil": True, "fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
+    try:
+        return njit(cache=True, **options)(function)
+    except RuntimeError:  # no writable place for the cache, as in a read-only installation
+        return njit(**options)(function)
