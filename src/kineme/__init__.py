@@ -1,3 +1,86 @@
-"""kineme: learn movements as Dynamical Movement Primitives, recognise them, move again."""
+"""kineme: learn movements as Dynamical Movement Primitives, recognise them, name them, move again.
+
+The names below load on first use, so that ``import kineme`` costs next to nothing.
+"""
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+from typing import Any as _Any
 
 __version__ = "0.1.0"
+
+if _TYPE_CHECKING:
+    from kineme import datasets, kernels
+    from kineme.datasets.lasa import load_lasa
+    from kineme.errors import (
+        DataError,
+        DegenerateMovementError,
+        DegenerateMovementWarning,
+        KinemeError,
+        SpecificationError,
+        TrajectoryError,
+    )
+    from kineme.features.dmp_features import DMPFeatures
+    from kineme.primitives.dmp import DMP
+    from kineme.primitives.primitives import Primitives
+    from kineme.trajectories.demonstrations import Demonstrations
+    from kineme.trajectories.preprocess import preprocess
+    from kineme.trajectories.resample import Resample
+    from kineme.trajectories.smooth import Smooth
+    from kineme.trajectories.trajectory import Trajectory
+    from kineme.trajectories.trim import TrimRest
+
+_HOME = {
+    "Trajectory": "kineme.trajectories.trajectory",
+    "Demonstrations": "kineme.trajectories.demonstrations",
+    "preprocess": "kineme.trajectories.preprocess",
+    "TrimRest": "kineme.trajectories.trim",
+    "Smooth": "kineme.trajectories.smooth",
+    "Resample": "kineme.trajectories.resample",
+    "datasets": "kineme",
+    "load_lasa": "kineme.datasets.lasa",
+    "DMP": "kineme.primitives.dmp",
+    "Primitives": "kineme.primitives.primitives",
+    "DMPFeatures": "kineme.features.dmp_features",
+    "kernels": "kineme",
+    "KinemeError": "kineme.errors",
+    "TrajectoryError": "kineme.errors",
+    "DegenerateMovementError": "kineme.errors",
+    "SpecificationError": "kineme.errors",
+    "DataError": "kineme.errors",
+    "DegenerateMovementWarning": "kineme.errors",
+}
+
+__all__ = [  # in the order of the flow
+    "DMP",
+    "DMPFeatures",
+    "DataError",
+    "DegenerateMovementError",
+    "DegenerateMovementWarning",
+    "Demonstrations",
+    "KinemeError",
+    "Primitives",
+    "Resample",
+    "Smooth",
+    "SpecificationError",
+    "Trajectory",
+    "TrajectoryError",
+    "TrimRest",
+    "datasets",
+    "kernels",
+    "load_lasa",
+    "preprocess",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> _Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'kineme' has no attribute {name!r}; it has {', '.join(__all__)}")
+    home = _HOME[name]
+    value = _import_module(f"kineme.{name}") if home == "kineme" else getattr(_import_module(home), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,16 +1,25 @@
 """Work over row tiles in a few threads.
 
 Compiled kernels are single-threaded and release the GIL; parallelism is a short-lived thread pool,
-which survives forks and concurrent callers, unlike Numba's own parallel layers.
+which survives forks and concurrent callers, unlike Numba's own parallel layers. While the pool
+works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile
+split in two, because a tile stays in one core's cache.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from threading import Lock
+from typing import Any
 
 from kineme.errors import SpecificationError
+
+_blas_lock = Lock()
+_blas_holds: list[Any] = []  # one entry per active caller; the first entry is the limiter
 
 
 def n_threads() -> int:
@@ -39,6 +48,32 @@ def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -
         for start, stop in tiles:
             work(start, stop)
         return
-    with ThreadPoolExecutor(threads) as pool:
+    with single_threaded_blas(), ThreadPoolExecutor(threads) as pool:
         for result in [pool.submit(work, *tile) for tile in tiles]:
             result.result()
+
+
+@contextmanager
+def single_threaded_blas() -> Iterator[None]:
+    """Hold BLAS to one thread per caller; the last caller to leave restores what was there.
+
+    The limit is a property of the process, so concurrent callers are counted: without the count,
+    the second one in would save, and later restore, the first one's limit.
+    """
+    with _blas_lock:
+        _blas_holds.append(None if _blas_holds else _blas_controller().limit(limits=1, user_api="blas"))
+    try:
+        yield
+    finally:
+        with _blas_lock:
+            first = _blas_holds[0]
+            _blas_holds.pop()
+            if not _blas_holds:
+                first.restore_original_limits()
+
+
+@cache
+def _blas_controller() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

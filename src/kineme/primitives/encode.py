@@ -1,0 +1,62 @@
+"""Learning a batch of movements: resample, subtract the start, multiply."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.parallel import for_tiles
+from kineme.primitives.dmp import DMP
+from kineme.primitives.operators import encoder
+from kineme.primitives.primitives import Primitives
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.preprocess import preprocess
+from kineme.trajectories.resample import even_rows, relative_rows
+from kineme.validation import Array, describe
+
+_TILE_SAMPLES = 100_000  # numbers in one tile: with its product it stays in a core's cache
+
+
+def encode(dmp: DMP, movements: Any) -> Primitives:
+    """Learn one primitive per movement; see `DMP.learn`."""
+    demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
+    n, n_dims = len(demos), demos.n_dims
+    n_samples = demos.even_length or dmp.n_points
+    operator = encoder(dmp, n_samples)
+    weights = np.empty((n, n_dims, dmp.n_basis))
+    amplitudes, velocities, extents = np.empty((n, n_dims)), np.empty((n, n_dims)), np.empty((n, n_dims))
+
+    def learn_tile(start: int, stop: int) -> None:
+        # Even movements are multiplied as they are: their operator contains the resampling.
+        rows = even_rows(demos, start, stop) if demos.even_length else relative_rows(demos, start, stop, n_samples)
+        np.matmul(rows, operator.weights, out=weights[start:stop])
+        np.matmul(rows, operator.velocity, out=velocities[start:stop])
+        amplitudes[start:stop] = rows[:, :, -1]
+        np.subtract(rows.max(axis=2), rows.min(axis=2), out=extents[start:stop])
+
+    for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
+    starts = demos.positions[demos.offsets[:-1]]
+    _check_movement(demos, starts, extents)
+    return Primitives(
+        dmp,
+        scaled_weights=weights,
+        starts=starts,
+        goals=demos.positions[demos.offsets[1:] - 1],
+        velocities=velocities / demos.durations[:, None],
+        durations=demos.durations,
+        extents=extents,
+        labels=demos.labels,
+        names=demos.names,
+    )
+
+
+def _check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None:
+    still = (extents <= 8 * np.finfo(float).eps * np.abs(starts)).all(axis=1)
+    if still.any():
+        i = int(np.argmax(still))
+        raise TrajectoryError(
+            f"{describe(i, demos.names)}: expected a movement, got {demos.lengths[i]} samples "
+            f"at the same place ({still.sum()} of {len(demos)} movements do not move); leave them out"
+        )

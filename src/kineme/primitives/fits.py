@@ -1,0 +1,64 @@
+"""Two ways to fit the weights, each one matrix from a resampled movement to its weights."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.primitives.basis import GaussianBasis
+from kineme.primitives.differentiation import differentiation_matrices
+from kineme.primitives.formulations import Formulation
+from kineme.primitives.response import Response
+from kineme.validation import Array
+
+FITS = ("forcing", "trajectory")
+REGRESSIONS = ("local", "ridge")
+
+
+def forcing_target(basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array) -> Array:
+    """The matrix (T, T) from y = x - x0 to scale * f, the equation of the formulation solved for it.
+
+    ``scale f = (D2 + D D1 + K) y - (K + coupling(s)) (g - x0)``; the last sample of y is g - x0.
+    """
+    D1, D2 = differentiation_matrices(len(u))
+    target = D2 + damping * D1 + stiffness * np.eye(len(u))
+    target[:, -1] -= stiffness + formulation.coupling(stiffness, basis.phase(u))
+    return target
+
+
+def local_regression(basis: GaussianBasis, u: Array) -> Array:
+    """Locally weighted regression (N, T): each weight fits the target around its own center.
+
+    ``w_i = sum_t psi_i(s_t) q_t y_t / sum_t psi_i(s_t) q_t^2`` with the gate q = 1 or s.
+    """
+    psi, gate = basis.activations(u), basis.gate(u)[:, None]
+    return np.asarray((psi * gate / (psi * gate**2).sum(axis=0)).T)
+
+
+def ridge_regression(design: Array, ridge: float) -> Array:
+    """Least squares with a penalty on ``||w||^2`` (N, T), relative to the mean square of a design column."""
+    _, n_basis = design.shape
+    gram = design.T @ design
+    return np.asarray(np.linalg.solve(gram + ridge * np.trace(gram) / n_basis * np.eye(n_basis), design.T))
+
+
+def trajectory_regression(response: Response, stiffness: float, ridge: float) -> tuple[Array, Array]:
+    """Least squares of the path itself on the decode matrix, with a penalty on the weights' curvature.
+
+    Minimizes ``mean (y - Phi W - goal (g - x0) - velocity v0)^2 + ridge mean (diff^2 W / K)^2`` over W and v0:
+    no numerical derivative of the data occurs.
+
+    Returns
+    -------
+    weights : ndarray of shape (N, T)
+        From y = x - x0 to W.
+    velocity : ndarray of shape (T,)
+        From y to v0.
+    """
+    n_points, n_basis = response.Phi[0].shape
+    columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0]))  # unit: W / K, comparable to y
+    curvature = np.diff(np.eye(n_basis, n_basis + 1), n=2, axis=0)
+    rows = np.vstack((columns / np.sqrt(n_points), np.sqrt(ridge / (n_basis - 2)) * curvature))
+    data = np.vstack((np.eye(n_points), np.zeros((n_basis - 2, n_points)))) / np.sqrt(n_points)
+    data[:n_points, -1] -= response.goal[0] / np.sqrt(n_points)  # the last sample of y is g - x0
+    solution = np.linalg.lstsq(rows, data, rcond=None)[0]
+    return solution[:-1] * stiffness, solution[-1]

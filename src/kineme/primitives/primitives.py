@@ -1,0 +1,144 @@
+"""A batch of learned primitives: what they hold, what they look like as features, how they replay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.primitives.amplitudes import safe_amplitudes
+from kineme.primitives.dmp import DMP
+from kineme.primitives.operators import decoder, forcing_matrix
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_count
+
+
+@dataclass(frozen=True, eq=False)
+class Primitives:
+    """n primitives of d dimensions that share one specification; made by `DMP.learn`.
+
+    Attributes
+    ----------
+    dmp : DMP
+        The specification.
+    scaled_weights : ndarray of shape (n, d, N)
+        Weights times the formulation's scale: ``(g - x0) w`` (original) or ``K w`` (bio-inspired). They
+        exist for every movement, closed ones too.
+    starts, goals : ndarray of shape (n, d)
+        x0 and g, in the user's unit.
+    velocities : ndarray of shape (n, d)
+        Initial velocities, in the user's unit per second.
+    durations : ndarray of shape (n,)
+        tau [s].
+    extents : ndarray of shape (n, d)
+        Largest minus smallest position of each demonstration, the yardstick for "g is close to x0".
+    labels : ndarray of shape (n,) or None
+    names : tuple of str or None
+    """
+
+    dmp: DMP
+    scaled_weights: Array
+    starts: Array
+    goals: Array
+    velocities: Array
+    durations: Array
+    extents: Array
+    labels: NDArray[Any] | None = None
+    names: tuple[str | None, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("scaled_weights", "starts", "goals", "velocities", "durations", "extents"):
+            getattr(self, field).setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __getitem__(self, index: Any) -> Primitives:
+        """The chosen primitives as a batch; an integer gives a batch of one."""
+        chosen = np.atleast_1d(np.arange(len(self))[index])
+        arrays = ("scaled_weights", "starts", "goals", "velocities", "durations", "extents")
+        return replace(
+            self,
+            **{field: getattr(self, field)[chosen] for field in arrays},
+            labels=None if self.labels is None else self.labels[chosen],
+            names=None if self.names is None else tuple(self.names[i] for i in chosen),
+        )
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return int(self.starts.shape[1])
+
+    @property
+    def weights(self) -> Array:
+        """Weights w of Eq. (2), shape (n, N, d).
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
+
+    def forcing(self, n_samples: int = 100) -> Array:
+        """The forcing term f, Eq. (2), at `n_samples` (S) even times, shape (n, S, d).
+
+        Contains s if the specification's gating is "phase"; never contains K or g - x0.
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
+
+    def shape_attractor(self, n_samples: int = 100) -> Array:
+        """The shape-attractor term as it acts in the equation, at `n_samples` (S) even times, shape (n, S, d).
+
+        ``(g - x0) f(s)`` in Eq. (1), ``s K (f(s)/s + x0 - x) = K f(s) + K s (x0 - x)`` in Eq. (4), with x the
+        primitive's own path. It needs no division, neither by g - x0 nor by s, so it exists for every
+        movement. Section 2.2 gives the name to the bracket without the leading s; that one grows without bound
+        as s vanishes.
+        """
+        term = self._scaled_forcing(n_samples)
+        s = self.dmp.basis.phase(np.linspace(0.0, 1.0, n_samples))
+        coupling = self.dmp.system.coupling(self.dmp.K, s)
+        if coupling.any():
+            term += coupling * self._relative_path(n_samples)
+        return term.transpose(0, 2, 1)
+
+    def rollout(self, n_samples: int | None = None) -> Demonstrations:
+        """Move again as demonstrated: same start, goal, initial velocity and duration.
+
+        Parameters
+        ----------
+        n_samples : int, optional
+            Samples per movement; by default the specification's `n_points`.
+        """
+        n_samples = self.dmp.n_points if n_samples is None else n_samples
+        path = self._relative_path(n_samples).transpose(0, 2, 1) + self.starts[:, None]
+        times = self.durations[:, None] * np.linspace(0.0, 1.0, n_samples)
+        labels = None if self.labels is None else self.labels
+        return Demonstrations.from_arrays(path, labels, times=list(times), names=self.names, copy=False)  # type: ignore[arg-type]
+
+    def _scale(self, feature: str) -> Array:
+        """The formulation's scale (n, d, 1), refused where it is zero."""
+        amplitude = self.goals - self.starts
+        if self.dmp.system.scales_with_amplitude:
+            amplitude = safe_amplitudes(amplitude, self.extents, self.names, feature)
+        return self.dmp.system.scale(self.dmp.K, amplitude)[:, :, None]
+
+    def _scaled_forcing(self, n_samples: int) -> Array:
+        check_count("n_samples", n_samples, 2)
+        return self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T
+
+    def _relative_path(self, n_samples: int) -> Array:
+        """Positions minus the start, shape (n, d, S)."""
+        check_count("n_samples", n_samples, 2)
+        response = decoder(self.dmp, n_samples)
+        path = self.scaled_weights @ response.Phi[0].T
+        path += (self.goals - self.starts)[:, :, None] * response.goal[0]
+        path += (self.velocities * self.durations[:, None])[:, :, None] * response.velocity[0]
+        return path

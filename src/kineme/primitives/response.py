@@ -1,0 +1,72 @@
+"""The spring-damper's exact response to each part of the forcing term: the decode matrix."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.primitives.basis import GaussianBasis
+from kineme.primitives.formulations import Formulation
+from kineme.validation import Array
+
+_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at least
+
+
+class Response(NamedTuple):
+    """Positions and velocities at T normalized times as linear maps of (W, g - x0, v0).
+
+    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0``, and index 1 gives dx/du in the same way.
+    W are the weights times the formulation's scale, v0 is dx/du at the start.
+    """
+
+    Phi: Array  # (2, T, N)
+    goal: Array  # (2, T)
+    velocity: Array  # (2, T)
+
+
+def spring_damper_response(
+    basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array
+) -> Response:
+    """Solve ``x'' = K (g - x) - D x' + F(u)`` for every basis function, the goal and the initial velocity.
+
+    The state is carried from one time to the next by the matrix exponential, which is exact for any step; the
+    forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval,
+    that is with order 16.
+
+    Parameters
+    ----------
+    u : ndarray of shape (T,)
+        Even normalized times from 0.
+    """
+    n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (basis.n_basis - 1) * (u[1] - u[0])))
+    h = (u[1] - u[0]) / n_steps
+    nodes = 0.5 * h * (_NODES + 1.0)
+    carry = transition(stiffness, damping, np.array([h]))[0]
+    # An acceleration at a node reaches the end of the step through the second column.
+    impulse = transition(stiffness, damping, h - nodes)[:, :, 1] * (0.5 * h * _NODE_WEIGHTS)[:, None]  # (8, 2)
+    starts = np.arange((len(u) - 1) * n_steps) * h
+    at_nodes = (starts[:, None] + nodes).ravel()
+    forcing = np.column_stack(
+        (basis.design(at_nodes), stiffness + formulation.coupling(stiffness, basis.phase(at_nodes)))
+    ).reshape(len(starts), len(nodes), -1)
+    driven = np.einsum("qz,kqf->kzf", impulse, forcing)  # what each step adds to (x, x')
+    states = np.zeros((len(u), 2, basis.n_basis + 2))
+    states[0, 1, -1] = 1.0
+    state = states[0]
+    for k, added in enumerate(driven):
+        state = carry @ state
+        state[:, :-1] += added
+        if (k + 1) % n_steps == 0:
+            states[(k + 1) // n_steps] = state
+    by_part = states.transpose(1, 0, 2)
+    return Response(np.ascontiguousarray(by_part[:, :, :-2]), by_part[:, :, -2].copy(), by_part[:, :, -1].copy())
+
+
+def transition(stiffness: float, damping: float, h: Array) -> Array:
+    """Exponentials ``exp(A h)`` of ``A = [[0, 1], [-K, -D]]`` for steps h (m,), shape (m, 2, 2)."""
+    from scipy.linalg import expm
+
+    return np.asarray(expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * h[:, None, None]))

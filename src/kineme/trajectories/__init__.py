@@ -1,0 +1,1 @@
+"""Trajectories: one movement, many movements, and the steps that prepare them."""

@@ -1,0 +1,169 @@
+"""Compiled twins of the loops over ragged movements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.compiled import jit
+
+
+@jit
+def fill_spline_rows(parameter, positions, offsets, rows):  # type: ignore[no-untyped-def]
+    """Not-a-knot cubic spline of every movement at even parameters; see `spline.spline_rows`.
+
+    With knot distances h and second derivatives m, continuity of the slope at the inner knots is
+    ``h[j-1] m[j-1] + 2 (h[j-1] + h[j]) m[j] + h[j] m[j+1] = 6 (slope[j] - slope[j-1])``. The
+    not-a-knot conditions put the outer second derivatives into the first and last of these rows.
+    """
+    n, n_dims, n_points = rows.shape
+    longest = 0
+    for i in range(n):
+        longest = max(longest, offsets[i + 1] - offsets[i])
+    h, inv_h, pivot, above = np.empty(longest), np.empty(longest), np.empty(longest), np.empty(longest)
+    y, slope, m, cubic = np.empty(longest), np.empty(longest), np.empty(longest), np.empty(longest)
+    interval, local = np.empty(n_points, np.int64), np.empty(n_points)
+    for i in range(n):
+        first, length = offsets[i], offsets[i + 1] - offsets[i]
+        u = parameter[first : first + length]
+        _factor(u, length, h, inv_h, pivot, above)
+        _locate(u, length, interval, local)
+        for k in range(n_dims):
+            x = positions[first : first + length, k]
+            for j in range(length):
+                y[j] = x[j] - x[0]
+            _second_derivatives(y, length, h, inv_h, pivot, above, slope, m)
+            for j in range(length - 1):
+                slope[j] -= h[j] * (2.0 * m[j] + m[j + 1]) * (1.0 / 6.0)
+                cubic[j] = (m[j + 1] - m[j]) * inv_h[j] * (1.0 / 6.0)
+                m[j] *= 0.5
+            row = rows[i, k]
+            for p in range(n_points):
+                j, v = interval[p], local[p]
+                row[p] = y[j] + v * (slope[j] + v * (m[j] + v * cubic[j]))
+
+
+@jit
+def _factor(u, length, h, inv_h, pivot, above):  # type: ignore[no-untyped-def]
+    """Knot distances and the elimination of the tridiagonal matrix, shared by all dimensions.
+
+    `pivot` holds the reciprocal pivots, `above` the eliminated upper diagonal.
+    """
+    last = length - 2  # the last inner knot
+    for j in range(length - 1):
+        h[j] = u[j + 1] - u[j]
+    for j in range(length - 1):
+        inv_h[j] = 1.0 / h[j]
+    q = h[0] * h[0] * inv_h[1]
+    pivot[1] = 1.0 / (3.0 * h[0] + 2.0 * h[1] + q)
+    above[1] = (h[1] - q) * pivot[1]
+    for j in range(2, last):
+        pivot[j] = 1.0 / (2.0 * (h[j - 1] + h[j]) - h[j - 1] * above[j - 1])
+        above[j] = h[j] * pivot[j]
+    q = h[last] * h[last] * inv_h[last - 1]
+    pivot[last] = 1.0 / (2.0 * h[last - 1] + 3.0 * h[last] + q - (h[last - 1] - q) * above[last - 1])
+
+
+@jit
+def _second_derivatives(y, length, h, inv_h, pivot, above, slope, m):  # type: ignore[no-untyped-def]
+    """Solve for the second derivatives m of one dimension; `slope` holds the chord slopes."""
+    last = length - 2
+    for j in range(length - 1):
+        slope[j] = (y[j + 1] - y[j]) * inv_h[j]
+    for j in range(1, length - 1):
+        m[j] = 6.0 * (slope[j] - slope[j - 1])
+    m[1] *= pivot[1]
+    for j in range(2, last):
+        m[j] = (m[j] - h[j - 1] * m[j - 1]) * pivot[j]
+    m[last] = (m[last] - (h[last - 1] - h[last] * h[last] * inv_h[last - 1]) * m[last - 1]) * pivot[last]
+    for j in range(last - 1, 0, -1):
+        m[j] -= above[j] * m[j + 1]
+    m[0] = m[1] - h[0] * inv_h[1] * (m[2] - m[1])
+    m[last + 1] = m[last] + h[last] * inv_h[last - 1] * (m[last] - m[last - 1])
+
+
+@jit
+def _locate(u, length, interval, local):  # type: ignore[no-untyped-def]
+    """For each even target, its knot interval and its distance from the interval's left knot.
+
+    Counting the knots at or below each target, then adding up, has no branch to mispredict: on
+    irregular stamps it is several times faster than walking along the knots.
+    """
+    n_points = len(interval)
+    step = (u[length - 1] - u[0]) / (n_points - 1)
+    per_step = 1.0 / step
+    interval[:] = 0
+    for j in range(1, length - 1):
+        target = int(np.ceil((u[j] - u[0]) * per_step))
+        interval[min(target, n_points - 1)] += 1
+    j = 0
+    for p in range(n_points):
+        j += interval[p]
+        interval[p] = j
+        local[p] = u[0] + p * step - u[j]
+
+
+@jit
+def fill_smoothed(u, positions, offsets, penalties, smoothed):  # type: ignore[no-untyped-def]
+    """Reinsch's smoothing spline of every movement; see `smooth.Smooth`.
+
+    With Q the second divided differences and R the Gram matrix of hat functions, both banded, the second
+    derivatives of the spline solve ``(R + lam Q'Q) m = Q'x``, and the smoothed positions are ``x - lam Q m``.
+    """
+    longest = 0
+    for i in range(len(penalties)):
+        longest = max(longest, offsets[i + 1] - offsets[i])
+    inv_h, m = np.empty(longest), np.empty(longest + 2)
+    diagonal, above, second = np.empty(longest), np.empty(longest), np.empty(longest)
+    for i in range(len(penalties)):
+        first, length, lam = offsets[i], offsets[i + 1] - offsets[i], penalties[i]
+        for j in range(length - 1):
+            inv_h[j] = 1.0 / (u[first + j + 1] - u[first + j])
+        _factor_smoother(inv_h, length - 2, lam, diagonal, above, second)
+        for k in range(positions.shape[1]):
+            x = positions[first : first + length, k]
+            _solve_smoother(x, inv_h, length - 2, diagonal, above, second, m)
+            for j in range(length):  # m is stored from index 1; the outer second derivatives are 0
+                left = (m[j + 1] - m[j]) * inv_h[j] if j < length - 1 else 0.0
+                right = (m[j] - m[j - 1]) * inv_h[j - 1] if j > 0 else 0.0
+                smoothed[first + j, k] = x[j] - lam * (left - right)
+
+
+@jit
+def _factor_smoother(inv_h, n, lam, diagonal, above, second):  # type: ignore[no-untyped-def]
+    """L D L' factors of the pentadiagonal matrix R + lam Q'Q of the n inner knots.
+
+    `diagonal` holds 1 / D, `above` and `second` the off-diagonals of L.
+    """
+    for j in range(n):
+        a, b = inv_h[j], inv_h[j + 1]
+        row = (1.0 / a + 1.0 / b) / 3.0 + lam * (a * a + b * b + (a + b) * (a + b))
+        next_one = 1.0 / (6.0 * b) - lam * b * (a + 2.0 * b + inv_h[j + 2]) if j < n - 1 else 0.0
+        next_two = lam * b * inv_h[j + 2] if j < n - 2 else 0.0
+        if j > 0:
+            row -= above[j - 1] * above[j - 1] / diagonal[j - 1]
+            next_one -= above[j - 1] * second[j - 1] / diagonal[j - 1]
+        if j > 1:
+            row -= second[j - 2] * second[j - 2] / diagonal[j - 2]
+        diagonal[j] = 1.0 / row
+        above[j] = next_one * diagonal[j]
+        second[j] = next_two * diagonal[j]
+
+
+@jit
+def _solve_smoother(x, inv_h, n, diagonal, above, second, m):  # type: ignore[no-untyped-def]
+    """Second derivatives at the inner knots, in m[1] to m[n]; m[0] and m[n + 1] are 0."""
+    m[0] = 0.0
+    m[n + 1] = 0.0
+    for j in range(n):
+        value = (x[j + 2] - x[j + 1]) * inv_h[j + 1] - (x[j + 1] - x[j]) * inv_h[j]
+        if j > 0:
+            value -= above[j - 1] * m[j]
+        if j > 1:
+            value -= second[j - 2] * m[j - 1]
+        m[j + 1] = value
+    for j in range(n):
+        m[j + 1] *= diagonal[j]
+    for j in range(n - 2, -1, -1):
+        m[j + 1] -= above[j] * m[j + 2]
+        if j < n - 2:
+            m[j + 1] -= second[j] * m[j + 3]

@@ -1,0 +1,62 @@
+"""Bring every movement to the same number of samples, evenly spaced in the phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kineme.trajectories.collect import Movements
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.spline import spline_matrix, spline_rows
+from kineme.validation import MIN_SAMPLES, Array, check_count
+
+
+@dataclass(frozen=True)
+class Resample:
+    """Interpolate each movement at even times between its first and last stamp.
+
+    Parameters
+    ----------
+    n_points : int, default 200
+        Samples per movement afterwards.
+
+    Notes
+    -----
+    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Resampling far
+    below the recorded rate folds high frequencies into low ones: `Smooth` first.
+    """
+
+    n_points: int = 200
+
+    def __post_init__(self) -> None:
+        check_count("n_points", self.n_points, MIN_SAMPLES)
+
+    def apply(self, demonstrations: Demonstrations) -> Movements:
+        """The movements, evenly sampled."""
+        n = len(demonstrations)
+        starts = demonstrations.positions[demonstrations.offsets[:-1]]
+        rows = relative_rows(demonstrations, 0, n, self.n_points)
+        return replace(
+            demonstrations.movements,
+            positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, demonstrations.n_dims),
+            offsets=np.arange(n + 1) * self.n_points,
+            times=None,
+        )
+
+
+def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_points: int) -> Array:
+    """Movements start:stop at `n_points` even times, minus their start, shape (stop - start, d, n_points)."""
+    n_samples = demonstrations.even_length
+    if n_samples is None:
+        offsets = demonstrations.offsets[start : stop + 1]
+        return spline_rows(demonstrations.times, demonstrations.positions, offsets, n_points)
+    rows = even_rows(demonstrations, start, stop)
+    return rows if n_points == n_samples else rows @ spline_matrix(n_samples, n_points).T
+
+
+def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Evenly sampled movements start:stop as they are, minus their start, shape (stop - start, d, T)."""
+    first, last = demonstrations.offsets[[start, stop]]
+    block = demonstrations.positions[first:last].reshape(stop - start, -1, demonstrations.n_dims).transpose(0, 2, 1)
+    return np.subtract(block, block[:, :, :1], out=np.empty(block.shape))

@@ -1,0 +1,71 @@
+"""Interpolation on an even grid by cubic splines, movement by movement or as one matrix.
+
+The spline is the not-a-knot cubic spline of `scipy.interpolate.CubicSpline`: fourth order, exact for
+cubics, and twice continuously differentiable, as the second derivative in the fit requires.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.compiled import use_compiled
+from kineme.validation import Array
+
+_OPERATIONS_PER_SAMPLE = 100  # elementary operations that SciPy's spline costs per sample and dimension
+
+
+@lru_cache(maxsize=64)
+def spline_matrix(n_in: int, n_out: int) -> Array:
+    """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples."""
+    from scipy.interpolate import CubicSpline
+
+    if n_in == n_out:
+        matrix = np.eye(n_in)
+    else:
+        matrix = CubicSpline(np.linspace(0, 1, n_in), np.eye(n_in))(np.linspace(0, 1, n_out))
+    matrix.setflags(write=False)
+    return matrix
+
+
+def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n_points: int) -> Array:
+    """Interpolate movements on `n_points` even values of their parameter, relative to their start.
+
+    Parameters
+    ----------
+    parameter : ndarray of shape (total,)
+        Strictly increasing within each movement: time, or arc length.
+    positions : ndarray of shape (total, d)
+        Samples of all movements.
+    offsets : ndarray of shape (n + 1,)
+        Where each movement begins in `parameter` and `positions`.
+    n_points : int
+        Points per movement.
+
+    Returns
+    -------
+    ndarray of shape (n, d, n_points)
+        Positions minus the first position: a large offset costs no digits.
+    """
+    n, n_dims = len(offsets) - 1, positions.shape[1]
+    rows = np.empty((n, n_dims, n_points))
+    if use_compiled(_OPERATIONS_PER_SAMPLE * int(offsets[-1] - offsets[0]) * n_dims):
+        from kineme.trajectories._compiled import fill_spline_rows
+
+        fill_spline_rows(parameter, positions, offsets, rows)
+    else:
+        _fill_spline_rows(parameter, positions, offsets, rows)
+    return rows
+
+
+def _fill_spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], rows: Array) -> None:
+    """The plain twin of the compiled loop: SciPy's spline, movement by movement."""
+    from scipy.interpolate import CubicSpline
+
+    for i in range(len(rows)):
+        movement = slice(offsets[i], offsets[i + 1])
+        u = parameter[movement]
+        spline = CubicSpline(u - u[0], positions[movement] - positions[offsets[i]])
+        rows[i] = spline(np.linspace(0.0, u[-1] - u[0], rows.shape[2])).T

@@ -1,0 +1,72 @@
+"""One demonstrated movement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kineme.validation import Array, as_positions, as_times, check_finite, check_times
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One movement: positions over time, with an optional label and name.
+
+    Parameters
+    ----------
+    times : array_like of shape (T,)
+        Strictly increasing time stamps [s]; any origin, any spacing. T >= 4.
+    positions : array_like of shape (T, d)
+        Positions, in any unit; angles in radians.
+    label : str or int, optional
+        The action that the movement shows.
+    name : str, optional
+        Where it comes from; error messages show it.
+
+    Raises
+    ------
+    TrajectoryError
+        Fewer than 4 samples, NaN or infinity, times not strictly increasing or of another length.
+
+    Notes
+    -----
+    Both arrays are copied once and write-protected.
+    """
+
+    times: Array
+    positions: Array
+    label: Any = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        who = f"trajectory {self.name!r}" if self.name else "trajectory"
+        x = as_positions(self.positions, who)
+        t = as_times(self.times, len(x), who)
+        whole = np.array([0, len(x)])
+        names = [self.name] if self.name else None
+        check_finite(x, whole, names, "positions")
+        check_times(t, whole, names)
+        for field, values in (("times", t), ("positions", x)):
+            own = values.copy()
+            own.setflags(write=False)
+            object.__setattr__(self, field, own)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return int(self.positions.shape[1])
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        label = "" if self.label is None else f", label={self.label!r}"
+        name = "" if self.name is None else f", name={self.name!r}"
+        return f"Trajectory({len(self)} samples, {self.n_dims} dims, {self.duration:.3g} s{label}{name})"

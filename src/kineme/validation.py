@@ -1,0 +1,120 @@
+"""The only place that turns what a user passes into arrays, and refuses what cannot be used.
+
+Inside the library arrays are trusted. Nothing here writes to an array of the caller.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import SpecificationError, TrajectoryError
+
+Array = NDArray[np.float64]
+
+MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
+
+
+def describe(index: int, names: Sequence[str | None] | None) -> str:
+    """How error messages refer to one movement: its index and, where it has one, its name."""
+    name = names[index] if names else None
+    return f"trajectory {index}" + (f" ({name!r})" if name else "")
+
+
+def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
+    """Check one movement's positions and return them as float64 of shape (T, d).
+
+    A 1-D array is one degree of freedom. Finiteness is checked by `check_finite`, for all movements at once.
+    """
+    try:
+        x = np.asarray(positions, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f"{who}: expected positions to be an array of numbers, got {error}") from error
+    if x.ndim == 1:
+        x = x[:, None]
+    if x.ndim != 2 or x.shape[1] == 0:
+        raise TrajectoryError(
+            f"{who}: expected positions of shape (T, d), samples by dimensions, got shape {x.shape}; "
+            "pass many movements as a list of (T, d) arrays or one (n, T, d) array"
+        )
+    if len(x) < MIN_SAMPLES:
+        raise TrajectoryError(
+            f"{who}: expected at least {MIN_SAMPLES} samples, got {len(x)}"
+            + ("; samples run along the first axis: transpose the array" if x.shape[1] > len(x) else "")
+        )
+    return x
+
+
+def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str] | None, what: str) -> None:
+    """Refuse NaN and infinity in (total, ...) `values`; name the movement and the sample."""
+    if math.isfinite(values.sum()) or np.isfinite(values).all():  # the sum is one quick pass without a temporary
+        return
+    row = int(np.argmin(np.isfinite(values).reshape(len(values), -1).all(axis=1)))
+    i = int(np.searchsorted(offsets, row, side="right")) - 1
+    raise TrajectoryError(
+        f"{describe(i, names)}: expected finite {what}, got {values[row].tolist()} at sample "
+        f"{row - offsets[i]}; remove the sample (its neighbors are interpolated on their time stamps) or repair it"
+    )
+
+
+def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str] | None) -> None:
+    """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
+    check_finite(times, offsets, names, "times")
+    steps = np.diff(times)
+    steps[offsets[1:-1] - 1] = 1.0  # from one movement to the next
+    if steps.size == 0 or steps.min() > 0:
+        return
+    row = int(np.argmax(steps <= 0)) + 1
+    i = int(np.searchsorted(offsets, row, side="right")) - 1
+    k = row - offsets[i]
+    problem = "duplicate" if times[row] == times[row - 1] else "decreasing"
+    raise TrajectoryError(
+        f"{describe(i, names)}: expected strictly increasing times, got {problem} stamps "
+        f"{times[row - 1]:.9g} and {times[row]:.9g} at samples {k - 1} and {k}; sort the samples and drop repeated ones"
+    )
+
+
+def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:
+    """Check that one movement's time stamps are (n_samples,) numbers."""
+    try:
+        t = np.asarray(times, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f"{who}: expected times in seconds, got {error}") from error
+    if t.shape != (n_samples,):
+        raise TrajectoryError(
+            f"{who}: expected one time stamp for each of the {n_samples} samples, got times of shape {t.shape}"
+        )
+    return t
+
+
+def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
+    """Refuse a value that is not in a table's keys; list what is."""
+    if value not in choices:
+        raise SpecificationError(f"expected {name} to be one of {list(choices)}, got {value!r}")
+
+
+def check_number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> None:
+    """Refuse a parameter that is not a finite number in its range."""
+    bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    outside = (above is not None and number <= above) or (least is not None and number < least)
+    if not math.isfinite(number) or outside:
+        raise SpecificationError(f"expected {name} to be a number{bound}, got {value!r}")
+
+
+def check_count(name: str, value: Any, least: int) -> None:
+    """Refuse a parameter that is not a whole number from `least` on."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if number < least:
+        raise SpecificationError(f"expected {name} to be a whole number of at least {least}, got {value!r}")
