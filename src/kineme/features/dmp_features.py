@@ -61,7 +61,7 @@ class DMPFeatures(TransformerMixin, BaseEstimator):
     1.0
     """
 
-    def __init__(  # noqa: PLR0913 - one parameter per choice, as scikit-learn's searches need them
+    def __init__(  # noqa: PLR0913, PLR0917 - one parameter per choice, as scikit-learn's searches need them
         self,
         feature: str = "shape-attractor",
         formulation: str = "bio-inspired",
@@ -132,7 +132,7 @@ class DMPFeatures(TransformerMixin, BaseEstimator):
         return np.array([f"{axis}_{k + 1}" for axis in axes for k in range(size)], dtype=object)
 
     def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()  # type: ignore[no-untyped-call]
+        tags = super().__sklearn_tags__()
         tags.input_tags.two_d_array = False
         tags.input_tags.three_d_array = True
         return tags

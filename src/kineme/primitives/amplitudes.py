@@ -20,12 +20,12 @@ def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | Non
     Raises
     ------
     DegenerateMovementError
-        Where \\|g - x0\\| is zero in a dimension: a closed or a flat movement.
+        Where g = x0 in a dimension: a closed or a flat movement.
 
     Warns
     -----
     DegenerateMovementWarning
-        Once, with a count, for movements in which it is below 1 % of the movement's largest extent.
+        Once, with a count, for movements whose g is closer to x0 than 1 % of the movement's largest extent.
     """
     relative = np.abs(amplitudes) / extents.max(axis=1, keepdims=True)
     zero = relative <= _ZERO
@@ -40,8 +40,8 @@ def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | Non
     near = (relative < _NEAR).any(axis=1)
     if near.any():
         warnings.warn(
-            f"{near.sum()} of {len(near)} movements end within 1 % of their extent from where they start in some dimension "
-            f"(first: {describe(int(np.argmax(near)), names)}); "
+            f"{near.sum()} of {len(near)} movements end within 1 % of their extent from where they start, in some "
+            f"dimension (first: {describe(int(np.argmax(near)), names)}); "
             f'their {feature} are large and fragile: prefer "shape-attractor" or the "bio-inspired" formulation',
             DegenerateMovementWarning,
             stacklevel=4,

@@ -117,11 +117,8 @@ def collect_arrays(
     copy: bool,
 ) -> Movements:
     """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
-    positions, offsets = (
-        _from_block(arrays, copy)
-        if isinstance(arrays, np.ndarray) and arrays.dtype != object
-        else _from_list(arrays, names)
-    )
+    is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
+    positions, offsets = _from_block(arrays, copy) if is_block else _from_list(arrays, names)
     n = len(offsets) - 1
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
