@@ -1,0 +1,31 @@
+"""``kineme``: the group of commands, and how errors end them."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import click
+
+from kineme.cli.reproduce import reproduce
+from kineme.errors import KinemeError
+
+
+class _OneLineErrors(click.Group):
+    """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (KinemeError, OSError) as error:
+            click.echo(f"kineme: {error}", err=True)
+            sys.exit(1)
+
+
+@click.group(cls=_OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="kineme")
+def main() -> None:
+    """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
+
+
+main.add_command(reproduce)

@@ -1,0 +1,1 @@
+"""The experiments, tables and figures of the paper, on real recordings."""

@@ -1,0 +1,76 @@
+"""One draw of one data set through every representation and classifier: the numbers behind all tables."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sklearn
+from scipy.spatial.distance import pdist
+
+from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
+from kineme.kernels import RBF, TruncatedEuclidean
+from kineme.reproduction import paper
+from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, svm_accuracy
+from kineme.reproduction.representations import READINGS, REPRESENTATIONS
+from kineme.validation import Array
+
+#: The paper's nine letters, and its "larger datasets".
+DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
+
+#: Penalties for the table that shows why an SVM can land at 1 / 9.
+PENALTIES = (1.0, 10.0, 1000.0)
+
+
+@lru_cache(maxsize=2)
+def _features(dataset: str) -> tuple[dict[str, Array], Any]:
+    """Features of all recordings of a data set, per representation, and labels as numbers."""
+    demos = load_lasa(DATASETS[dataset])
+    labels = np.unique(demos.labels, return_inverse=True)[1]  # type: ignore[arg-type]
+    return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels
+
+
+def run_draw(dataset: str, seed: int, index: int, svm: bool) -> dict[str, Any]:
+    """All accuracies of one draw.
+
+    Returns
+    -------
+    dict
+        ``nearest``, ``correlation`` and ``distance`` per representation; with `svm`, ``svm`` per
+        "representation/kernel/widths" and ``penalty`` per "representation/kernel/C", and ``width`` per
+        "representation/kernel".
+    """
+    features, labels = _features(dataset)
+    chosen = draw(labels, paper.PER_CLASS, seed, index)
+    rows, y = {key: X[chosen] for key, X in features.items()}, labels[chosen]
+    result: dict[str, Any] = {
+        "nearest": {key: nearest_neighbor_accuracy(X, y) for key, X in rows.items()},
+        "correlation": {key: nearest_neighbor_accuracy(rows[key], y, "cosine") for key in ("original-w", "bio-w")},
+        "distance": {key: float(np.median(pdist(X))) for key, X in rows.items()},
+    }
+    if svm:
+        with sklearn.config_context(skip_parameter_validation=True):
+            result |= _run_svm(rows, y, penalties=dataset == "paper")
+    return result
+
+
+def _run_svm(rows: dict[str, Array], y: Any, penalties: bool) -> dict[str, Any]:
+    accuracy: dict[str, float] = {}
+    width: dict[str, float] = {}
+    by_penalty: dict[str, float] = {}
+    for key, X in rows.items():
+        if not any(key in keys for keys in READINGS.values()):
+            continue
+        rbf, tre = RBF().fit(X), TruncatedEuclidean().fit(X)
+        width |= {f"{key}/rbf": float(rbf.sigma), f"{key}/tre": float(tre.m)}  # type: ignore[arg-type]
+        for name, kernel in (("rbf", rbf), ("tre", tre)):
+            gram = kernel(X)
+            accuracy[f"{key}/{name}/median"] = svm_accuracy(gram, y)
+            for C in PENALTIES[:-1] if penalties and key == "original-sa" else ():
+                by_penalty[f"{key}/{name}/{C:g}"] = svm_accuracy(gram, y, C)
+    for key, cell in zip(READINGS["closest to the paper"], paper.CELLS, strict=True):
+        X = rows[key]
+        accuracy[f"{key}/rbf/paper"] = svm_accuracy(RBF(paper.RBF_SIGMA[cell])(X), y)
+        accuracy[f"{key}/tre/paper"] = svm_accuracy(TruncatedEuclidean(paper.TRE_M[cell])(X), y)
+    return {"svm": accuracy, "width": width, "penalty": by_penalty}

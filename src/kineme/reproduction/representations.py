@@ -1,0 +1,169 @@
+"""What "weights" and "f(t)" can mean: one table of the conventions that papers mix.
+
+Each row turns movements into feature rows. The first question of the reproduction is which rows give the
+paper's numbers; the second is which ones a user should take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kineme.features.dmp_features import features_of
+from kineme.primitives.dmp import DMP
+from kineme.primitives.fits import forcing_target, local_regression
+from kineme.reproduction.paper import N_BASIS, N_POINTS, N_SAMPLES, STIFFNESS
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.resample import relative_rows
+from kineme.validation import Array
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One row of `REPRESENTATIONS`.
+
+    Attributes
+    ----------
+    formulation, quantity : str
+        The column of the paper's tables that the row can stand for.
+    formula : str
+        What the feature is.
+    why : str
+        What the row shows, in one sentence.
+    rows : callable
+        Demonstrations -> features (n, p).
+    """
+
+    key: str
+    formulation: str
+    quantity: str
+    formula: str
+    why: str
+    rows: Callable[[Demonstrations], Array]
+
+
+def specification(formulation: str, gating: str = "none") -> DMP:
+    """The paper's parameters (Section 4.2)."""
+    return DMP(formulation, n_basis=N_BASIS, stiffness=STIFFNESS, gating=gating, n_points=N_POINTS)
+
+
+def _feature(formulation: str, feature: str, gating: str = "none") -> Callable[[Demonstrations], Array]:
+    dmp = specification(formulation, gating)
+    return lambda demos: features_of(dmp.learn(demos), feature, N_SAMPLES)
+
+
+def _phase(n_samples: int) -> Array:
+    return specification("bio-inspired").basis.phase(np.linspace(0.0, 1.0, n_samples))
+
+
+def _weights_of_target_over_s(demos: Demonstrations) -> Array:
+    """Bio-inspired weights when the target is divided by s before a fit with the basis gated by s."""
+    dmp, u = specification("bio-inspired", gating="phase"), np.linspace(0.0, 1.0, N_POINTS)
+    over_s = forcing_target(dmp.basis, dmp.system, dmp.K, dmp.D, u) / _phase(N_POINTS)[:, None]
+    operator = local_regression(dmp.basis, u) @ over_s
+    return (relative_rows(demos, 0, len(demos), N_POINTS) @ operator.T).reshape(len(demos), -1)
+
+
+def _forcing_over_s(demos: Demonstrations) -> Array:
+    by_dimension = _feature("bio-inspired", "forcing")(demos).reshape(len(demos), -1, N_SAMPLES)
+    return (by_dimension / _phase(N_SAMPLES)).reshape(len(demos), -1)
+
+
+def _bracket(demos: Demonstrations) -> Array:
+    by_dimension = _feature("bio-inspired", "shape-attractor")(demos).reshape(len(demos), -1, N_SAMPLES)
+    return (by_dimension / _phase(N_SAMPLES)).reshape(len(demos), -1)
+
+
+REPRESENTATIONS = {
+    row.key: row
+    for row in (
+        Representation(
+            "original-w",
+            "original",
+            "weights",
+            "w, Eq. (2) as printed",
+            "the sign and size of g - x0 differ between equal movements, and w is divided by it",
+            _feature("original", "weights"),
+        ),
+        Representation(
+            "original-w-gated",
+            "original",
+            "weights",
+            "w, basis times s",
+            "the last weights carry 1/s on top; the paper's number lies between this row and the one above",
+            _feature("original", "weights", gating="phase"),
+        ),
+        Representation(
+            "original-f",
+            "original",
+            "f(t)",
+            "f",
+            "f alone is no better than w: both are divided by g - x0",
+            _feature("original", "forcing"),
+        ),
+        Representation(
+            "original-sa",
+            "original",
+            "f(t)",
+            "(g - x0) f, the shape-attractor",
+            "without the division the inversion of Section 3.1 is gone; distances fit the paper's RBF width",
+            _feature("original", "shape-attractor"),
+        ),
+        Representation(
+            "bio-w-over-s",
+            "bio-inspired",
+            "weights",
+            "K w, target divided by s, basis times s",
+            "dividing by a phase that ends at 0.01 drowns the shape in the last samples; fits the paper's RBF width",
+            lambda demos: STIFFNESS * _weights_of_target_over_s(demos),
+        ),
+        Representation(
+            "bio-w",
+            "bio-inspired",
+            "weights",
+            "w, Eq. (2) as printed",
+            "the same weights without any division: nothing is wrong with the formulation",
+            _feature("bio-inspired", "weights"),
+        ),
+        Representation(
+            "bio-f-over-s",
+            "bio-inspired",
+            "f(t)",
+            "f / s",
+            "the paper's bracket without its x0 - x; distances fit the paper's RBF width",
+            _forcing_over_s,
+        ),
+        Representation(
+            "bio-f",
+            "bio-inspired",
+            "f(t)",
+            "f",
+            "not divided by s: all recognized",
+            _feature("bio-inspired", "forcing"),
+        ),
+        Representation(
+            "bio-bracket",
+            "bio-inspired",
+            "f(t)",
+            "K (f/s + x0 - x), Section 2.2 to the letter",
+            "the same division by s, so the same loss",
+            _bracket,
+        ),
+        Representation(
+            "bio-sa",
+            "bio-inspired",
+            "f(t)",
+            "s K (f/s + x0 - x), the shape-attractor as it acts",
+            "multiplied by the s that stands in Eq. (4): no division is left",
+            _feature("bio-inspired", "shape-attractor"),
+        ),
+    )
+}
+
+#: Two readings of the four columns of Tables 2 to 4, in the order of `paper.CELLS`.
+READINGS = {
+    "closest to the paper": ("original-w", "bio-w-over-s", "original-sa", "bio-f-over-s"),
+    "kineme's default": ("original-w", "bio-w", "original-sa", "bio-sa"),
+}

@@ -1,0 +1,47 @@
+"""A table as data, written as text for the terminal and as HTML for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from statistics import fmean
+from typing import NamedTuple
+
+
+class Table(NamedTuple):
+    """A title, column heads, rows of text with the row's name first, and what to read in it."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    reading: str = ""
+
+
+def spread(values: Sequence[float]) -> str:
+    """Mean and range over draws, as ``0.954 (0.89-1.00)``."""
+    return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
+
+
+def to_text(table: Table, width: int = 110) -> str:
+    """Columns aligned for a terminal."""
+    from textwrap import fill
+
+    lines = [table.columns, *table.rows]
+    widths = [max(len(row[k]) for row in lines) for k in range(len(table.columns))]
+    rendered = ["  ".join(cell.ljust(size) for cell, size in zip(row, widths, strict=True)).rstrip() for row in lines]
+    rule = "-" * max(map(len, rendered))
+    return "\n".join(filter(None, [table.title, rule, rendered[0], rule, *rendered[1:], fill(table.reading, width)]))
+
+
+def to_html(table: Table) -> str:
+    """A table element with caption."""
+    head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in table.columns)
+    body = "".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>' + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:]) + "</tr>"
+        for row in table.rows
+    )
+    reading = f"<p>{escape(table.reading)}</p>" if table.reading else ""
+    return (
+        f"<figure><table><caption>{escape(table.title)}</caption><thead><tr>{head}</tr></thead>"
+        f"<tbody>{body}</tbody></table>{reading}</figure>"
+    )
