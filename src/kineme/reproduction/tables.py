@@ -115,10 +115,10 @@ def _diagnosis(draws: Draws) -> Table:
         "Diagnosis. What the numbers depend on: 1-NN, leave one out, nine letters",
         ("feature", "formulation", "column", "ours", "paper", "median distance", "paper's sigma", "why"),
         rows,
-        'The paper calls both forms of f "f(t)" and prints neither gating nor divisions. Its weights are "not useful" in '
-        "the bio-inspired form because the target is divided by a vanishing s, not because of the form; and the "
-        "inversion of w between equal movements is the sign of g - x0, which the shape-attractor does not contain. "
-        "Without divisions both formulations recognize every letter.",
+        'The paper says "f(t)" for what Eqs. (1) and (4) call f and for the shape-attractor, and prints neither gating '
+        'nor divisions. Its weights are "not useful" in the bio-inspired form because the target is divided by a '
+        "vanishing s, not because of the form; and the inversion of w between equal movements is the sign of g - x0, "
+        "which the shape-attractor does not contain. Without divisions both formulations recognize every letter.",
     )
 
 
@@ -132,8 +132,8 @@ def _penalty(draws: Draws) -> Table:
         "Diagnosis. Why an SVM can land at 1/9: the penalty C, shape-attractor, original, median widths",
         ("", *(f"C = {C:g}" for C in PENALTIES)),
         rows,
-        "With three movements per class, a similarity of at most 1 and scikit-learn's C = 1, every multiplier is at its "
-        "bound: the classes that keep three movements outvote the one that lost its third, and accuracy falls below "
+        "With three movements per class, a similarity of at most 1 and scikit-learn's C = 1, every multiplier is at "
+        "its bound: the classes that keep three movements outvote the one that lost its third, and accuracy falls below "
         "chance (1/9 = 0.111). TrE as printed is as large as m, so C does not bind. The tables above use "
         f"C = {PENALTY:g}.",
     )
