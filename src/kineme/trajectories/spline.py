@@ -51,7 +51,7 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))
-    if use_compiled(_OPERATIONS_PER_SAMPLE * int(offsets[-1] - offsets[0]) * n_dims):
+    if use_compiled(_OPERATIONS_PER_SAMPLE * positions.size):  # the whole block, though callers come tile by tile
         from kineme.trajectories._compiled import fill_spline_rows
 
         fill_spline_rows(parameter, positions, offsets, rows)
