@@ -71,5 +71,10 @@ class GaussianBasis:
         return normalized * self.gate(u)[:, None]
 
     def gate(self, u: Array) -> Array:
-        """The factor that f carries besides the basis, shape (T,): 1 or s."""
-        return self.phase(u) if self.gating == "phase" else np.ones_like(u)
+        """The factor that f carries besides the basis, shape (T,): s if gated, else 1.
+
+        Eq. (2) says nothing of u > 1, phases that no demonstration has seen; there the last weight would hold the
+        movement off its goal for ever. So past the end an ungated f fades with the phase, as ``s / s(tau)``.
+        """
+        s = self.phase(u)
+        return s if self.gating == "phase" else np.minimum(1.0, s / self.phase.end)

@@ -31,8 +31,9 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
     def learn_tile(start: int, stop: int) -> None:
         # Even movements are multiplied as they are: their operator contains the resampling.
         rows = even_rows(demos, start, stop) if demos.even_length else relative_rows(demos, start, stop, n_samples)
-        np.matmul(rows, operator.weights, out=weights[start:stop])
-        np.matmul(rows, operator.velocity, out=velocities[start:stop])
+        flat = rows.reshape(-1, n_samples)  # a stack of matrices would become as many small products
+        np.matmul(flat, operator.weights, out=weights[start:stop].reshape(len(flat), -1))
+        np.matmul(flat, operator.velocity, out=velocities[start:stop].reshape(-1))
         amplitudes[start:stop] = rows[:, :, -1]
         np.subtract(rows.max(axis=2), rows.min(axis=2), out=extents[start:stop])
 

@@ -25,22 +25,45 @@ class Formulation:
     ----------
     equation : str
         The transformation system as the paper prints it.
-    scales_with_amplitude : bool
+    divides_by_amplitude : bool
         Whether scale is ``g - x0`` (then weights and f do not exist where it is 0) or the stiffness K.
     coupling : callable
         ``coupling(K, s)``: the factor of ``g - x0`` in the equation and, the same function, of
         ``x - x0`` in the shape-attractor term.
+    ratio : callable
+        ``ratio(new, learned, extents)``: what scale f is multiplied by when a movement learned with one
+        ``g - x0`` is generated with another; all of shape (n, d).
     """
 
     name: str
     equation: str
-    scales_with_amplitude: bool
+    divides_by_amplitude: bool
     coupling: Callable[[float, Array], Array]
+    ratio: Callable[[Array, Array, Array], Array]
 
     def scale(self, stiffness: float, amplitude: Array) -> Array:
-        """The factor of f in the equation, for amplitudes g - x0 of any shape."""
-        return amplitude if self.scales_with_amplitude else np.full_like(amplitude, stiffness)
+        """The factor of f in the equation, for learned amplitudes g - x0 of any shape."""
+        return amplitude if self.divides_by_amplitude else np.full_like(amplitude, stiffness)
 
+
+def _per_dimension(new: Array, learned: Array, extents: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(new == learned, 1.0, new / learned)
+
+
+def _unchanged(new: Array, learned: Array, extents: Array) -> Array:
+    return np.ones_like(new)
+
+
+def _isotropic(new: Array, learned: Array, extents: Array) -> Array:
+    distance = np.linalg.norm(learned, axis=-1, keepdims=True)
+    closed = distance <= CLOSED * extents.max(axis=-1, keepdims=True)
+    ratio = np.linalg.norm(new, axis=-1, keepdims=True) / np.where(closed, 1.0, distance)
+    return np.broadcast_to(np.where(closed, 1.0, ratio), new.shape)
+
+
+#: Share of its extent within which a movement that ends there counts as closed for the amplitude-scaled formulation.
+CLOSED = 0.05
 
 FORMULATIONS = {
     row.name: row
@@ -48,15 +71,27 @@ FORMULATIONS = {
         Formulation(
             name="original",
             equation="tau v' = K (g - x) + (g - x0) f(s) - D v  (Eq. 1)",
-            scales_with_amplitude=True,
+            divides_by_amplitude=True,
             coupling=lambda K, s: np.zeros_like(s),
+            ratio=_per_dimension,
         ),
         # Eq. (4) multiplied out: s K (f/s + x0 - x) + (1 - s) K (g - x) = K (g - x) + K f - K s (g - x0).
         Formulation(
             name="bio-inspired",
             equation="tau v' = s K (f(s)/s + x0 - x) + (1 - s) K (g - x) - D v  (Eq. 4)",
-            scales_with_amplitude=False,
+            divides_by_amplitude=False,
             coupling=lambda K, s: -K * s,
+            ratio=_unchanged,
+        ),
+        # Eq. (4) with f multiplied by the ratio of the distances from start to goal, new over learned: one factor
+        # for all dimensions, never negative, so a nearer goal shrinks the shape and nothing is mirrored. Closed
+        # movements keep their size.
+        Formulation(
+            name="amplitude-scaled",
+            equation="tau v' = s K (r f(s)/s + x0 - x) + (1 - s) K (g - x) - D v,  r = |g - x0| / |g - x0| learned",
+            divides_by_amplitude=False,
+            coupling=lambda K, s: -K * s,
+            ratio=_isotropic,
         ),
     )
 }

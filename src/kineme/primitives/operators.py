@@ -42,9 +42,9 @@ def encoder(dmp: DMP, n_samples: int) -> Encoder:
 
 
 @lru_cache(maxsize=32)
-def decoder(dmp: DMP, n_samples: int) -> Response:
-    """The decode matrices of `dmp` at `n_samples` even times of the movement's duration."""
-    return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, 1.0, n_samples))
+def decoder(dmp: DMP, n_samples: int, end: float = 1.0) -> Response:
+    """The decode matrices of `dmp` at `n_samples` even times from 0 to `end` durations."""
+    return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, end, n_samples))
 
 
 @lru_cache(maxsize=32)

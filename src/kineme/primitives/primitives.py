@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.errors import SpecificationError
 from kineme.primitives.amplitudes import safe_amplitudes
 from kineme.primitives.dmp import DMP
-from kineme.primitives.operators import decoder, forcing_matrix
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.primitives.operators import forcing_matrix
+from kineme.primitives.rollout import Rollout, rollout, samples_at_rate, settled_end
 from kineme.validation import Array, check_count
 
 
@@ -109,24 +111,65 @@ class Primitives:
             term += coupling * self._relative_path(n_samples)
         return term.transpose(0, 2, 1)
 
-    def rollout(self, n_samples: int | None = None) -> Demonstrations:
-        """Move again as demonstrated: same start, goal, initial velocity and duration.
+    def rollout(  # noqa: PLR0913 - a wish per parameter
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> Rollout:
+        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+
+        One primitive goes with many goals, many primitives with one goal, or as many with as many.
 
         Parameters
         ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            x0 and g; by default the demonstrated ones.
+        duration : float or array_like of shape (n,), optional
+            tau [s]; by default the demonstrated one. The path does not depend on it.
+        velocity : array_like of shape (d,) or (n, d), optional
+            Initial velocity, per second; by default the demonstrated one, in proportion to the tempo.
+        rate : float, optional
+            Samples per second, at least; all movements of a batch get the same number of samples.
         n_samples : int, optional
-            Samples per movement; by default the specification's `n_points`.
+            Samples per movement; by default the specification's `n_points`. Give this or `rate`.
+        settle : float, optional
+            Go on past the duration until every dimension stays within this distance of the goal.
+
+        Returns
+        -------
+        Rollout
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal or velocity of the wrong shape; numbers of movements that do not go together.
+        SpecificationError
+            A duration of 0 or less, a rate too low to follow the dynamics.
+        DegenerateMovementError
+            The original formulation asked to move a closed or flat demonstration to another goal.
         """
-        n_samples = self.dmp.n_points if n_samples is None else n_samples
-        path = self._relative_path(n_samples).transpose(0, 2, 1) + self.starts[:, None]
-        times = self.durations[:, None] * np.linspace(0.0, 1.0, n_samples)
-        labels = None if self.labels is None else self.labels
-        return Demonstrations.from_arrays(path, labels, times=list(times), names=self.names, copy=False)  # type: ignore[arg-type]
+        movement = rollout(self, start, goal, duration, velocity)
+        end = 1.0 if settle is None else settled_end(movement, settle)
+        if rate is not None and n_samples is not None:
+            raise SpecificationError("expected either rate or n_samples, got both")
+        if rate is not None:
+            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp.K)
+        elif n_samples is None:
+            n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
+        check_count("n_samples", n_samples, 2)
+        return replace(movement, n_samples=n_samples, end=end)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""
         amplitude = self.goals - self.starts
-        if self.dmp.system.scales_with_amplitude:
+        if self.dmp.system.divides_by_amplitude:
             amplitude = safe_amplitudes(amplitude, self.extents, self.names, feature)
         return self.dmp.system.scale(self.dmp.K, amplitude)[:, :, None]
 
@@ -136,9 +179,5 @@ class Primitives:
 
     def _relative_path(self, n_samples: int) -> Array:
         """Positions minus the start, shape (n, d, S)."""
-        check_count("n_samples", n_samples, 2)
-        response = decoder(self.dmp, n_samples)
-        path = self.scaled_weights @ response.Phi[0].T
-        path += (self.goals - self.starts)[:, :, None] * response.goal[0]
-        path += (self.velocities * self.durations[:, None])[:, :, None] * response.velocity[0]
-        return path
+        path = self.rollout(n_samples=n_samples).positions.transpose(0, 2, 1)
+        return path - self.starts[:, :, None]

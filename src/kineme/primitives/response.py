@@ -16,15 +16,15 @@ _STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at
 
 
 class Response(NamedTuple):
-    """Positions and velocities at T normalized times as linear maps of (W, g - x0, v0).
+    """Positions, velocities and accelerations at T normalized times as linear maps of (W, g - x0, v0).
 
-    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0``, and index 1 gives dx/du in the same way.
-    W are the weights times the formulation's scale, v0 is dx/du at the start.
+    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0``; index 1 gives dx/du and index 2 its derivative
+    in the same way. W are the weights times the formulation's scale, v0 is dx/du at the start.
     """
 
-    Phi: Array  # (2, T, N)
-    goal: Array  # (2, T)
-    velocity: Array  # (2, T)
+    Phi: Array  # (3, T, N)
+    goal: Array  # (3, T)
+    velocity: Array  # (3, T)
 
 
 def spring_damper_response(
@@ -47,22 +47,27 @@ def spring_damper_response(
     carry = transition(stiffness, damping, np.array([h]))[0]
     # An acceleration at a node reaches the end of the step through the second column.
     impulse = transition(stiffness, damping, h - nodes)[:, :, 1] * (0.5 * h * _NODE_WEIGHTS)[:, None]  # (8, 2)
-    starts = np.arange((len(u) - 1) * n_steps) * h
+    starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
     at_nodes = (starts[:, None] + nodes).ravel()
-    forcing = np.column_stack(
-        (basis.design(at_nodes), stiffness + formulation.coupling(stiffness, basis.phase(at_nodes)))
-    ).reshape(len(starts), len(nodes), -1)
+    forcing = _forcing(basis, formulation, stiffness, at_nodes).reshape(len(starts), len(nodes), -1)
     driven = np.einsum("qz,kqf->kzf", impulse, forcing)  # what each step adds to (x, x')
-    states = np.zeros((len(u), 2, basis.n_basis + 2))
+    states = np.zeros((len(u), 3, basis.n_basis + 2))
     states[0, 1, -1] = 1.0
-    state = states[0]
+    state = states[0, :2]
     for k, added in enumerate(driven):
         state = carry @ state
         state[:, :-1] += added
         if (k + 1) % n_steps == 0:
-            states[(k + 1) // n_steps] = state
+            states[(k + 1) // n_steps, :2] = state
+    states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
+    states[:, 2, :-1] += _forcing(basis, formulation, stiffness, u)
     by_part = states.transpose(1, 0, 2)
     return Response(np.ascontiguousarray(by_part[:, :, :-2]), by_part[:, :, -2].copy(), by_part[:, :, -1].copy())
+
+
+def _forcing(basis: GaussianBasis, formulation: Formulation, stiffness: float, u: Array) -> Array:
+    """What acts besides spring and damper, per unit of each W and of g - x0, shape (T, N + 1)."""
+    return np.column_stack((basis.design(u), stiffness + formulation.coupling(stiffness, basis.phase(u))))
 
 
 def transition(stiffness: float, damping: float, h: Array) -> Array:

@@ -133,7 +133,7 @@ def _penalty(draws: Draws) -> Table:
         ("", *(f"C = {C:g}" for C in PENALTIES)),
         rows,
         "With three movements per class, a similarity of at most 1 and scikit-learn's C = 1, every multiplier is at "
-        "its bound: the classes that keep three movements outvote the one that lost its third, and accuracy falls below "
-        "chance (1/9 = 0.111). TrE as printed is as large as m, so C does not bind. The tables above use "
+        "its bound: the classes that keep three movements outvote the one that lost its third, and accuracy falls "
+        "below chance (1/9 = 0.111). TrE as printed is as large as m, so C does not bind. The tables above use "
         f"C = {PENALTY:g}.",
     )
