@@ -50,7 +50,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     return x
 
 
-def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str] | None, what: str) -> None:
+def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None, what: str) -> None:
     """Refuse NaN and infinity in (total, ...) `values`; name the movement and the sample."""
     if math.isfinite(values.sum()) or np.isfinite(values).all():  # the sum is one quick pass without a temporary
         return
@@ -62,7 +62,7 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str] 
     )
 
 
-def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str] | None) -> None:
+def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
     steps = np.diff(times)

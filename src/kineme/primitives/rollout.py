@@ -191,8 +191,8 @@ def samples_at_rate(rate: float, durations: Array, stiffness: float) -> int:
     least = math.ceil(2 * math.sqrt(stiffness)) + 1
     if n_samples < least:
         raise SpecificationError(
-            f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that is "
-            f"two samples in each time constant duration / sqrt(K) of the spring, got {rate:g} Hz"
+            f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that "
+            f"is two samples in each time constant duration / sqrt(K) of the spring, got {rate:g} Hz"
         )
     return n_samples
 

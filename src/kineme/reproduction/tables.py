@@ -88,7 +88,10 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
         kernel = {"rbf": "RBF", "tre": "TrE"}[name]
         if with_paper:
             rows.append((f"{kernel}: paper", *(f"{printed[cell]:.3f}" for cell in paper.CELLS)))
-        lines = ((_CLOSEST, "paper", "Table 3 widths"), (_CLOSEST, "median", "median widths"))
+        lines: tuple[tuple[str, str, str], ...] = (
+            (_CLOSEST, "paper", "Table 3 widths"),
+            (_CLOSEST, "median", "median widths"),
+        )
         lines += ((_DEFAULT, "median", "median widths"),)
         for reading, widths, words in lines:
             cells = (spread(_over(draws, "svm", f"{key}/{name}/{widths}")) for key in READINGS[reading])
@@ -98,7 +101,7 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
 
 
 def _diagnosis(draws: Draws) -> Table:
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             row.formula,
             row.formulation,

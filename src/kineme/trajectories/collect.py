@@ -113,7 +113,7 @@ def collect_arrays(
     arrays: Any,
     labels: ArrayLike | None,
     times: Sequence[ArrayLike] | Array | None,
-    names: Sequence[str] | None,
+    names: Sequence[str | None] | None,
     copy: bool,
 ) -> Movements:
     """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
@@ -149,7 +149,7 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 
 
-def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str] | None) -> tuple[Array, NDArray[np.intp]]:
+def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
     known = tuple(names) if names is not None and len(names) == len(arrays) else None
     return _join(_check_each(as_positions, (arrays,), known), known)
 
@@ -177,7 +177,9 @@ def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate(checked), np.concatenate(([0], np.cumsum([len(x) for x in checked])))
 
 
-def _join_times(times: Sequence[ArrayLike] | Array, offsets: NDArray[np.intp], names: Sequence[str] | None) -> Array:
+def _join_times(
+    times: Sequence[ArrayLike] | Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None
+) -> Array:
     n, lengths = len(offsets) - 1, np.diff(offsets)
     if isinstance(times, np.ndarray) and times.dtype != object and times.ndim == 1:
         times = [times] * n

@@ -54,7 +54,7 @@ class Demonstrations(Sequence[Trajectory]):
         arrays: Sequence[ArrayLike] | Array,
         labels: ArrayLike | None = None,
         times: Sequence[ArrayLike] | Array | None = None,
-        names: Sequence[str] | None = None,
+        names: Sequence[str | None] | None = None,
         copy: bool = True,
     ) -> Demonstrations:
         """Collect plain arrays.
