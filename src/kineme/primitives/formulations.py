@@ -17,6 +17,9 @@ import numpy as np
 from kineme.validation import Array
 
 
+_ZERO = 1e-9  # of the movement's largest extent: g and x0 are the same place
+
+
 @dataclass(frozen=True)
 class Formulation:
     """One row of `FORMULATIONS`.
@@ -47,8 +50,10 @@ class Formulation:
 
 
 def _per_dimension(new: Array, learned: Array, extents: Array) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(new == learned, 1.0, new / learned)
+    nothing = _ZERO * extents.max(axis=-1, keepdims=True)  # rounding alone would mirror and magnify
+    closed = np.abs(learned) <= nothing
+    ratio = np.where(np.abs(new) <= nothing, 1.0, np.inf)
+    return np.divide(new, learned, out=ratio, where=~closed)
 
 
 def _unchanged(new: Array, learned: Array, extents: Array) -> Array:

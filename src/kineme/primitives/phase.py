@@ -10,6 +10,9 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_number
 
+# Beyond these the centers c_i, or the squares of their distances, are no longer different numbers.
+_SMALLEST, _LARGEST = 1e-100, 0.999
+
 
 @dataclass(frozen=True)
 class ExponentialPhase:
@@ -25,8 +28,10 @@ class ExponentialPhase:
 
     def __post_init__(self) -> None:
         check_number("phase_end", self.end, above=0.0)
-        if self.end >= 1:
-            raise SpecificationError(f"expected phase_end to be below 1, got {self.end!r}")
+        if not _SMALLEST <= self.end <= _LARGEST:
+            raise SpecificationError(
+                f"expected phase_end to be between {_SMALLEST:g} and {_LARGEST:g}, got {self.end!r}"
+            )
 
     @property
     def alpha(self) -> float:

@@ -52,7 +52,9 @@ class Primitives:
 
     def __post_init__(self) -> None:
         for field in ("scaled_weights", "starts", "goals", "velocities", "durations", "extents"):
-            getattr(self, field).setflags(write=False)
+            view = getattr(self, field).view()
+            view.setflags(write=False)
+            object.__setattr__(self, field, view)
 
     def __len__(self) -> int:
         return len(self.starts)

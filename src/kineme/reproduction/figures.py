@@ -95,7 +95,7 @@ def _movement(seed: int) -> Figure:
     left.plot(*x[0], "o", color=GRAY, markersize=6)
     left.plot(*x[-1], "*", color="black", markersize=9)
     for formulation, color, line in zip(("original", "bio-inspired"), SEQUENCE, LINES, strict=False):
-        y = specification(formulation).learn(one).rollout(len(x))[0].positions
+        y = specification(formulation).learn(one).rollout(n_samples=len(x)).positions[0]
         left.plot(*y.T, color=color, linestyle=line, label=f"from w, {formulation}")
         distance = np.linalg.norm(y - x, axis=1)
         right.plot(one[0].times, distance, color=color, linestyle=line, label=formulation)

@@ -15,8 +15,6 @@ from sklearn.model_selection import LeaveOneOut
 from sklearn.neighbors import NearestNeighbors
 from sklearn.svm import SVC
 
-from kineme.validation import Array
-
 #: Penalty of the SVM. The paper does not print its own; scikit-learn's 1 makes the RBF columns collapse.
 PENALTY = 1000.0
 
@@ -28,13 +26,13 @@ def draw(labels: NDArray[Any], per_class: int, seed: int, index: int) -> NDArray
     return np.concatenate(chosen)
 
 
-def nearest_neighbor_accuracy(rows: Array, labels: NDArray[Any], metric: str = "euclidean") -> float:
+def nearest_neighbor_accuracy(rows: NDArray[Any], labels: NDArray[Any], metric: str = "euclidean") -> float:
     """Leave-one-out accuracy of 1-NN: scikit-learn's neighbors of the training rows leave each row itself out."""
     nearest = NearestNeighbors(n_neighbors=1, metric=metric).fit(rows).kneighbors(return_distance=False)[:, 0]
     return float(np.mean(labels[nearest] == labels))
 
 
-def svm_accuracy(gram: Array, labels: NDArray[Any], penalty: float = PENALTY) -> float:
+def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENALTY) -> float:
     """Leave-one-out accuracy of an SVM on a Gram matrix."""
     model = SVC(kernel="precomputed", C=penalty)
     right = 0

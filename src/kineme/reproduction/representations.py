@@ -116,8 +116,8 @@ REPRESENTATIONS = {
             "bio-inspired",
             "weights",
             "K w, target divided by s, basis times s",
-            "dividing by a phase that ends at 0.01 drowns the shape in the last samples; fits the paper's RBF width",
-            lambda demos: STIFFNESS * _weights_of_target_over_s(demos),
+            "dividing by a phase that ends at 0.01 leaves little but the last samples; distances fit the paper's RBF width",
+            _weights_of_target_over_s,
         ),
         Representation(
             "bio-w",
@@ -132,7 +132,7 @@ REPRESENTATIONS = {
             "bio-inspired",
             "f(t)",
             "f / s",
-            "the paper's bracket without its x0 - x; distances fit the paper's RBF width",
+            "the division magnifies the noise of the last samples; distances fit the paper's RBF width",
             _forcing_over_s,
         ),
         Representation(

@@ -12,7 +12,7 @@ BLUE, ORANGE, GREEN, PURPLE, GRAY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", 
 SEQUENCE = (BLUE, ORANGE, GREEN)
 LINES = ("-", "--", ":")
 
-_RC = {
+_RC: dict[str, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 9,
@@ -34,7 +34,7 @@ def new_figure(width: float, height: float) -> Figure:
     """An empty figure of the given size in inches, without any window system."""
     import matplotlib
 
-    matplotlib.rcParams.update(_RC)
+    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
     return Figure(figsize=(width, height), layout="constrained")
 
 
