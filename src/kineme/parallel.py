@@ -27,7 +27,7 @@ def n_threads() -> int:
     wanted = os.environ.get("KINEME_NUM_THREADS")
     if wanted is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not wanted.isdigit() or int(wanted) < 1:
+    if not wanted.isdecimal() or int(wanted) < 1:
         raise SpecificationError(f"expected KINEME_NUM_THREADS to be a whole number from 1, got {wanted!r}")
     return int(wanted)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,9 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
 
 def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None, what: str) -> None:
     """Refuse NaN and infinity in (total, ...) `values`; name the movement and the sample."""
-    if math.isfinite(values.sum()) or np.isfinite(values).all():  # the sum is one quick pass without a temporary
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = values.sum()  # one quick pass without a temporary
+    if math.isfinite(total) or np.isfinite(values).all():
         return
     row = int(np.argmin(np.isfinite(values).reshape(len(values), -1).all(axis=1)))
     i = int(np.searchsorted(offsets, row, side="right")) - 1
@@ -101,10 +104,7 @@ def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
 def check_number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> None:
     """Refuse a parameter that is not a finite number in its range."""
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     outside = (above is not None and number <= above) or (least is not None and number < least)
     if not math.isfinite(number) or outside:
         raise SpecificationError(f"expected {name} to be a number{bound}, got {value!r}")

@@ -127,7 +127,7 @@ class DMPFeatures(TransformerMixin, BaseEstimator):
     def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
         """Names x_1 ... x_S, y_1 ... y_S; beyond three dimensions q1_1 ... q1_S, q2_1 ..."""
         check_is_fitted(self)
-        size = self.n_basis if self.feature == "weights" else self.n_samples
+        size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
         axes = "xyz"[: self.n_dims_] if self.n_dims_ <= len("xyz") else [f"q{k + 1}" for k in range(self.n_dims_)]
         return np.array([f"{axis}_{k + 1}" for axis in axes for k in range(size)], dtype=object)
 

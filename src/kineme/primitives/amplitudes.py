@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
+from kineme.primitives.formulations import ZERO
 from kineme.validation import Array, describe
 
-_ZERO = 1e-9  # of the movement's largest extent: g and x0 are the same place
 _NEAR = 1e-2  # of it: the division magnifies noise a hundredfold
 
 
@@ -28,7 +28,7 @@ def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | Non
         Once, with a count, for movements whose g is closer to x0 than 1 % of the movement's largest extent.
     """
     relative = np.abs(amplitudes) / extents.max(axis=1, keepdims=True)
-    zero = relative <= _ZERO
+    zero = relative <= ZERO
     if zero.any():
         i, k = (int(index) for index in np.argwhere(zero)[0])
         raise DegenerateMovementError(

@@ -16,8 +16,8 @@ import numpy as np
 
 from kineme.validation import Array
 
-
-_ZERO = 1e-9  # of the movement's largest extent: g and x0 are the same place
+#: Share of its largest extent within which the goal of a movement is the same place as its start.
+ZERO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Formulation:
 
 
 def _per_dimension(new: Array, learned: Array, extents: Array) -> Array:
-    nothing = _ZERO * extents.max(axis=-1, keepdims=True)  # rounding alone would mirror and magnify
+    nothing = ZERO * extents.max(axis=-1, keepdims=True)  # rounding alone would mirror and magnify
     closed = np.abs(learned) <= nothing
     ratio = np.where(np.abs(new) <= nothing, 1.0, np.inf)
     return np.divide(new, learned, out=ratio, where=~closed)

@@ -19,66 +19,80 @@ def fill_spline_rows(parameter, positions, offsets, rows):  # type: ignore[no-un
     longest = 0
     for i in range(n):
         longest = max(longest, offsets[i + 1] - offsets[i])
-    h, inv_h, pivot, above = np.empty(longest), np.empty(longest), np.empty(longest), np.empty(longest)
-    y, slope, m, cubic = np.empty(longest), np.empty(longest), np.empty(longest), np.empty(longest)
+    h, inv_h, above, cubic = np.empty(longest), np.empty(longest), np.empty(longest), np.empty(longest)
+    y, slope, m = np.empty((n_dims, longest)), np.empty((n_dims, longest)), np.empty((n_dims, longest))
     interval, local = np.empty(n_points, np.int64), np.empty(n_points)
     for i in range(n):
         first, length = offsets[i], offsets[i + 1] - offsets[i]
         u = parameter[first : first + length]
-        _factor(u, length, h, inv_h, pivot, above)
+        for j in range(length - 1):
+            h[j] = u[j + 1] - u[j]
+            inv_h[j] = 1.0 / h[j]
+        for k in range(n_dims):
+            _chords(positions[first : first + length, k], inv_h, length, y[k], slope[k], m[k])
+        _eliminate(h, inv_h, length, above, m)
         _locate(u, length, interval, local)
         for k in range(n_dims):
-            x = positions[first : first + length, k]
-            for j in range(length):
-                y[j] = x[j] - x[0]
-            _second_derivatives(y, length, h, inv_h, pivot, above, slope, m)
-            for j in range(length - 1):
-                slope[j] -= h[j] * (2.0 * m[j] + m[j + 1]) * (1.0 / 6.0)
-                cubic[j] = (m[j + 1] - m[j]) * inv_h[j] * (1.0 / 6.0)
-                m[j] *= 0.5
-            row = rows[i, k]
-            for p in range(n_points):
-                j, v = interval[p], local[p]
-                row[p] = y[j] + v * (slope[j] + v * (m[j] + v * cubic[j]))
+            _substitute(h, inv_h, length, above, m[k])
+            _evaluate(h, inv_h, length, y[k], slope[k], m[k], cubic, interval, local, rows[i, k])
 
 
 @jit
-def _factor(u, length, h, inv_h, pivot, above):  # type: ignore[no-untyped-def]
-    """Knot distances and the elimination of the tridiagonal matrix, shared by all dimensions.
-
-    `pivot` holds the reciprocal pivots, `above` the eliminated upper diagonal.
-    """
-    last = length - 2  # the last inner knot
-    for j in range(length - 1):
-        h[j] = u[j + 1] - u[j]
-    for j in range(length - 1):
-        inv_h[j] = 1.0 / h[j]
-    q = h[0] * h[0] * inv_h[1]
-    pivot[1] = 1.0 / (3.0 * h[0] + 2.0 * h[1] + q)
-    above[1] = (h[1] - q) * pivot[1]
-    for j in range(2, last):
-        pivot[j] = 1.0 / (2.0 * (h[j - 1] + h[j]) - h[j - 1] * above[j - 1])
-        above[j] = h[j] * pivot[j]
-    q = h[last] * h[last] * inv_h[last - 1]
-    pivot[last] = 1.0 / (2.0 * h[last - 1] + 3.0 * h[last] + q - (h[last - 1] - q) * above[last - 1])
-
-
-@jit
-def _second_derivatives(y, length, h, inv_h, pivot, above, slope, m):  # type: ignore[no-untyped-def]
-    """Solve for the second derivatives m of one dimension; `slope` holds the chord slopes."""
-    last = length - 2
+def _chords(x, inv_h, length, y, slope, m):  # type: ignore[no-untyped-def]
+    """Positions from the start, chord slopes, and the right-hand side of the equations."""
+    for j in range(length):
+        y[j] = x[j] - x[0]
     for j in range(length - 1):
         slope[j] = (y[j + 1] - y[j]) * inv_h[j]
     for j in range(1, length - 1):
         m[j] = 6.0 * (slope[j] - slope[j - 1])
-    m[1] *= pivot[1]
+
+
+@jit
+def _eliminate(h, inv_h, length, above, m):  # type: ignore[no-untyped-def]
+    """Forward elimination of the tridiagonal matrix, in all dimensions; `above` gets its upper diagonal.
+
+    Each pivot waits for the division before it: one loop for all lets the processor work on the
+    right-hand sides meanwhile, and `used`, which is ``h[j] * above[j]``, does not wait for `above`.
+    """
+    last = length - 2  # the last inner knot
+    q = h[0] * h[0] * inv_h[1]
+    pivot = 1.0 / (3.0 * h[0] + 2.0 * h[1] + q)
+    above[1] = (h[1] - q) * pivot
+    m[:, 1] *= pivot
+    used = h[1] * above[1]
     for j in range(2, last):
-        m[j] = (m[j] - h[j - 1] * m[j - 1]) * pivot[j]
-    m[last] = (m[last] - (h[last - 1] - h[last] * h[last] * inv_h[last - 1]) * m[last - 1]) * pivot[last]
+        pivot = 1.0 / (2.0 * (h[j - 1] + h[j]) - used)
+        used = (h[j] * h[j]) * pivot
+        above[j] = h[j] * pivot
+        for k in range(len(m)):
+            m[k, j] = (m[k, j] - h[j - 1] * m[k, j - 1]) * pivot
+    q = h[last] * h[last] * inv_h[last - 1]
+    below = h[last - 1] - q
+    pivot = 1.0 / (2.0 * h[last - 1] + 3.0 * h[last] + q - below * above[last - 1])
+    m[:, last] = (m[:, last] - below * m[:, last - 1]) * pivot
+
+
+@jit
+def _substitute(h, inv_h, length, above, m):  # type: ignore[no-untyped-def]
+    """Backward substitution of one dimension, and the second derivatives at both ends."""
+    last = length - 2
     for j in range(last - 1, 0, -1):
         m[j] -= above[j] * m[j + 1]
     m[0] = m[1] - h[0] * inv_h[1] * (m[2] - m[1])
     m[last + 1] = m[last] + h[last] * inv_h[last - 1] * (m[last] - m[last - 1])
+
+
+@jit
+def _evaluate(h, inv_h, length, y, slope, m, cubic, interval, local, row):  # type: ignore[no-untyped-def]
+    """The cubics of one dimension at the even targets; overwrites slopes and second derivatives."""
+    for j in range(length - 1):
+        slope[j] -= h[j] * (2.0 * m[j] + m[j + 1]) * (1.0 / 6.0)
+        cubic[j] = (m[j + 1] - m[j]) * inv_h[j] * (1.0 / 6.0)
+        m[j] *= 0.5
+    for p in range(len(row)):
+        j, v = interval[p], local[p]
+        row[p] = y[j] + v * (slope[j] + v * (m[j] + v * cubic[j]))
 
 
 @jit

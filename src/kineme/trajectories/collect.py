@@ -95,16 +95,13 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
     positions, offsets = _join([one.positions for one in trajectories], names)
     times = np.concatenate([one.times for one in trajectories])
     labels = [one.label for one in trajectories]
-    if None in labels and any(label is not None for label in labels):
-        raise TrajectoryError(
-            f"expected a label on every movement or on none, got none on {describe(labels.index(None), None)}"
-        )
+    labeled = any(label is not None for label in labels)
     return Movements(
         positions,
         offsets,
         times[offsets[1:] - 1] - times[offsets[:-1]],
         times,
-        None if labels[0] is None else np.asarray(labels),
+        _as_labels(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
     )
 
@@ -118,6 +115,8 @@ def collect_arrays(
 ) -> Movements:
     """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
     is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
+    if not is_block:
+        _check_sized(arrays, "movements as a list of (T, d) arrays or one (n, T, d) array")
     positions, offsets = _from_block(arrays, copy) if is_block else _from_list(arrays, names)
     n = len(offsets) - 1
     if names is not None and len(names) != n:
@@ -130,7 +129,7 @@ def collect_arrays(
         offsets,
         durations,
         stamps,
-        None if labels is None else _as_labels(labels, n),
+        None if labels is None else _as_labels(labels, n, names),
         None if names is None else tuple(names),
     )
 
@@ -143,8 +142,10 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
         )
     if len(block) == 0:
         raise TrajectoryError("expected at least one movement, got none")
-    as_positions(block[0])
+    as_positions(block[0], "every movement of the block")
     n, n_samples, n_dims = block.shape
+    if block.dtype.kind not in "biuf":
+        raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 
@@ -152,6 +153,11 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
     known = tuple(names) if names is not None and len(names) == len(arrays) else None
     return _join(_check_each(as_positions, (arrays,), known), known)
+
+
+def _check_sized(value: Any, expected: str) -> None:
+    if not hasattr(value, "__len__") or isinstance(value, (str, bytes, dict)):
+        raise TrajectoryError(f"expected {expected}, got {type(value).__name__}")
 
 
 def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...], names: Names) -> list[Array]:
@@ -183,6 +189,7 @@ def _join_times(
     n, lengths = len(offsets) - 1, np.diff(offsets)
     if isinstance(times, np.ndarray) and times.dtype != object and times.ndim == 1:
         times = [times] * n
+    _check_sized(times, "times as a list of (T,) arrays or one (T,) array")
     if len(times) != n:
         raise TrajectoryError(f"expected times for each of the {n} movements, got {len(times)}")
     stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
@@ -190,8 +197,12 @@ def _join_times(
     return stamps
 
 
-def _as_labels(labels: ArrayLike, n: int) -> NDArray[Any]:
-    array = np.asarray(labels)
+def _as_labels(labels: Any, n: int, names: Sequence[str | None] | None) -> NDArray[Any]:
+    array = np.array(labels)
     if array.shape != (n,):
         raise TrajectoryError(f"expected one label for each of the {n} movements, got labels of shape {array.shape}")
-    return array.copy()
+    if array.dtype == object and None in (known := array.tolist()):
+        raise TrajectoryError(
+            f"expected a label on every movement or on none, got none on {describe(known.index(None), names)}"
+        )
+    return array

@@ -85,7 +85,7 @@ class Demonstrations(Sequence[Trajectory]):
             return movements
         if isinstance(movements, Trajectory):
             return cls([movements])
-        if not isinstance(movements, np.ndarray) and len(movements) and isinstance(movements[0], Trajectory):
+        if isinstance(movements, Sequence) and len(movements) and isinstance(movements[0], Trajectory):
             return cls(movements)
         return cls.from_arrays(movements, copy=False)
 
@@ -161,7 +161,7 @@ class Demonstrations(Sequence[Trajectory]):
         one = object.__new__(Trajectory)
         object.__setattr__(one, "times", self.times[rows])
         object.__setattr__(one, "positions", self.positions[rows])
-        object.__setattr__(one, "label", None if self.labels is None else self.labels[i])
+        object.__setattr__(one, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
         object.__setattr__(one, "name", None if self.names is None else self.names[i])
         return one
 

@@ -18,12 +18,20 @@ class Step(Protocol):
         ...
 
 
+def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
+    """Refuse what is not an iterable of steps; a step's class without parentheses is not a step."""
+    found = tuple(steps) if isinstance(steps, Iterable) else ()
+    wrong = [step for step in found if isinstance(step, type) or not callable(getattr(step, "apply", None))]
+    if wrong or not isinstance(steps, Iterable):
+        raise SpecificationError(
+            "expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), "
+            f"got {wrong[0] if wrong else steps!r}"
+        )
+    return found
+
+
 def preprocess(demonstrations: Demonstrations, steps: Iterable[Step]) -> Demonstrations:
     """Apply steps in order; the result's ``steps`` records them after those already applied."""
-    for step in steps:
-        if not callable(getattr(step, "apply", None)):
-            raise SpecificationError(
-                f"expected preprocessing steps such as kineme.TrimRest() or kineme.Smooth(), got {step!r}"
-            )
+    for step in check_steps(steps):
         demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))
     return demonstrations

@@ -19,13 +19,21 @@ _OPERATIONS_PER_SAMPLE = 100  # elementary operations that SciPy's spline costs 
 
 @lru_cache(maxsize=64)
 def spline_matrix(n_in: int, n_out: int) -> Array:
-    """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples."""
-    from scipy.interpolate import CubicSpline
+    """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples.
 
+    With B-splines B at the samples and C at the points it is ``C B^-1``; solving with the transposed, banded B
+    needs no more memory than the result, however long the recording.
+    """
+    from scipy.interpolate import BSpline
+    from scipy.sparse.linalg import splu
+
+    u, v = np.linspace(0.0, 1.0, n_in), np.linspace(0.0, 1.0, n_out)
     if n_in == n_out:
         matrix = np.eye(n_in)
     else:
-        matrix = CubicSpline(np.linspace(0, 1, n_in), np.eye(n_in))(np.linspace(0, 1, n_out))
+        knots = np.concatenate((np.zeros(4), u[2:-2], np.ones(4)))  # not-a-knot: none at the samples next to the ends
+        at_samples, at_points = (BSpline.design_matrix(points, knots, 3) for points in (u, v))
+        matrix = np.ascontiguousarray(splu(at_samples.T.tocsc()).solve(at_points.T.toarray()).T)
     matrix.setflags(write=False)
     return matrix
 
