@@ -1,0 +1,1 @@
+"""Timings and errors of kineme beside its peers; run `python -m bench`."""

@@ -1,0 +1,30 @@
+"""Measure, print a table, save the figures: ``python -m bench [--only NAME ...] [--quick]``."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+
+from bench.rows import save, table
+
+SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction")
+
+
+def main() -> int:
+    """Run the subjects; the exit status says whether every target is met."""
+    parser = argparse.ArgumentParser(prog="bench", description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=SUBJECTS, default=SUBJECTS, metavar="NAME", help=str(SUBJECTS))
+    parser.add_argument("--quick", action="store_true", help="smaller data, fewer repeats: a look, not a result")
+    arguments = parser.parse_args()
+    missed = 0
+    for name in arguments.only:
+        rows = importlib.import_module(f"bench.{name}").measure(arguments.quick)
+        missed += sum(row.met is False for row in rows)
+        print(f"\n{name}\n{table(rows)}", flush=True)
+        save(name, rows, arguments.quick)
+    print(f"\n{missed} targets missed" if missed else "\nall targets met")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,50 @@
+"""The peers behind one small interface, each with its own recommended settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bench.movements import Array
+
+
+def movement_primitive(times: Array, n_dims: int, n_basis: int, bio_inspired: bool = False) -> Any:
+    """An untrained DMP of movement_primitives for a movement with these (T,) stamps, which start at zero.
+
+    `smooth_scaling` is its name for the bio-inspired formulation.
+    """
+    from movement_primitives.dmp import DMP
+
+    return DMP(
+        n_dims,
+        execution_time=float(times[-1]),
+        dt=float(times[-1]) / (len(times) - 1),
+        n_weights_per_dim=n_basis,
+        smooth_scaling=bio_inspired,
+    )
+
+
+def pydmps_primitive(n_steps: int, n_dims: int, n_basis: int) -> Any:
+    """An untrained DMP of pydmps, which takes every movement as one second long."""
+    from pydmps.dmp_discrete import DMPs_discrete
+
+    return DMPs_discrete(n_dmps=n_dims, n_bfs=n_basis, dt=1.0 / n_steps)
+
+
+def replay_movement_primitives(times: Array, positions: Array, n_basis: int, bio_inspired: bool) -> tuple[Array, Array]:
+    """Learn and replay one even movement: phases in [0, 1] and positions."""
+    dmp = movement_primitive(times, positions.shape[1], n_basis, bio_inspired)
+    dmp.imitate(times, positions)
+    t, path = dmp.open_loop()
+    n = len(times)  # its time axis sometimes has one step more
+    return t[:n] / times[-1], path[:n]
+
+
+def replay_pydmps(positions: Array, n_basis: int) -> tuple[Array, Array]:
+    """Learn and replay one even movement: phases in [0, 1] and positions."""
+    n_steps = len(positions)
+    dmp = pydmps_primitive(n_steps, positions.shape[1], n_basis)
+    dmp.imitate_path(positions.T)
+    path, _, _ = dmp.rollout()
+    return np.arange(1, len(path) + 1) / n_steps, path  # its first sample is the state after one step
