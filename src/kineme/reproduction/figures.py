@@ -101,7 +101,7 @@ def _movement(seed: int) -> Figure:
         right.plot(one[0].times, distance, color=color, linestyle=line, label=formulation)
     left.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     left.margins(0.12)
-    right.set(xlabel="time [s]", ylabel="distance from demonstration [mm]", ylim=(0, None))
+    right.set(xlabel="time [s]", ylabel="distance from it [mm]", ylim=(0, None))
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 

@@ -116,7 +116,7 @@ REPRESENTATIONS = {
             "bio-inspired",
             "weights",
             "K w, target divided by s, basis times s",
-            "dividing by a phase that ends at 0.01 leaves little but the last samples; distances fit the paper's RBF width",
+            "division by a phase that ends at 0.01 leaves little but the last samples; fits the paper's RBF width",
             _weights_of_target_over_s,
         ),
         Representation(
