@@ -1,0 +1,44 @@
+"""The shortcuts of the protocol against scikit-learn's own leave-one-out."""
+
+import numpy as np
+import pytest
+from sklearn.model_selection import LeaveOneOut, cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.svm import SVC
+
+from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, svm_accuracy
+
+
+@pytest.fixture(params=range(5))
+def overlapping_classes(request):
+    rng = np.random.default_rng(request.param)
+    y = np.repeat(np.arange(5), 4)
+    return rng.normal(size=(20, 3)) + 0.8 * y[:, None], y
+
+
+@pytest.mark.parametrize("metric", ["euclidean", "cosine"])
+def test_nearest_neighbor_is_leave_one_out(overlapping_classes, metric):
+    X, y = overlapping_classes
+    model = KNeighborsClassifier(1, metric=metric)
+    assert nearest_neighbor_accuracy(X, y, metric) == cross_val_score(model, X, y, cv=LeaveOneOut()).mean()
+
+
+def test_svm_is_leave_one_out(overlapping_classes):
+    X, y = overlapping_classes
+    expected = cross_val_score(SVC(C=3.0, gamma=0.5), X, y, cv=LeaveOneOut()).mean()
+    gram = np.exp(-0.5 * ((X[:, None] - X[None]) ** 2).sum(-1))
+    assert svm_accuracy(gram, y, penalty=3.0) == pytest.approx(expected)
+
+
+def test_a_draw_takes_equally_many_of_each_class_without_repetition():
+    labels = np.repeat(list("abcd"), 7)
+    chosen = draw(labels, 3, seed=1, index=2)
+    assert len(set(chosen)) == 12
+    assert (np.unique(labels[chosen], return_counts=True)[1] == 3).all()
+
+
+def test_draws_depend_on_seed_and_index_only():
+    labels = np.repeat(list("abcd"), 7)
+    assert (draw(labels, 3, 1, 2) == draw(labels, 3, 1, 2)).all()
+    assert (draw(labels, 3, 1, 2) != draw(labels, 3, 1, 3)).any()
+    assert (draw(labels, 3, 1, 2) != draw(labels, 3, 2, 2)).any()
