@@ -35,16 +35,17 @@ def use_compiled(n_operations: int) -> bool:
     return n_operations >= (_REPAYS_CALL if "numba" in sys.modules else _REPAYS_IMPORT)
 
 
-def jit(function: Callable[..., Any]) -> Callable[..., Any]:
+def jit(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:
     """Compile one thread's loop: cached on disk where possible, without the GIL.
 
-    Only reassociation and contraction of floating-point operations are allowed, so NaN and infinity
+    Pass ``cache=False`` for a function whose arguments are functions: its cache would never be found
+    again. Only reassociation and contraction of floating-point operations are allowed, so NaN and infinity
     keep their meaning and validation can be compiled too.
     """
     from numba import njit
 
     options: dict[str, Any] = {"nogil": True, "fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
     try:
-        return njit(cache=True, **options)(function)
+        return njit(cache=cache, **options)(function)
     except RuntimeError:  # no writable place for the cache, as in a read-only installation
         return njit(**options)(function)

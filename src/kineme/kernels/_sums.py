@@ -1,0 +1,111 @@
+"""Sums over coordinates, for every kernel of the form h(sum_j g(d(x_j, y_j))), Eq. (5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kineme.compiled import use_compiled
+from kineme.kernels._rows import Rows, contiguous
+from kineme.parallel import for_tiles
+
+# Pairs of 256 x 256 rows: large enough to repay packing the columns, small enough for the cache.
+_TILE = 256
+# Elements of a temporary array in the twin.
+_TWIN_CHUNK = 2**17
+
+TileSums = Callable[[Rows, Rows, Any, Rows], None]
+
+
+@dataclass(frozen=True)
+class Term:
+    """What one coordinate adds to the sum: g(d(x, y)), with one constant c.
+
+    Attributes
+    ----------
+    twin : callable
+        The definition, ``twin(x, y, c)`` over arrays.
+    load_compiled : callable
+        Gives the compiled loop; called only where it is used, because it imports Numba.
+    cost : int
+        Elementary operations of NumPy per evaluation of the twin.
+    symmetric : bool
+        Whether term(x, y) equals term(y, x) for certain.
+    """
+
+    twin: Callable[[Rows, Rows, Any], Any]
+    load_compiled: Callable[[], TileSums]
+    cost: int = 4
+    symmetric: bool = True
+
+
+def _builtin(name: str) -> Callable[[], TileSums]:
+    def load() -> TileSums:
+        from kineme.kernels import _compiled
+
+        loop: TileSums = getattr(_compiled, name)
+        return loop
+
+    return load
+
+
+def _canberra(x: Rows, y: Rows, _c: Any) -> Rows:
+    size = np.abs(x) + np.abs(y)
+    return np.abs(x - y) / np.where(size > 0, size, 1)
+
+
+ABSOLUTE = Term(lambda x, y, c: np.abs(x - y), _builtin("absolute_sums"))
+SQUARED = Term(lambda x, y, c: (x - y) ** 2, _builtin("squared_sums"))
+TRUNCATED = Term(lambda x, y, c: np.minimum(np.abs(x - y), c), _builtin("truncated_sums"))
+CANBERRA = Term(_canberra, _builtin("canberra_sums"), cost=8)
+
+
+def fill_gram(term: Term, c: float, finish: Callable[[Rows], object], A: Rows, B: Rows | None, gram: Rows) -> None:
+    """Write h(sums of `term` over coordinates) to `gram`, tile by tile, in threads.
+
+    Parameters
+    ----------
+    term : Term
+    c : float
+        The constant of the term.
+    finish : callable
+        h of Eq. (5): changes a tile of sums in place.
+    A, B : arrays (n_A, p), (n_B, p), or B None for a symmetric Gram matrix of A
+    gram : array (n_A, n_B)
+    """
+    mirrored = B is None and term.symmetric
+    A = contiguous(A, A.dtype)
+    columns = A if B is None else contiguous(B, A.dtype)
+    n_pairs = gram.size // (2 if mirrored else 1)
+    tile_sums = tile_sums_of(term, n_pairs * A.shape[1])
+    constant = A.dtype.type(c)
+    tiles = [(i, j) for i in range(0, len(A), _TILE) for j in range(0, i + 1 if mirrored else len(columns), _TILE)]
+
+    def work(first: int, last: int) -> None:
+        for i, j in tiles[first:last]:
+            a, b = A[i : i + _TILE], columns[j : j + _TILE]
+            tile = np.empty((len(a), len(b)), A.dtype)
+            tile_sums(a, b, constant, tile)
+            finish(tile)
+            gram[i : i + _TILE, j : j + _TILE] = tile
+            if mirrored and i != j:
+                gram[j : j + _TILE, i : i + _TILE] = tile.T
+
+    for_tiles(work, len(tiles), 1)
+
+
+def tile_sums_of(term: Term, n_terms: int) -> TileSums:
+    """The loop that repays its overhead for a job of `n_terms` evaluations of the term."""
+    if use_compiled(n_terms * term.cost):
+        return term.load_compiled()
+
+    def twin_sums(A: Rows, B: Rows, c: Any, sums: Rows) -> None:
+        step = max(1, _TWIN_CHUNK // A.shape[1])
+        for i, x in enumerate(A):
+            for j in range(0, len(B), step):
+                sums[i, j : j + step] = term.twin(x, B[j : j + step], c).sum(axis=1)
+
+    return twin_sums

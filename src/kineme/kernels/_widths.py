@@ -1,0 +1,52 @@
+"""Median heuristics: widths that put a typical pair of training rows on the slope of the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kineme.errors import SpecificationError
+from kineme.kernels._rows import Rows
+from kineme.kernels._sums import Term, fill_gram
+
+_MAX_ROWS = 1000
+_MAX_DIFFERENCES = 2**21
+
+
+def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
+    """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
+
+    Large X are represented by 1000 evenly spaced rows, so the answer is deterministic. Pairs of equal
+    rows do not count: copies of a row say nothing about the spread of the others.
+    """
+    rows = _evenly_spaced(X, _MAX_ROWS)
+    sums = np.empty((len(rows), len(rows)))
+    fill_gram(term, 0.0, finish, rows, None, sums)
+    return _median_of_positive(sums[np.triu_indices(len(rows), 1)], len(X))
+
+
+def median_difference(X: Rows) -> float:
+    """Median over pairs of rows and coordinates of the differences |x_i - y_i| that are not zero.
+
+    As many evenly spaced rows represent X as give about two million differences.
+    """
+    rows = _evenly_spaced(X, max(10, min(_MAX_ROWS, int((2 * _MAX_DIFFERENCES / X.shape[1]) ** 0.5))))
+    first, second = np.triu_indices(len(rows), 1)
+    return _median_of_positive(np.abs(rows[first] - rows[second]), len(X))
+
+
+def _evenly_spaced(X: Rows, n_rows: int) -> Rows:
+    if len(X) > n_rows:
+        X = X[np.linspace(0, len(X) - 1, n_rows).astype(np.intp)]
+    return np.ascontiguousarray(X, np.float64)
+
+
+def _median_of_positive(values: Rows, n_rows: int) -> float:
+    positive = values[values > 0]
+    if not positive.size:
+        raise SpecificationError(
+            f"expected training rows that differ, got {n_rows} row(s), all equal, which say nothing about "
+            "the widths; pass the widths as numbers, or more rows"
+        )
+    return float(np.median(positive))

@@ -1,0 +1,83 @@
+"""What every kernel is: a frozen specification that turns rows into a Gram matrix."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import fields, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.kernels._numbers import check_representable, positive
+from kineme.kernels._rows import Rows, checked_pair, checked_rows
+
+
+class Kernel(ABC):
+    """A similarity of feature rows; subclasses are frozen dataclasses.
+
+    A width that is None is chosen from the *reference* rows of each call: B, or A where B is None.
+    scikit-learn passes its training rows as B, so a classifier keeps the width of its training data.
+    `fit` stores the numbers instead.
+    """
+
+    def __call__(self, A: ArrayLike, B: ArrayLike | None = None) -> Rows:
+        """Gram matrix of similarities k(A[i], B[j]).
+
+        Parameters
+        ----------
+        A : array-like (n_A, p)
+        B : array-like (n_B, p), optional
+            A itself by default, which costs half.
+
+        Returns
+        -------
+        ndarray (n_A, n_B), float32 where A and B are float32, else float64
+
+        Raises
+        ------
+        SpecificationError
+            Rows that are not finite numbers in two dimensions, columns that do not match, or a
+            width that is None with reference rows that do not determine it.
+        """
+        rows, others = checked_pair(A, B)
+        reference = rows if others is None else others
+        kernel = self._with_widths(reference)
+        kernel._check_dtype(rows.dtype)
+        gram = np.empty((len(rows), len(reference)), rows.dtype)
+        if gram.size:
+            kernel._fill(rows, others, gram)
+        return gram
+
+    def fit(self, X: ArrayLike) -> Self:
+        """Return the kernel with every width that is None computed from the rows X (n, p)."""
+        return self._with_widths(checked_rows(X))
+
+    def _with_widths(self, X: Rows) -> Self:
+        missing = [name for name in self._width_names() if getattr(self, name) is None]
+        if not missing:
+            return self
+        # Widths are statistics: float64 whatever the rows are.
+        return replace(self, **{name: self._median_width(name, X) for name in missing})  # type: ignore[type-var]
+
+    def _check_dtype(self, dtype: np.dtype[np.floating]) -> None:
+        for name in self._width_names():
+            check_representable(getattr(self, name), name, dtype)
+
+    def _check_widths(self) -> None:
+        for name in self._width_names():
+            value, default = getattr(self, name), getattr(type(self), name)
+            hint = "leave it out to take it from the training rows" if default is None else f"the default is {default}"
+            if value is not None or default is not None:
+                object.__setattr__(self, name, positive(value, name, hint))
+
+    @classmethod
+    def _width_names(cls) -> tuple[str, ...]:
+        return tuple(field.name for field in fields(cls) if field.metadata.get("width"))  # type: ignore[arg-type]
+
+    def _median_width(self, name: str, X: Rows) -> float:
+        raise NotImplementedError(f"{type(self).__name__} has no rule for {name}")
+
+    @abstractmethod
+    def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
+        """Write the Gram matrix of checked, non-empty rows; B None means A."""

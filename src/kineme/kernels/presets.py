@@ -1,0 +1,24 @@
+"""The widths of the paper, Table 3."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from kineme.kernels.rbf import RBF
+from kineme.kernels.truncated import TruncatedEuclidean
+
+
+class PaperKernels(NamedTuple):
+    """The two kernels the paper applies to one representation."""
+
+    rbf: RBF
+    truncated: TruncatedEuclidean
+
+
+# Keys are (feature, formulation) as `DMPFeatures` and `DMP` name them.
+PAPER_WIDTHS: dict[tuple[str, str], PaperKernels] = {
+    ("weights", "original"): PaperKernels(RBF(500), TruncatedEuclidean(750, 1)),
+    ("weights", "bio-inspired"): PaperKernels(RBF(3.5e7), TruncatedEuclidean(1e7, 1)),
+    ("forcing", "original"): PaperKernels(RBF(6e4), TruncatedEuclidean(1e4, 1)),
+    ("forcing", "bio-inspired"): PaperKernels(RBF(7000), TruncatedEuclidean(350, 1)),
+}

@@ -1,0 +1,62 @@
+"""The kernels by name, with their properties: for the command line, the documentation and the tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kineme.kernels.base import Kernel
+from kineme.kernels.canberra import Canberra
+from kineme.kernels.laplacian import Laplacian
+from kineme.kernels.means import MEANS
+from kineme.kernels.rbf import RBF
+from kineme.kernels.truncated import TruncatedEuclidean
+
+
+@dataclass(frozen=True)
+class KernelRow:
+    """One kernel that can be built from its name.
+
+    Attributes
+    ----------
+    kernel : type
+        Called without arguments it takes its widths from the data.
+    formula, equation : str
+        Equation number of the paper, empty where the paper has none.
+    psd : bool
+        Whether it is proved positive semi-definite for all its parameters.
+    infinitely_divisible : bool
+        Whether its powers k^t, t > 0, are proved so too.
+    """
+
+    kernel: type[Kernel]
+    formula: str
+    equation: str
+    psd: bool
+    infinitely_divisible: bool
+
+    @property
+    def widths(self) -> tuple[str, ...]:
+        """Names of the parameters of the kernel."""
+        return self.kernel._width_names()
+
+    @property
+    def psd_means(self) -> tuple[str, ...]:
+        """Means of `MEANS` whose average of this kernel is proved positive semi-definite."""
+        proved = {"always": self.psd, "infinitely divisible": self.infinitely_divisible, "not claimed": False}
+        return tuple(name for name, mean in MEANS.items() if proved[mean.psd])
+
+
+KERNELS: dict[str, KernelRow] = {
+    "rbf": KernelRow(RBF, "exp(-‖x - y‖² / (2 σ²))", "(6)", psd=True, infinitely_divisible=True),
+    "truncated": KernelRow(
+        TruncatedEuclidean,
+        "1/n Σ max(0, m - min(m, |x_i - y_i|) / σ)",
+        "(7)-(8)",
+        psd=True,
+        infinitely_divisible=False,
+    ),
+    "laplacian": KernelRow(Laplacian, "exp(-Σ |x_i - y_i| / σ)", "", psd=True, infinitely_divisible=True),
+    "canberra": KernelRow(
+        Canberra, "1/n Σ (1 - |x_i - y_i| / (|x_i| + |y_i|))", "", psd=True, infinitely_divisible=False
+    ),
+}
