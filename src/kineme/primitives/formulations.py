@@ -67,6 +67,18 @@ def _isotropic(new: Array, learned: Array, extents: Array) -> Array:
     return np.broadcast_to(np.where(closed, 1.0, ratio), new.shape)
 
 
+def late_shape_weight(s: Array) -> Array:
+    """Weight of the shape-attractor in the decoupled formulation: 1 at the start, 0 at the goal for ever.
+
+    ``w_s(s) = (1 + c^2) s^2 / (s^2 + c^2)`` with `HANDOVER` c. As s decays exponentially this is a logistic curve in
+    time, ``1 / (1 + exp(2 alpha (u - u_c)))`` with ``s(u_c) = c``, up to the factor that makes it start from 1.
+    """
+    return (1.0 + HANDOVER**2) * s**2 / (s**2 + HANDOVER**2)
+
+
+#: Phase c at which the decoupled formulation hands over from shape to goal: halfway in time for s(tau) = 0.01.
+HANDOVER = 0.1
+
 #: Share of its extent within which a movement that ends there counts as closed for the amplitude-scaled formulation.
 CLOSED = 0.05
 
@@ -97,6 +109,18 @@ FORMULATIONS = {
             divides_by_amplitude=False,
             coupling=lambda K, s: -K * s,
             ratio=_isotropic,
+        ),
+        # Prada and Remazeilles (2012), the paper's [9], part the weights of the two attractors, s and 1 - s in Eq. (4).
+        # What we take: each attractor has a weight of a shape of its own, so that the goal can act later than s
+        # lets it. What we choose: a logistic curve in time, and weights whose sum stays 1, which keeps the spring
+        # constant. Multiplied out, K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0):
+        # nothing divides by w_s, and w_s vanishes with s, so the goal is reached.
+        Formulation(
+            name="decoupled",
+            equation="tau v' = w_s K (f(s)/w_s + x0 - x) + w_g K (g - x) - D v,  w_g = 1 - w_s, w_s logistic in time",
+            divides_by_amplitude=False,
+            coupling=lambda K, s: -K * late_shape_weight(s),
+            ratio=_unchanged,
         ),
     )
 }
