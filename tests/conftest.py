@@ -1,0 +1,45 @@
+"""What all tests share: deterministic hypothesis, smooth movements, and a comparison in units of the result."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "deterministic",
+    derandomize=True,
+    deadline=None,
+    max_examples=6,
+    database=None,
+    suppress_health_check=[HealthCheck.differing_executors],
+)
+settings.load_profile("deterministic")
+
+
+def _make_movement(seed, n_dims=2, n_samples=None, even=True):
+    """Times (T,) over 2 s and positions (T, d): a straight line with four sines on it, so that g - x0 is never small."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(40, 90)) if n_samples is None else n_samples
+    u = np.linspace(0, 1, n) if even else np.append(0, np.cumsum(rng.uniform(0.4, 1.6, n - 1)))
+    u = u / u[-1]
+    k = np.arange(1, 5)
+    line = rng.choice([-1, 1], n_dims) * rng.uniform(1, 2, n_dims)
+    waves = rng.uniform(-0.5, 0.5, (4, n_dims)) / k[:, None]
+    x = rng.normal(size=n_dims) + u[:, None] * line + np.sin(np.pi * u[:, None] * k) @ waves
+    return 2.0 * u, x
+
+
+def _agree(actual, expected, tolerance=1e-7):
+    """Equal within `tolerance` of the largest expected number."""
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+@pytest.fixture(scope="session")
+def make_movement():
+    return _make_movement
+
+
+@pytest.fixture(scope="session")
+def agree():
+    return _agree
