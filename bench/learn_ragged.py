@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from bench.movements import SEED, ragged_movements
 from bench.peers import movement_primitive
 from bench.rows import Row
-from bench.timing import medians
+from bench.timing import alone, medians
 from kineme import DMP, Demonstrations
 from kineme.parallel import for_tiles
 from kineme.trajectories.resample import relative_rows
@@ -34,7 +36,7 @@ def measure(quick: bool) -> list[Row]:
             "check": check,
             "learn collected": lambda: dmp.learn(demos),
             "resample": lambda: for_tiles(lambda i, j: relative_rows(demos, i, j, N_POINTS), n, _TILE),
-            "imitate": lambda: [peer.imitate(t, x) for peer, t, x in zip(peers, times, arrays, strict=False)],
+            "imitate": alone(lambda: [peer.imitate(t, x) for peer, t, x in zip(peers, times, arrays, strict=False)]),
         },
         repeats,
     )
@@ -45,7 +47,13 @@ def measure(quick: bool) -> list[Row]:
         "multiply and the rest": seconds["learn collected"] - seconds["resample"],
     }
     ours, imitated = n / seconds["learn"], n_peer / seconds["imitate"]
-    details = {"n": n, "n_peer": n_peer, "lengths": [SHORTEST, LONGEST], "n_points": N_POINTS, "n_basis": N_BASIS}
+    details: dict[str, Any] = {
+        "n": n,
+        "n_peer": n_peer,
+        "lengths": [SHORTEST, LONGEST],
+        "n_points": N_POINTS,
+        "n_basis": N_BASIS,
+    }
     details |= {"n_dims": N_DIMS, "repeats": repeats, "seed": SEED, "seconds": seconds, "dmp": repr(dmp)}
     peer = "movement_primitives imitate"
     return [

@@ -1,4 +1,4 @@
-"""The peers behind one small interface, each with its own recommended settings."""
+"""The peers behind one small interface, with settings that serve them at least as well as their defaults."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 
 from bench.movements import Array
+
+# Tried on LASA: stiffer than the defaults (25, 6.25) cut its worst error by six; a faster phase than 1 helps pydmps.
+STIFF = {"alpha_y": 100.0, "beta_y": 25.0}
+PYDMPS_PHASE_RATE = 2.0
 
 
 def movement_primitive(times: Array, n_dims: int, n_basis: int, bio_inspired: bool = False) -> Any:
@@ -22,6 +26,7 @@ def movement_primitive(times: Array, n_dims: int, n_basis: int, bio_inspired: bo
         dt=float(times[-1]) / (len(times) - 1),
         n_weights_per_dim=n_basis,
         smooth_scaling=bio_inspired,
+        **STIFF,
     )
 
 
@@ -29,7 +34,7 @@ def pydmps_primitive(n_steps: int, n_dims: int, n_basis: int) -> Any:
     """An untrained DMP of pydmps, which takes every movement as one second long."""
     from pydmps.dmp_discrete import DMPs_discrete
 
-    return DMPs_discrete(n_dmps=n_dims, n_bfs=n_basis, dt=1.0 / n_steps)
+    return DMPs_discrete(n_dmps=n_dims, n_bfs=n_basis, dt=1.0 / n_steps, ax=PYDMPS_PHASE_RATE)
 
 
 def replay_movement_primitives(times: Array, positions: Array, n_basis: int, bio_inspired: bool) -> tuple[Array, Array]:
@@ -41,7 +46,7 @@ def replay_movement_primitives(times: Array, positions: Array, n_basis: int, bio
     return t[:n] / times[-1], path[:n]
 
 
-def replay_pydmps(positions: Array, n_basis: int) -> tuple[Array, Array]:
+def replay_pydmps(_times: Array, positions: Array, n_basis: int) -> tuple[Array, Array]:
     """Learn and replay one even movement: phases in [0, 1] and positions."""
     n_steps = len(positions)
     dmp = pydmps_primitive(n_steps, positions.shape[1], n_basis)

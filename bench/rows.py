@@ -56,14 +56,13 @@ def table(rows: list[Row]) -> str:
     return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines)
 
 
-def save(name: str, rows: list[Row], quick: bool) -> Path:
-    """Write a subject's rows with everything needed to judge them; a quick run is marked as such."""
+def save(name: str, rows: list[Row]) -> Path:
+    """Write a subject's rows with everything needed to judge them."""
     RESULTS.mkdir(exist_ok=True)
-    path = RESULTS / (f"{name}-quick.json" if quick else f"{name}.json")
+    path = RESULTS / f"{name}.json"
     content = {
         "subject": name,
         "date": date.today().isoformat(),
-        "quick": quick,
         "machine": _machine(),
         "versions": _versions(),
         "rows": [{**asdict(row), "met": row.met} for row in rows],
