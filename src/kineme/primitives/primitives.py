@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,6 +168,33 @@ class Primitives:
             n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
         check_count("n_samples", n_samples, 2)
         return replace(movement, n_samples=n_samples, end=end)
+
+    def save(self, path: str | Path) -> Path:
+        """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
+
+        Raises
+        ------
+        DataError
+            Labels or preprocessing steps that plain data cannot hold.
+        OSError
+            The file cannot be written; what was there before stays.
+        """
+        from kineme.primitives.persistence import save_primitives
+
+        return save_primitives(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Primitives:
+        """Read a file of `save`. The file is data: nothing in it is executed.
+
+        Raises
+        ------
+        DataError
+            The file is foreign, truncated, damaged, of another kind or of a later version.
+        """
+        from kineme.primitives.persistence import load_primitives
+
+        return load_primitives(path)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

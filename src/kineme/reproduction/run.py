@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, NamedTuple
 
+from kineme.io.atomic import write_atomically
 from kineme.parallel import n_threads
 from kineme.reproduction.table import Table
 
@@ -70,7 +71,7 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
         "draw_by_draw": by_draw,
         "tables": [t._asdict() for t in tables],
     }
-    _write(out / "results.json", (json.dumps(_rounded(numbers), indent=1) + "\n").encode())
+    write_atomically(out / "results.json", (json.dumps(_rounded(numbers), indent=1) + "\n").encode())
     return Reproduction(tables, [*files, out / "results.json"])
 
 
@@ -119,7 +120,7 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
     written = []
     for name, (_, pictures) in figures.items():
         for kind, data in pictures.items():
-            written.append(_write(out / f"{name}.{kind}", data))
+            written.append(write_atomically(out / f"{name}.{kind}", data))
     return written
 
 
@@ -129,18 +130,7 @@ def _write_tables(out: Path, tables: list[Table], figures: dict[str, Any], facts
 
     html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
     text = "\n\n".join(map(to_text, tables)) + "\n"
-    return [_write(out / "report.html", html.encode()), _write(out / "tables.txt", text.encode())]
-
-
-def _write(path: Path, data: bytes) -> Path:
-    """Write beside the file, then rename: a reader sees the old file or the new one, never half of one."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_bytes(data)
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
-    return path
+    return [write_atomically(out / "report.html", html.encode()), write_atomically(out / "tables.txt", text.encode())]
 
 
 def _versions() -> dict[str, str]:
