@@ -1,0 +1,155 @@
+"""A batch of learned orientations or poses, and how it moves again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.errors import TrajectoryError
+from kineme.orientation.pose_rollout import PoseRollout
+from kineme.orientation.quaternions import conjugate, normalized, product
+from kineme.orientation.rates import rotation_vector_rate
+from kineme.orientation.rotation_vectors import exp, log, nearest
+from kineme.primitives.primitives import Primitives
+from kineme.validation import Array
+
+_ROUNDING = 1e-12  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class PosePrimitives:
+    """n primitives of orientations or poses; made by `PoseDMP.learn`.
+
+    Attributes
+    ----------
+    tangent : Primitives
+        Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
+        weights, forcing terms and shape-attractors describe the movements.
+    references : ndarray of shape (n, 4)
+        The demonstrated goal orientations, where the rotation vector is 0.
+    """
+
+    tangent: Primitives
+    references: Array
+
+    def __post_init__(self) -> None:
+        self.references.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.tangent)
+
+    def __getitem__(self, index: Any) -> PosePrimitives:
+        """The chosen primitives as a batch; an integer gives a batch of one."""
+        chosen = np.atleast_1d(np.arange(len(self))[index])
+        return PosePrimitives(self.tangent[chosen], self.references[chosen])
+
+    @property
+    def n_columns(self) -> int:
+        """4 for orientations, 7 for poses."""
+        return self.tangent.n_dims + 1
+
+    @property
+    def starts(self) -> Array:
+        """Demonstrated starts, shape (n, 4) or (n, 7)."""
+        return self._poses(self.tangent.starts)
+
+    @property
+    def goals(self) -> Array:
+        """Demonstrated goals, shape (n, 4) or (n, 7)."""
+        return self._poses(self.tangent.goals)
+
+    def rollout(  # noqa: PLR0913 - a wish per parameter
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> PoseRollout:
+        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+
+        Parameters
+        ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            Orientations (d = 4) or poses (d = 7), as demonstrated; quaternions of either sign. The way from a new
+            start to a new goal is the one nearest to the demonstrated way, the long way round if that was shown.
+        duration, rate, n_samples : optional
+            See `Primitives.rollout`.
+        velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
+            the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
+        settle : float, optional
+            Go on past the duration until every position and every component of the rotation vector [rad] stays within
+            this distance of the goal.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal or velocity of the wrong shape, a quaternion not of norm 1, numbers that do not go together.
+        DegenerateMovementError
+            The original formulation asked to turn about an axis that the demonstration does not turn about.
+        """
+        tangent_start, tangent_goal, references = self._endpoints(start, goal)
+        movement = self.tangent.rollout(
+            tangent_start,
+            tangent_goal,
+            duration,
+            velocity=None if velocity is None else self._tangent_velocity(velocity, tangent_start),
+            rate=rate,
+            n_samples=n_samples,
+            settle=settle,
+        )
+        return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
+
+    def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
+        """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
+        starts = self.starts if start is None else self._as_poses(start, "start")
+        goals = self.goals if goal is None else self._as_poses(goal, "goal")
+        lengths = {"primitives": len(self), "start": len(starts), "goal": len(goals)}
+        n = max(lengths.values())
+        if any(length not in (1, n) for length in lengths.values()):
+            listed = ", ".join(f"{length} {name}" for name, length in lengths.items())
+            raise TrajectoryError(f"expected one or equally many of primitives, starts and goals, got {listed}")
+        learned = self.tangent.starts[:, -3:]
+        p = learned
+        if start is not None or goal is not None:
+            p = nearest(log(product(starts[:, -4:], conjugate(goals[:, -4:]))), learned)
+            # An axis that is not turned about must stay exactly so: the original formulation divides by it.
+            p = np.where(np.abs(p - learned) <= _ROUNDING * (1.0 + np.abs(learned)), learned, p)
+
+        def joined(positions: Array, vectors: Array) -> Array:
+            return np.concatenate((np.broadcast_to(positions, (n, positions.shape[1])), vectors), axis=1)
+
+        vectors = np.broadcast_to(p, (n, 3))
+        return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
+
+    def _tangent_velocity(self, velocity: ArrayLike, starts: Array) -> Array:
+        wish = np.asarray(velocity, dtype=np.float64)
+        wish = wish[None] if wish.ndim == 1 else wish
+        d = self.tangent.n_dims
+        if wish.ndim != 2 or wish.shape[1] != d:
+            raise TrajectoryError(f"expected velocity of shape ({d},) or (n, {d}), got shape {np.shape(velocity)}")
+        if 1 not in (len(wish), len(starts)) and len(wish) != len(starts):
+            raise TrajectoryError(f"expected one velocity, or one for each of {len(starts)} movements, got {len(wish)}")
+        rates = rotation_vector_rate(starts[:, -3:], wish[:, -3:])
+        return np.concatenate((np.broadcast_to(wish[:, :-3], (len(rates), d - 3)), rates), axis=1)
+
+    def _as_poses(self, wish: ArrayLike, name: str) -> Array:
+        poses, d = np.asarray(wish, dtype=np.float64), self.n_columns
+        poses = poses[None] if poses.ndim == 1 else poses
+        if poses.ndim != 2 or poses.shape[1] != d:
+            raise TrajectoryError(f"expected {name} of shape ({d},) or (n, {d}), got shape {np.shape(wish)}")
+        try:
+            return np.concatenate((poses[:, :-4], normalized(poses[:, -4:])), axis=1)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{name}: {error}") from error
+
+    def _poses(self, tangent: Array) -> Array:
+        q = product(exp(tangent[:, -3:]), self.references)
+        return np.concatenate((tangent[:, :-3], q), axis=1)

@@ -1,0 +1,78 @@
+"""Generated orientations and poses with their velocities and accelerations in the world frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kineme.orientation.quaternions import product
+from kineme.orientation.rates import angular_acceleration, angular_velocity
+from kineme.orientation.rotation_vectors import exp
+from kineme.orientation.tangent import from_tangent
+from kineme.primitives.rollout import Rollout
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRollout:
+    """n generated movements of T samples; computed when asked for.
+
+    Attributes
+    ----------
+    tangent : Rollout
+        The movement in positions and rotation vectors.
+    references : ndarray of shape (n, 4)
+        Goal orientations, from which the rotation vectors count.
+    """
+
+    tangent: Rollout
+    references: Array
+
+    def __len__(self) -> int:
+        return len(self.tangent)
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples (n, T) [s]."""
+        return self.tangent.times
+
+    @cached_property
+    def orientations(self) -> Array:
+        """Unit quaternions (n, T, 4)."""
+        return product(exp(self.tangent.positions[..., -3:]), self.references[:, None])
+
+    @property
+    def poses(self) -> Array:
+        """What was demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
+        return np.concatenate((self.tangent.positions[..., :-3], self.orientations), axis=-1)
+
+    @cached_property
+    def angular_velocities(self) -> Array:
+        """Angular velocities in the world frame (n, T, 3) [rad/s]."""
+        return angular_velocity(self.tangent.positions[..., -3:], self.tangent.velocities[..., -3:])
+
+    @cached_property
+    def angular_accelerations(self) -> Array:
+        """Angular accelerations in the world frame (n, T, 3) [rad/s^2]."""
+        p, rate, acceleration = (
+            values[..., -3:] for values in (self.tangent.positions, self.tangent.velocities, self.tangent.accelerations)
+        )
+        return angular_acceleration(p, rate, acceleration)
+
+    @property
+    def velocities(self) -> Array:
+        """Angular velocities (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
+        return np.concatenate((self.tangent.velocities[..., :-3], self.angular_velocities), axis=-1)
+
+    @property
+    def accelerations(self) -> Array:
+        """Angular accelerations (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
+        return np.concatenate((self.tangent.accelerations[..., :-3], self.angular_accelerations), axis=-1)
+
+    @property
+    def trajectories(self) -> Demonstrations:
+        """The movements as `Demonstrations` of 4 or 7 columns, with the labels and names of their primitives."""
+        return from_tangent(self.tangent.trajectories, self.references)
