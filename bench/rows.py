@@ -56,7 +56,7 @@ def table(rows: list[Row]) -> str:
     return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip() for line in lines)
 
 
-def save(name: str, rows: list[Row]) -> Path:
+def save(name: str, rows: list[Row], load: float) -> Path:
     """Write a subject's rows with everything needed to judge them."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
@@ -64,6 +64,7 @@ def save(name: str, rows: list[Row]) -> Path:
         "subject": name,
         "date": date.today().isoformat(),
         "machine": _machine(),
+        "load_before": load,
         "versions": _versions(),
         "rows": [{**asdict(row), "met": row.met} for row in rows],
     }
