@@ -90,16 +90,15 @@ def test_distance_kernel_keeps_an_asymmetric_distance():
     np.testing.assert_array_equal(kernel([[0.0], [2.0]]), [[0.0, 0.0], [-2.0, 0.0]])
 
 
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("sigma", [1e-3, 1e-1])
-def test_rbf_of_close_rows_far_from_all_others(dtype, sigma):
-    """Norms 1e6 times the distance: a matrix product alone would lose the distance."""
-    A = np.array([[0.0, 0.0], [1000.0, 1000.0], [1000.0, 1000.0]], dtype)
-    A[2, 0] += dtype(sigma) if dtype is np.float64 else dtype(0.125)
-    distance = float(A[2, 0]) - 1000
-    expected = np.exp(-(distance**2) / (2 * sigma**2))
-    assert RBF(sigma)(A)[1, 2] == pytest.approx(expected, rel=1e-5)
-    assert RBF(sigma)(A, A.copy())[1, 1] == 1
+@pytest.mark.parametrize(("dtype", "spread", "tolerance"), [(np.float64, 1e6, 1e-9), (np.float32, 1e3, 1e-3)])
+def test_rbf_of_close_rows_far_from_all_others(dtype, spread, tolerance):
+    """Norms are `spread` times the distances of interest: a matrix product alone would lose these."""
+    places = np.round(rows("normal", 0, 10, 8) * spread)
+    A = np.concatenate([places, places + np.round(rows("normal", 1, 10, 8) * 64) / 128]).astype(dtype)
+    expected = np.exp(-(np.square(A[:10].astype(np.float64) - A[10:]).sum(axis=1)) / 2)
+    for gram in (RBF(1.0)(A), RBF(1.0)(A, A.copy())):
+        np.testing.assert_allclose(np.diag(gram[:10, 10:]), expected, rtol=tolerance)
+        np.testing.assert_array_equal(np.diag(gram), 1)
 
 
 def test_table_3_of_the_paper():

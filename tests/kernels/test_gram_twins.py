@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from kernel_samples import ALL, KINDS, rows
 
+from kineme.kernels import averaged
+
 # Around the register block (4 features), the panel (128 columns) and the tile (256 rows).
 SHAPES = [(1, 1, 2), (1, 130, 6), (3, 1, 10), (127, 129, 8), (257, 5, 14), (300, 131, 2)]
 
@@ -57,6 +59,21 @@ def test_a_pair_does_not_depend_on_its_place(monkeypatch):
     kernel = ALL["truncated"].fit(A)
     gram = kernel(A)
     assert kernel(A[290:291], A[7:8])[0, 0] == gram[290, 7] == gram[7, 290]
+
+
+def test_one_compilation_per_dtype(monkeypatch):
+    """Writable, read-only, sliced and per-dimension rows share it: each further one would cost seconds."""
+    monkeypatch.setenv("KINEME_COMPILED", "always")
+    from kineme.kernels import _compiled
+
+    for dtype in (np.float64, np.float32):
+        A = rows("normal", 0, dtype=dtype)
+        frozen = A.copy()
+        frozen.flags.writeable = False
+        for X in (A, frozen, A[::2], np.asfortranarray(A)):
+            ALL["truncated"].fit(A)(X)
+            averaged(ALL["truncated"], 3).fit(A)(X, A)
+    assert len(_compiled.truncated_sums.signatures) <= 2
 
 
 def test_importing_kernels_imports_neither_numba_nor_scikit_learn():
