@@ -10,7 +10,7 @@ from typing import Any as _Any
 __version__ = "0.1.0"
 
 if _TYPE_CHECKING:
-    from kineme import datasets, kernels
+    from kineme import datasets, kernels, styles
     from kineme.datasets.lasa import load_lasa
     from kineme.errors import (
         DataError,
@@ -43,6 +43,7 @@ _HOME = {
     "Primitives": "kineme.primitives.primitives",
     "DMPFeatures": "kineme.features.dmp_features",
     "kernels": "kineme",
+    "styles": "kineme",
     "KinemeError": "kineme.errors",
     "TrajectoryError": "kineme.errors",
     "DegenerateMovementError": "kineme.errors",
@@ -70,6 +71,7 @@ __all__ = [  # in the order of the flow
     "kernels",
     "load_lasa",
     "preprocess",
+    "styles",
 ]  # fmt: skip
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.datasets.lasa import PAPER_LETTERS, load_lasa
+from kineme.figures import GRAY, LINES, SEQUENCE, new_figure
 from kineme.kernels import RBF, TruncatedEuclidean
 from kineme.primitives.primitives import Primitives
 from kineme.reproduction import paper
 from kineme.reproduction.protocol import draw
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS, specification
-from kineme.reproduction.style import GRAY, LINES, SEQUENCE, new_figure
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 

@@ -95,8 +95,8 @@ def _draw(*arguments: Any) -> Any:
 
 
 def _figure(name: str, seed: int, dpi: int) -> tuple[str, dict[str, bytes]]:
+    from kineme.figures import render
     from kineme.reproduction.figures import DRAWINGS
-    from kineme.reproduction.style import render
 
     return DRAWINGS[name].caption, render(DRAWINGS[name].draw(seed), dpi)
 
