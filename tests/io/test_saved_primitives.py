@@ -51,7 +51,7 @@ def test_a_truncated_file_is_refused(tmp_path, kept):
     path = learned().save(tmp_path / "x")
     data = path.read_bytes()
     path.write_bytes(data[: int(kept * len(data))])
-    with pytest.raises(kineme.DataError, match=r"x to be a file saved by kineme, got something foreign, truncated"):
+    with pytest.raises(kineme.DataError, match=r"x to be an archive of arrays, got something foreign, truncated"):
         kineme.Primitives.load(path)
 
 

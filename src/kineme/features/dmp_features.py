@@ -14,6 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import TrajectoryError
 from kineme.primitives.dmp import DMP
 from kineme.primitives.primitives import Primitives
+from kineme.trajectories.axes import axis_names
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import check_choice, check_count
 
@@ -128,8 +129,8 @@ class DMPFeatures(TransformerMixin, BaseEstimator):
         """Names x_1 ... x_S, y_1 ... y_S; beyond three dimensions q1_1 ... q1_S, q2_1 ..."""
         check_is_fitted(self)
         size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
-        axes = "xyz"[: self.n_dims_] if self.n_dims_ <= len("xyz") else [f"q{k + 1}" for k in range(self.n_dims_)]
-        return np.array([f"{axis}_{k + 1}" for axis in axes for k in range(size)], dtype=object)
+        names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
+        return np.array(names, dtype=object)
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

@@ -54,18 +54,26 @@ def read_container(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDA
     DataError
         The file is foreign, truncated or damaged, of another kind, or of a later version; the message says which.
     """
+    arrays = read_arrays(path)
+    try:
+        header = json.loads(arrays.pop(_HEADER).tobytes())
+    except (ValueError, KeyError) as error:
+        raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
+    _check_header(path, header, kind)
+    return header, arrays
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read all arrays of an npz archive; arrays of Python objects are refused, not unpickled."""
     data = path.read_bytes()
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(arrays.pop(_HEADER).tobytes())
-    except (ValueError, KeyError, EOFError, OSError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+            return {name: archive[name] for name in archive.files}
+    except (ValueError, EOFError, OSError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
         raise DataError(
-            f"expected {path} to be a file saved by kineme, got something foreign, truncated or damaged ({error}); "
+            f"expected {path} to be an archive of arrays, got something foreign, truncated or damaged ({error}); "
             "save it again, or take it from a backup"
         ) from error
-    _check_header(path, header, kind)
-    return header, arrays
 
 
 def _check_header(path: Path, header: Any, kind: str) -> None:
