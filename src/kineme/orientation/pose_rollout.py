@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,9 +12,12 @@ from kineme.orientation.quaternions import product
 from kineme.orientation.rates import angular_acceleration, angular_velocity
 from kineme.orientation.rotation_vectors import exp
 from kineme.orientation.tangent import from_tangent
+from kineme.parallel import for_tiles
 from kineme.primitives.rollout import Rollout
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
+
+_TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it stays in a core's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +46,7 @@ class PoseRollout:
     @cached_property
     def orientations(self) -> Array:
         """Unit quaternions (n, T, 4)."""
-        return product(exp(self.tangent.positions[..., -3:]), self.references[:, None])
+        return self._by_tiles(lambda p, r: product(exp(p), r), 4, self._vectors(0), self.references[:, None])
 
     @property
     def poses(self) -> Array:
@@ -52,15 +56,12 @@ class PoseRollout:
     @cached_property
     def angular_velocities(self) -> Array:
         """Angular velocities in the world frame (n, T, 3) [rad/s]."""
-        return angular_velocity(self.tangent.positions[..., -3:], self.tangent.velocities[..., -3:])
+        return self._by_tiles(angular_velocity, 3, self._vectors(0), self._vectors(1))
 
     @cached_property
     def angular_accelerations(self) -> Array:
         """Angular accelerations in the world frame (n, T, 3) [rad/s^2]."""
-        p, rate, acceleration = (
-            values[..., -3:] for values in (self.tangent.positions, self.tangent.velocities, self.tangent.accelerations)
-        )
-        return angular_acceleration(p, rate, acceleration)
+        return self._by_tiles(angular_acceleration, 3, self._vectors(0), self._vectors(1), self._vectors(2))
 
     @property
     def velocities(self) -> Array:
@@ -76,3 +77,18 @@ class PoseRollout:
     def trajectories(self) -> Demonstrations:
         """The movements as `Demonstrations` of 4 or 7 columns, with the labels and names of their primitives."""
         return from_tangent(self.tangent.trajectories, self.references)
+
+    def _vectors(self, order: int) -> Array:
+        """The rotation vectors (n, T, 3), or their first or second derivative in time."""
+        return (self.tangent.positions, self.tangent.velocities, self.tangent.accelerations)[order][..., -3:]
+
+    def _by_tiles(self, function: Callable[..., Array], size: int, *arrays: Array) -> Array:
+        """Apply an elementwise function to movements, tile by tile in a core's cache; result (n, T, size)."""
+        n_samples = self.tangent.n_samples
+        result = np.empty((size, len(self), n_samples)).transpose(1, 2, 0)
+
+        def tile(start: int, stop: int) -> None:
+            result[start:stop] = function(*(array[start:stop] for array in arrays))
+
+        for_tiles(tile, len(self), max(1, _TILE_SAMPLES // n_samples))
+        return result

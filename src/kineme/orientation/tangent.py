@@ -12,11 +12,13 @@ from kineme.errors import TrajectoryError
 from kineme.orientation.quaternions import conjugate, normalized_rows, product
 from kineme.orientation.rotation_vectors import exp
 from kineme.orientation.unwrap import unwrapped
+from kineme.parallel import for_tiles
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.preprocess import Step, preprocess
 from kineme.validation import Array, describe
 
 COLUMNS = (4, 7)
+_TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it stays in a core's cache
 
 
 def to_tangent(movements: Any, steps: Iterable[Step] = ()) -> tuple[Demonstrations, Array]:
@@ -50,20 +52,34 @@ def to_tangent(movements: Any, steps: Iterable[Step] = ()) -> tuple[Demonstratio
             "expected movements of 4 columns, an orientation (w, x, y, z), or 7, a position (x, y, z) and an "
             f"orientation, got {demos.n_dims} columns"
         )
-    offsets, names = demos.offsets, demos.names
+    positions = np.empty((len(demos.positions), demos.n_dims - 1))
+    positions[:, :-3] = demos.positions[:, :-4]
+    references = np.empty((len(demos), 4))
 
-    def where(row: int) -> str:
-        i = int(np.searchsorted(offsets, row, side="right")) - 1
-        return f"{describe(i, names)}: sample {row - offsets[i]}"
+    def tile(start: int, stop: int) -> None:
+        rows = slice(demos.offsets[start], demos.offsets[stop])
+        references[start:stop], positions[rows, -3:] = _rotation_vectors(demos, start, stop)
 
-    q = normalized_rows(demos.positions[:, -4:], where)
-    references = q[offsets[1:] - 1]
-    p = unwrapped(product(q, conjugate(np.repeat(references, demos.lengths, axis=0))), offsets, names)
-    tangent = _with_positions(demos, np.concatenate((demos.positions[:, :-4], p), axis=1))
+    for_tiles(tile, len(demos), max(1, _TILE_SAMPLES * len(demos) // len(positions)))
+    tangent = _with_positions(demos, positions)
     steps = tuple(steps)
     if not steps:
         return tangent, references
     return to_tangent(from_tangent(preprocess(tangent, steps), references))
+
+
+def _rotation_vectors(demos: Demonstrations, start: int, stop: int) -> tuple[Array, Array]:
+    """Goals (m, 4) and rotation vectors (samples, 3) of movements start:stop."""
+    first, last = demos.offsets[[start, stop]]
+    offsets = demos.offsets[start : stop + 1] - first
+
+    def where(row: int) -> str:
+        i = int(np.searchsorted(offsets, row, side="right")) - 1
+        return f"{describe(start + i, demos.names)}: sample {row - offsets[i]}"
+
+    q = normalized_rows(demos.positions[first:last, -4:], where)
+    goals = q[offsets[1:] - 1]
+    return goals, unwrapped(product(q, conjugate(np.repeat(goals, np.diff(offsets), axis=0))), offsets, where)
 
 
 def from_tangent(tangent: Demonstrations, references: Array) -> Demonstrations:

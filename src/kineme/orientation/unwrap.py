@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.orientation.quaternions import angle_between
 from kineme.orientation.rotation_vectors import TINY, logarithm_factor
-from kineme.validation import Array, describe
+from kineme.validation import Array
 
 # Per radian turned, the rotation vector moves up to (t/2) / sin(t/2): 1.6 at t = pi, 5 at 5.2, without bound at 2 pi.
 _STRETCH = 5.0
 _SLACK = 0.1  # rad
 
 
-def unwrapped(q: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None = None) -> Array:
+def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> Array:
     """Logarithms of unit quaternions, continuous along each movement.
 
     Every rotation has the rotation vectors ``(t + 2 pi k) axis``. The last sample of a movement gets the shortest
@@ -30,8 +30,8 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], names: Sequence[str | None] |
         All movements, one after the other; consecutive samples less than half a turn apart.
     offsets : ndarray of shape (n + 1,)
         Where each movement begins.
-    names : sequence of str, optional
-        For the message.
+    where : callable
+        Names the movement and the sample of a row, for the message.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], names: Sequence[str | None] |
     at_full_turn = (length < TINY) & (w < 0)
     principal = np.where(at_full_turn, signed[:, None] * axis, logarithm_factor(w, length) * v)
     p = principal + (4.0 * np.pi * turns)[:, None] * axis
-    _check_continuous(p, q, offsets, names)
+    _check_continuous(p, q, offsets, where)
     return p
 
 
@@ -87,7 +87,7 @@ def _axes(v: Array, length: Array, offsets: NDArray[np.intp], movement: NDArray[
     return v[chosen] / np.where(clear[chosen], length[chosen, 0], 1.0)[:, None]
 
 
-def _check_continuous(p: Array, q: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
+def _check_continuous(p: Array, q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> None:
     steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
     steps[offsets[1:-1] - 1] = 0.0
     suspects = np.flatnonzero(steps > _SLACK)
@@ -96,10 +96,8 @@ def _check_continuous(p: Array, q: Array, offsets: NDArray[np.intp], names: Sequ
     if broken.any():
         k = int(np.argmax(broken))
         row = int(suspects[k])
-        i = int(np.searchsorted(offsets, row, side="right")) - 1
         raise TrajectoryError(
-            f"{describe(i, names)}: expected orientations within a full turn of the goal, or turning about one fixed "
-            f"axis beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad while the orientation turns by "
-            f"{turned[k]:.3g} rad, between samples {row - offsets[i]} and {row - offsets[i] + 1}; split the movement "
-            "there"
+            f"{where(row)}: expected orientations within a full turn of the goal, or turning about one fixed axis "
+            f"beyond it, got a rotation vector that jumps by {steps[row]:.3g} rad to the next sample while the "
+            f"orientation turns by {turned[k]:.3g} rad; split the movement there"
         )
