@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from kineme import DMP, Trajectory
 from kineme.primitives.fits import forcing_target
+from kineme.primitives.formulations import FORMULATIONS
 
 SPRINGS = {"critical": (100.0, None), "underdamped": (100.0, 3.0), "overdamped": (50.0, 40.0)}
 
@@ -30,7 +31,17 @@ def eq_4(dmp, x, v, s, f, x0, g):
     return s * dmp.K * (f / s + x0 - x) + (1 - s) * dmp.K * (g - x) - dmp.D * v
 
 
-PRINTED = {"original": eq_1, "bio-inspired": eq_4}
+def decoupled(dmp, x, v, s, f, x0, g):
+    w_s = 1.01 * s**2 / (s**2 + 0.01)
+    return w_s * dmp.K * (f / w_s + x0 - x) + (1 - w_s) * dmp.K * (g - x) - dmp.D * v
+
+
+# "amplitude-scaled" is Eq. (4) with f times the ratio of distances, new over learned: see the second test.
+PRINTED = {"original": eq_1, "bio-inspired": eq_4, "amplitude-scaled": eq_4, "decoupled": decoupled}
+
+
+def test_every_formulation_has_its_equation_here():
+    assert PRINTED.keys() == FORMULATIONS.keys()
 
 
 def integrate(dmp, w, x0, g, v0, tau, times):
@@ -70,12 +81,14 @@ def test_another_start_goal_velocity_and_duration_solve_the_printed_equations(ma
     learned = dmp.learn(Trajectory(*make_movement(12)))
     start, goal, velocity, tau = np.array([5.0, -1.0]), np.array([3.0, 4.0]), np.array([0.5, -2.0]), 3.3
     path = learned.rollout(start, goal, tau, velocity=velocity, n_samples=40)
-    solved = integrate(dmp, learned.weights[0], start, goal, velocity, tau, path.times[0].clip(max=tau))
+    ratio = np.linalg.norm(goal - start) / np.linalg.norm(learned.goals - learned.starts)
+    w = learned.weights[0] * (ratio if formulation == "amplitude-scaled" else 1.0)
+    solved = integrate(dmp, w, start, goal, velocity, tau, path.times[0].clip(max=tau))
     agree(path.positions[0], solved[0], 1e-9)
     agree(path.velocities[0], solved[1], 1e-9)
 
 
-@pytest.mark.parametrize("formulation", PRINTED)
+@pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_the_forcing_target_is_the_printed_equation_solved_for_f(formulation):
     """x = 1 + sin(2u) + u^3 has known derivatives; inside, the error falls with the square of the step."""
     dmp = DMP(formulation, stiffness=30.0, damping=7.0)

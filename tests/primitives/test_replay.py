@@ -58,7 +58,9 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_path(make_movem
     learned = DMP(formulation, n_basis=20).learn(Trajectory(*make_movement(4)))
     path = learned.rollout(n_samples=4001)
     step = path.times[0, 1]
-    np.testing.assert_allclose(path.velocities[0, 1:-1], (path.positions[0, 2:] - path.positions[0, :-2]) / (2 * step), atol=1e-4)
+    np.testing.assert_allclose(
+        path.velocities[0, 1:-1], (path.positions[0, 2:] - path.positions[0, :-2]) / (2 * step), atol=1e-4
+    )
     np.testing.assert_allclose(
         path.accelerations[0, 1:-1], (path.velocities[0, 2:] - path.velocities[0, :-2]) / (2 * step), atol=2e-3
     )
