@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from kineme.datasets.lasa import PAPER_LETTERS, load_lasa
 from kineme.figures import GRAY, LINES, SEQUENCE, new_figure
-from kineme.kernels import RBF, TruncatedEuclidean
 from kineme.primitives.primitives import Primitives
 from kineme.reproduction import paper
 from kineme.reproduction.protocol import draw
@@ -114,10 +113,10 @@ def _similarities(formulation: str, quantity: str, seed: int) -> Figure:
     cell = (formulation, quantity)
     key = READINGS["closest to the paper"][paper.CELLS.index(cell)]
     X = REPRESENTATIONS[key].rows(chosen)
-    m = paper.TRE_M[cell]
+    rbf, truncated = paper.KERNELS[cell]
     grams = {
-        f"(a) RBF, σ = {paper.RBF_SIGMA[cell]:g}": RBF(paper.RBF_SIGMA[cell])(X),
-        f"(b) TrE, m = {m:g}, divided by m": TruncatedEuclidean(m)(X) / m,
+        f"(a) RBF, σ = {rbf.sigma:g}": rbf(X),
+        f"(b) TrE, m = {truncated.m:g}, divided by m": truncated(X) / truncated(X[:1]),
     }
     figure = new_figure(6.6, 3.2)
     ticks = np.arange(len(chosen) // paper.PER_CLASS) * paper.PER_CLASS + (paper.PER_CLASS - 1) / 2

@@ -72,10 +72,10 @@ def _parameters(draws: Draws) -> Table:
         return tuple(f"{np.mean(_over(draws, 'width', f'{key}/{kernel}')):.3g}" for key in keys)
 
     rows = [
-        ("RBF sigma, paper", *(f"{paper.RBF_SIGMA[cell]:.3g}" for cell in paper.CELLS)),
+        ("RBF sigma, paper", *(f"{paper.KERNELS[cell].rbf.sigma:.3g}" for cell in paper.CELLS)),
         (f"RBF sigma, median, {_CLOSEST}", *widths(READINGS[_CLOSEST], "rbf")),
         (f"RBF sigma, median, {_DEFAULT}", *widths(READINGS[_DEFAULT], "rbf")),
-        ("TrE m, paper", *(f"{paper.TRE_M[cell]:.3g}" for cell in paper.CELLS)),
+        ("TrE m, paper", *(f"{paper.KERNELS[cell].truncated.m:.3g}" for cell in paper.CELLS)),
         (f"TrE m, median, {_CLOSEST}", *widths(READINGS[_CLOSEST], "tre")),
         (f"TrE m, median, {_DEFAULT}", *widths(READINGS[_DEFAULT], "tre")),
     ]
@@ -122,7 +122,7 @@ def _diagnosis(draws: Draws) -> Table:
             spread(_over(draws, "nearest", row.key)),
             f"{paper.NEAREST_NEIGHBOR[row.formulation, row.quantity]:.3f}",
             f"{np.median(_over(draws, 'distance', row.key)):.2g}",
-            f"{paper.RBF_SIGMA[row.formulation, row.quantity]:.2g}",
+            f"{paper.KERNELS[row.formulation, row.quantity].rbf.sigma:.2g}",
             row.why,
         )
         for row in REPRESENTATIONS.values()

@@ -1,0 +1,83 @@
+"""Draw the pictures of these pages: ``make figures``."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import kineme
+from kineme.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
+
+COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
+LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
+
+
+def three_issues() -> Figure:
+    """Section 2.1's issues: x0 = g, g close to x0, g across x0; on the y dimension of a handwritten shape."""
+    demo = kineme.load_lasa(["GShape"])[3:4]
+    near = kineme.Demonstrations.from_arrays([_ending_near_its_start(demo[0].positions)], times=[demo[0].times])
+    cases = (
+        ("g = x0: no movement", demo, lambda start, goal: start),
+        ("g close to x0: 1 mm shown, 10 mm asked", near, lambda start, goal: start + 10 * (goal - start)),
+        ("g across x0: mirrored", demo, lambda start, goal: 2 * start - goal),
+    )
+    figure = new_figure(9.6, 2.9)
+    for axes, (title, demos, wish) in zip(figure.subplots(1, 3), cases, strict=True):
+        u = np.linspace(0, 1, len(demos[0]))
+        axes.plot(u, demos[0].positions[:, 1], color=GRAY, linewidth=4, alpha=0.4, label="demonstrated")
+        for formulation, color in COLORS.items():
+            primitives = _learn(formulation, demos)
+            goal = wish(primitives.starts, primitives.goals)
+            path = primitives.rollout(goal=goal, velocity=np.zeros(2)).positions[0, :, 1]
+            axes.plot(np.linspace(0, 1, len(path)), path, color=color, linestyle=LINES[formulation], label=formulation)
+            axes.plot(1, goal[0, 1], "*", color="black", markersize=8, clip_on=False)
+        axes.set(title=title, xlabel="normalized time t / τ", ylabel="y [mm]", xlim=(0, 1))
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def _ending_near_its_start(x: np.ndarray) -> np.ndarray:
+    """The same shape, bent so that it ends 1 mm from its start in each dimension."""
+    u = np.linspace(0, 1, len(x))[:, None]
+    return x - u**2 * (x[-1] - x[0] - 1.0)
+
+
+def _learn(formulation: str, demos: kineme.Demonstrations) -> kineme.Primitives:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", kineme.DegenerateMovementWarning)
+        return kineme.DMP(formulation).learn(demos)
+
+
+def many_goals() -> Figure:
+    """One handwritten shape, moved to new goals in one product."""
+    demo = kineme.load_lasa(["GShape"])[:1]
+    figure = new_figure(9.6, 3.2)
+    angles = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    for axes, formulation in zip(figure.subplots(1, 3, sharex=True, sharey=True), COLORS, strict=True):
+        primitives = _learn(formulation, demo)
+        goals = primitives.goals + 25 * np.column_stack((np.cos(angles), np.sin(angles)))
+        for path in primitives.rollout(goal=goals).positions:
+            axes.plot(*path.T, color=COLORS[formulation], linewidth=0.9, alpha=0.8)
+        axes.plot(*goals.T, "*", color="black", markersize=6)
+        axes.plot(*demo[0].positions.T, color=GRAY, linewidth=4, alpha=0.5)
+        axes.set(title=formulation, xlabel="x [mm]", aspect="equal", xlim=(-95, 65), ylim=(-85, 50))
+    figure.axes[0].set_ylabel("y [mm]")
+    return figure
+
+
+FIGURES = {"three-issues": three_issues, "many-goals": many_goals}
+
+
+def main(folder: Path) -> None:
+    """Write every figure as PNG."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, draw in FIGURES.items():
+        (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "images")
