@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from statistics import fmean
+from textwrap import fill, wrap
 from typing import NamedTuple
 
 
@@ -22,15 +23,20 @@ def spread(values: Sequence[float]) -> str:
     return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
 
 
-def to_text(table: Table, width: int = 110) -> str:
-    """Columns aligned for a terminal."""
-    from textwrap import fill
-
+def to_text(table: Table, width: int = 160) -> str:
+    """Columns aligned for a terminal; the last one is wrapped to stay within `width`."""
     lines = [table.columns, *table.rows]
     widths = [max(len(row[k]) for row in lines) for k in range(len(table.columns))]
-    rendered = ["  ".join(cell.ljust(size) for cell, size in zip(row, widths, strict=True)).rstrip() for row in lines]
+    widths[-1] = max(24, min(widths[-1], width - sum(widths[:-1]) - 2 * len(widths)))
+    rendered = [line for row in lines for line in _wrapped(row, widths)]
     rule = "-" * max(map(len, rendered))
-    return "\n".join(filter(None, [table.title, rule, rendered[0], rule, *rendered[1:], fill(table.reading, width)]))
+    return "\n".join(filter(None, [table.title, rule, rendered[0], rule, *rendered[1:], fill(table.reading, 110)]))
+
+
+def _wrapped(row: tuple[str, ...], widths: list[int]) -> list[str]:
+    first, *more = wrap(row[-1], widths[-1]) or [""]
+    head = "  ".join(cell.ljust(size) for cell, size in zip(row[:-1], widths, strict=False))
+    return [f"{head}  {first}".rstrip(), *(f"{'':{len(head)}}  {line}" for line in more)]
 
 
 def to_html(table: Table) -> str:
