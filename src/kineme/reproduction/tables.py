@@ -90,8 +90,8 @@ def _parameters(draws: Draws) -> Table:
 
 _TRE = (
     "RBF comes near the paper in every column. TrE does not: on weights the paper prints 1/9, and no convention that "
-    "we tried comes down to it. With the paper's own m, TrE recovers what the Euclidean distance loses: a few samples blown up by a "
-    "division count as m at most, and the rest decides."
+    "we tried comes down to it. With the paper's own m, TrE recovers what the Euclidean distance loses: a few samples "
+    "blown up by a division count as m at most, and the rest decides."
 )
 
 
