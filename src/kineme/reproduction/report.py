@@ -17,7 +17,7 @@ p.lead { color: #444; margin-top: 0; max-width: 48rem; }
 figure { margin: 1.6rem 0; overflow-x: auto; } figcaption, figure p { color: #444; font-size: .9rem; max-width: 52rem; }
 img { max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
-caption { text-align: left; font-weight: 600; padding-bottom: .4rem; font-size: .95rem; }
+caption { text-align: left; white-space: nowrap; font-weight: 600; padding-bottom: .4rem; font-size: .95rem; }
 th, td { padding: .28rem .7rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
 thead th { border-bottom: 1.5px solid #1a1a1a; } tbody th { font-weight: 500; }
 footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid #ddd; padding-top: 1rem; }

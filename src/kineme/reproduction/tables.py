@@ -150,6 +150,6 @@ def _penalty(draws: Draws) -> Table:
         rows,
         "With three movements per class, a similarity of at most 1 and scikit-learn's C = 1, every multiplier is at "
         "its bound: the classes that keep three movements outvote the one that lost its third, and accuracy falls "
-        "below chance (1/9 = 0.111). TrE as printed is as large as m, so C does not bind. The tables above use "
+        "towards chance (1/9 = 0.111). TrE as printed is as large as m, so C does not bind. The tables above use "
         f"C = {PENALTY:g}.",
     )
