@@ -21,8 +21,10 @@ if _TYPE_CHECKING:
         TrajectoryError,
     )
     from kineme.features.dmp_features import DMPFeatures
+    from kineme.features.rhythmic_features import RhythmicFeatures
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
+    from kineme.rhythm.rhythmic_dmp import RhythmicDMP
     from kineme.trajectories.demonstrations import Demonstrations
     from kineme.trajectories.preprocess import preprocess
     from kineme.trajectories.resample import Resample
@@ -41,7 +43,9 @@ _HOME = {
     "load_lasa": "kineme.datasets.lasa",
     "DMP": "kineme.primitives.dmp",
     "Primitives": "kineme.primitives.primitives",
+    "RhythmicDMP": "kineme.rhythm.rhythmic_dmp",
     "DMPFeatures": "kineme.features.dmp_features",
+    "RhythmicFeatures": "kineme.features.rhythmic_features",
     "kernels": "kineme",
     "styles": "kineme",
     "KinemeError": "kineme.errors",
@@ -62,6 +66,8 @@ __all__ = [  # in the order of the flow
     "KinemeError",
     "Primitives",
     "Resample",
+    "RhythmicDMP",
+    "RhythmicFeatures",
     "Smooth",
     "SpecificationError",
     "Trajectory",

@@ -14,12 +14,13 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import TrajectoryError
 from kineme.primitives.dmp import DMP
 from kineme.primitives.primitives import Primitives
+from kineme.rhythm.primitives import RhythmicPrimitives
 from kineme.trajectories.axes import axis_names
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import check_choice, check_count
 
-#: Feature name -> (Primitives, S) -> array (n, size, d).
-FEATURES: dict[str, Callable[[Primitives, int], NDArray[Any]]] = {
+#: Feature name -> (primitives, S) -> array (n, size, d).
+FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any]]] = {
     "shape-attractor": lambda primitives, n_samples: primitives.shape_attractor(n_samples),
     "forcing": lambda primitives, n_samples: primitives.forcing(n_samples),
     "weights": lambda primitives, _: primitives.weights,
@@ -139,7 +140,7 @@ class DMPFeatures(TransformerMixin, BaseEstimator):
         return tags
 
 
-def features_of(primitives: Primitives, feature: str, n_samples: int) -> NDArray[Any]:
+def features_of(primitives: Primitives | RhythmicPrimitives, feature: str, n_samples: int) -> NDArray[Any]:
     """Feature rows (n, d * size) of learned primitives, dimension-major as in Eq. (9)."""
     by_time = FEATURES[feature](primitives, n_samples)
     return by_time.transpose(0, 2, 1).reshape(len(primitives), -1)

@@ -39,7 +39,7 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
 
     for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
     starts = demos.positions[demos.offsets[:-1]]
-    _check_movement(demos, starts, extents)
+    check_movement(demos, starts, extents)
     return Primitives(
         dmp,
         scaled_weights=weights,
@@ -53,7 +53,8 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
     )
 
 
-def _check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None:
+def check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None:
+    """Refuse a movement that does not move."""
     still = (extents <= 8 * np.finfo(float).eps * np.abs(starts)).all(axis=1)
     if still.any():
         i = int(np.argmax(still))

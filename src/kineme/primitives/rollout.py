@@ -117,12 +117,12 @@ def rollout(
     """Broadcast the wishes over the primitives and check them; see `Primitives.rollout`."""
     d = primitives.n_dims
     wishes = {
-        "start": _per_movement(start, "start", d),
-        "goal": _per_movement(goal, "goal", d),
-        "velocity": _per_movement(velocity, "velocity", d),
-        "duration": _per_movement(duration, "duration", None),
+        "start": per_movement(start, "start", d),
+        "goal": per_movement(goal, "goal", d),
+        "velocity": per_movement(velocity, "velocity", d),
+        "duration": per_movement(duration, "duration", None),
     }
-    n = _broadcast_length(len(primitives), wishes)
+    n = broadcast_length(len(primitives), wishes)
 
     def fill(name: str, default: Array) -> Array:
         wish = wishes[name]
@@ -142,7 +142,7 @@ def rollout(
     )
 
 
-def _per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
+def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
     """A wish as (1, d) or (n, d), durations as (1,) or (n,)."""
     if wish is None:
         return None
@@ -161,7 +161,8 @@ def _per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Arra
     return value
 
 
-def _broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
+def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
+    """How many movements the wishes make, one or equally many of each."""
     lengths = {"primitives": n_primitives} | {name: len(value) for name, value in wishes.items() if value is not None}
     n = max(lengths.values())
     if any(length not in (1, n) for length in lengths.values()):

@@ -1,0 +1,117 @@
+"""Learning a batch of rhythmic movements: resample, find the period, fold, align, multiply."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.parallel import for_tiles
+from kineme.primitives.encode import check_movement
+from kineme.rhythm.cycle import fold
+from kineme.rhythm.harmonics import as_real, waves
+from kineme.rhythm.operators import encoder, even_phases
+from kineme.rhythm.periods import FEWEST_CYCLES, SAMPLES_PER_PERIOD, Periodicity, find_cycles
+from kineme.rhythm.primitives import RhythmicPrimitives
+from kineme.rhythm.rhythmic_dmp import RhythmicDMP
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.preprocess import preprocess
+from kineme.trajectories.resample import relative_rows
+from kineme.validation import describe
+
+_TILE_SAMPLES = 10_000  # numbers of recording in one tile; the exponentials of the period search are fifty times more
+_LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
+_ALMOST = 1 - 1e-6
+
+
+def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
+    """Learn one limit cycle per movement; see `RhythmicDMP.learn`."""
+    demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
+    n, n_dims, H = len(demos), demos.n_dims, dmp.n_harmonics
+    if dmp.align_on is not None and dmp.align_on >= n_dims:
+        raise TrajectoryError(
+            f"expected movements with a dimension {dmp.align_on} to align on, got {n_dims} dimensions"
+        )
+    first = demos.offsets[:-1]
+    starts = demos.positions[first]
+    extents = np.maximum.reduceat(demos.positions, first) - np.minimum.reduceat(demos.positions, first)
+    check_movement(demos, starts, extents)
+    n_samples = demos.even_length or int(demos.lengths.max())
+    found = periodicity(dmp, demos, n_samples)
+    coefficients = np.empty((n, n_dims, H + 1), dtype=complex)
+    phases, explained, aligned_on = np.empty(n), np.empty(n), np.empty(n, dtype=np.intp)
+
+    def fold_tile(start: int, stop: int) -> None:
+        chosen = slice(start, stop)
+        rows = relative_rows(demos, start, stop, n_samples)
+        one = fold(rows, found.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
+        coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = one
+
+    for_tiles(fold_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
+    series = as_real(coefficients)
+    shape = series[:, :, 1:] @ waves(even_phases(dmp.n_points), H)[:, 1:].T
+    return RhythmicPrimitives(
+        dmp,
+        scaled_weights=series @ encoder(dmp),
+        baselines=starts + series[:, :, 0],
+        amplitudes=np.ptp(shape, axis=2).max(axis=1) / 2,
+        periods=demos.durations / found.cycles,
+        phases=phases,
+        aligned_on=aligned_on,
+        explained=explained,
+        labels=demos.labels,
+        names=demos.names,
+    )
+
+
+def periodicity(dmp: RhythmicDMP, demos: Demonstrations, n_samples: int) -> Periodicity:
+    """Periods per recording: from the given period, or found, or refused."""
+    n = len(demos)
+    if dmp.period is not None:
+        cycles = demos.durations / dmp.period
+        # A period may be recorded without the sample that closes it.
+        short = cycles * demos.lengths / (demos.lengths - 1) < _ALMOST
+        if short.any():
+            i = int(np.argmax(short))
+            raise TrajectoryError(
+                f"{describe(i, demos.names)}: expected at least one period of {dmp.period:g} s, got a recording of "
+                f"{demos.durations[i]:.4g} s; record longer, or correct the period (times are in seconds)"
+            )
+        _check_samples(demos, dmp.period)
+        return Periodicity(cycles, np.ones(n))
+    found = Periodicity(np.empty(n), np.empty(n))
+
+    def search_tile(start: int, stop: int) -> None:
+        rows = relative_rows(demos, start, stop, n_samples)
+        found.cycles[start:stop], found.explained[start:stop] = find_cycles(rows, demos.lengths[start:stop])
+
+    for_tiles(search_tile, n, max(1, _TILE_SAMPLES // (demos.n_dims * n_samples)))
+    aperiodic = ~(found.explained >= _LEAST_EXPLAINED)
+    if aperiodic.any() and dmp.aperiodic == "raise":
+        _refuse(demos, found, aperiodic)
+    return Periodicity(np.where(np.isnan(found.cycles), 1.0, found.cycles), found.explained)
+
+
+def _refuse(demos: Demonstrations, found: Periodicity, aperiodic: np.ndarray) -> NoReturn:
+    i = int(np.argmax(aperiodic))
+    best = (
+        "nothing in it repeats"
+        if np.isnan(found.cycles[i])
+        else f"the best, {demos.durations[i] / found.cycles[i]:.4g} s, explains {max(found.explained[i], 0.0):.0%}"
+    )
+    raise TrajectoryError(
+        f"{describe(i, demos.names)}: expected a movement of at least {FEWEST_CYCLES:g} periods, found no period: "
+        f"{best} ({aperiodic.sum()} of {len(demos)} movements); record longer, remove drift, give period= if known, "
+        'learn a single reach with kineme.DMP, or take the best period with aperiodic="accept"'
+    )
+
+
+def _check_samples(demos: Demonstrations, period: float) -> None:
+    per_period = (demos.lengths - 1) / demos.durations * period
+    if (per_period < SAMPLES_PER_PERIOD).any():
+        i = int(per_period.argmin())
+        raise TrajectoryError(
+            f"{describe(i, demos.names)}: expected at least {SAMPLES_PER_PERIOD} samples per period of {period:g} s, "
+            f"got {per_period[i]:.3g}; record faster, or correct the period (times are in seconds)"
+        )
