@@ -1,0 +1,1 @@
+"""A primitive under live control: one step at a time, with a moving goal, a measured state, obstacles and any tempo."""

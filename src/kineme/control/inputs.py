@@ -1,0 +1,44 @@
+"""What comes from sensors, networks and planners while the robot moves: checked without ever raising."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kineme.validation import Array
+
+
+def vector(value: Any, n_dims: int) -> Array | None:
+    """`value` as (d,) finite float64, or None."""
+    array = _array(value)
+    return array if array is not None and array.shape == (n_dims,) else None
+
+
+def rows(value: Any, n_dims: int) -> Array | None:
+    """`value` (m, d), or (d,) for one, as contiguous (m, d) finite float64, or None."""
+    array = _array(value)
+    if array is not None and array.ndim == 1 and len(array):
+        array = array[None]
+    if array is None or array.ndim not in (1, 2):
+        return None
+    if array.size == 0:
+        return np.zeros((0, n_dims))
+    return np.ascontiguousarray(array) if array.shape[1] == n_dims else None
+
+
+def number(value: Any) -> float:
+    """`value` as a float; NaN for what is none."""
+    try:
+        return float(value)
+    except Exception:
+        return math.nan
+
+
+def _array(value: Any) -> Array | None:
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except Exception:  # whatever a driver hands over, the motion goes on
+        return None
+    return array if math.isfinite(array.sum()) or np.isfinite(array).all() else None
