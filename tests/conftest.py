@@ -18,7 +18,7 @@ settings.load_profile("deterministic")
 
 
 def _make_movement(seed, n_dims=2, n_samples=None, even=True):
-    """Times (T,) over 2 s and positions (T, d): a straight line with four sines on it, so that g - x0 is never small."""
+    """Times (T,) over 2 s and positions (T, d): a straight line, so that g - x0 is not small, with four sines on it."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(40, 90)) if n_samples is None else n_samples
     u = np.linspace(0, 1, n) if even else np.append(0, np.cumsum(rng.uniform(0.4, 1.6, n - 1)))

@@ -32,7 +32,7 @@ def eq_4(dmp, x, v, s, f, x0, g):
 
 
 def decoupled(dmp, x, v, s, f, x0, g):
-    w_s = 1.01 * s**2 / (s**2 + 0.01)
+    w_s = 1.008 * s**3 / (s**3 + 0.008)
     return w_s * dmp.K * (f / w_s + x0 - x) + (1 - w_s) * dmp.K * (g - x) - dmp.D * v
 
 

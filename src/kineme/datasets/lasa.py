@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice
 
@@ -53,6 +53,8 @@ def load_lasa(shapes: Iterable[str] | None = None) -> Demonstrations:
     SpecificationError
         An unknown shape; the message lists the known ones.
     """
+    if isinstance(shapes, str):
+        raise SpecificationError(f"expected a list of shapes, got {shapes!r}; pass [{shapes!r}]")
     arrays: list[Array] = []
     times: list[Array] = []
     labels: list[str] = []

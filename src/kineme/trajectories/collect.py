@@ -142,10 +142,10 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
         )
     if len(block) == 0:
         raise TrajectoryError("expected at least one movement, got none")
-    as_positions(block[0], "every movement of the block")
-    n, n_samples, n_dims = block.shape
     if block.dtype.kind not in "biuf":
         raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
+    as_positions(block[0], "every movement of the block")
+    n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 

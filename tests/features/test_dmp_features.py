@@ -1,0 +1,177 @@
+"""DMPFeatures as scikit-learn's searches, pipelines and cross-validations use it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.pipeline import Pipeline, make_pipeline
+
+from kineme import (
+    DMP,
+    DegenerateMovementError,
+    Demonstrations,
+    DMPFeatures,
+    KinemeError,
+    Smooth,
+    SpecificationError,
+    TrajectoryError,
+    TrimRest,
+)
+
+FEATURES = ("shape-attractor", "forcing", "weights")
+
+
+@pytest.fixture(scope="module")
+def demos(make_movement):
+    """Three classes of five noisy, ragged movements."""
+    rng = np.random.default_rng(0)
+    arrays, times, labels = [], [], []
+    for label in range(3):
+        for take in range(5):
+            t, x = make_movement(label, n_samples=50, even=False)
+            x = x[: 50 - take // 3]
+            arrays.append(x * rng.uniform(0.9, 1.1) + rng.normal(size=2))
+            times.append(t[: len(x)] * rng.uniform(0.5, 2))
+            labels.append("abc"[label])
+    return Demonstrations.from_arrays(arrays, labels, times)
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+def test_rows_are_eq_9_dimension_after_dimension(demos, feature):
+    rows = DMPFeatures(feature, n_basis=12, n_samples=20).fit_transform(demos)
+    learned = DMP(n_basis=12).learn(demos)
+    values = {
+        "weights": learned.weights,
+        "forcing": learned.forcing(20),
+        "shape-attractor": learned.shape_attractor(20),
+    }
+    for row, by_time in zip(rows, values[feature], strict=True):
+        x, y = by_time[:, 0], by_time[:, 1]
+        np.testing.assert_array_equal(row, [*x, *y])
+
+
+def test_every_parameter_of_the_specification_is_passed_on(demos):
+    choices = {
+        "formulation": "original", "n_basis": 9, "stiffness": 50.0, "damping": 9.0, "gating": "phase",
+        "regression": "ridge", "ridge": 1e-3, "phase_end": 0.02, "overlap": 0.5, "n_points": 70,
+        "preprocessing": (TrimRest(), Smooth(9.0)),
+    }  # fmt: skip
+    assert DMPFeatures(fit_to="trajectory", **choices).fit(demos).dmp_ == DMP(fit="trajectory", **choices)
+
+
+def test_defaults_are_those_of_the_specification(demos):
+    assert DMPFeatures().fit(demos).dmp_ == DMP()
+
+
+def test_cloning_keeps_parameters_and_forgets_the_fit(demos):
+    features = DMPFeatures("weights", "original", 7, preprocessing=(TrimRest(0.02),)).fit(demos)
+    copy = clone(features)
+    assert copy.get_params() == features.get_params()
+    assert not hasattr(copy, "dmp_")
+
+
+def test_parameters_are_set_by_name(demos):
+    features = DMPFeatures().set_params(feature="weights", n_basis=11)
+    assert features.fit_transform(demos).shape == (15, 22)
+
+
+def test_a_grid_search_over_features_formulations_and_sizes_runs(demos):
+    model = Pipeline([("features", DMPFeatures()), ("classify", KNeighborsClassifier(1))])
+    grid = {
+        "features__feature": FEATURES,
+        "features__formulation": ["original", "bio-inspired"],
+        "features__n_basis": [8, 16],
+    }
+    search = GridSearchCV(model, grid, cv=2, error_score="raise").fit(demos, demos.labels)
+    assert len(search.cv_results_["params"]) == 12
+    assert search.best_score_ == 1.0
+
+
+def test_demonstrations_and_a_list_of_arrays_cross_validate_alike(demos):
+    block = [one.positions for one in demos]
+    model = make_pipeline(DMPFeatures(n_basis=15), KNeighborsClassifier(1))
+    scores = cross_val_score(model, demos, demos.labels, cv=3, error_score="raise")
+    assert scores.tolist() == [1.0, 1.0, 1.0]
+    assert cross_val_score(model, block, demos.labels, cv=3, error_score="raise").tolist() == [1.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(("n_dims", "axes"), [(1, "x"), (2, "xy"), (3, "xyz"), (4, ["q1", "q2", "q3", "q4"])])
+@pytest.mark.parametrize("feature", FEATURES)
+def test_names_say_axis_and_number_of_each_column(make_movement, feature, n_dims, axes):
+    features = DMPFeatures(feature, n_basis=5, n_samples=6)
+    rows = features.fit_transform([make_movement(0, n_dims)[1]])
+    size = 5 if feature == "weights" else 6
+    assert features.get_feature_names_out().tolist() == [f"{axis}_{k}" for axis in axes for k in range(1, size + 1)]
+    assert rows.shape == (1, n_dims * size)
+
+
+def test_names_belong_to_the_fit(demos):
+    features = DMPFeatures("weights", n_basis=5).fit(demos)
+    features.set_params(n_basis=50)
+    assert len(features.get_feature_names_out()) == features.transform(demos).shape[1]
+
+
+def test_the_default_output_can_be_asked_for(demos):
+    features = DMPFeatures(n_samples=6).set_output(transform="default")
+    assert isinstance(features.fit_transform(demos), np.ndarray)
+
+
+def test_fitting_again_forgets(demos, make_movement):
+    other = [make_movement(0, 3)[1]]
+    features = DMPFeatures(n_samples=6).fit(demos)
+    assert features.fit(other).transform(other).shape == (1, 18)
+
+
+@pytest.mark.parametrize("method", ["transform", "get_feature_names_out"])
+def test_an_unfitted_transformer_says_so(demos, method):
+    with pytest.raises(NotFittedError, match="DMPFeatures instance is not fitted yet"):
+        getattr(DMPFeatures(), method)(*[demos] * (method == "transform"))
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_the_type_of_the_rows_is_chosen(demos, dtype):
+    assert DMPFeatures(dtype=dtype).fit_transform(demos).dtype == dtype
+
+
+def test_single_precision_is_the_rounded_double(demos):
+    double = DMPFeatures().fit_transform(demos)
+    np.testing.assert_array_equal(DMPFeatures(dtype="float32").fit_transform(demos), double.astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"feature": "f"}, r"feature to be one of \['shape-attractor', 'forcing', 'weights'\], got 'f'"),
+        ({"n_samples": 1}, "n_samples to be a whole number of at least 2, got 1"),
+        ({"dtype": "int"}, r"dtype to be one of \['float64', 'float32'\], got 'int'"),
+        ({"formulation": "Original"}, r"formulation to be one of \['original', 'bio-inspired', .*got 'Original'"),
+        ({"fit_to": "path"}, r"fit to be one of \['forcing', 'trajectory'\], got 'path'"),
+    ],
+)
+def test_parameters_out_of_range_are_refused_in_fit(demos, parameters, message):
+    features = DMPFeatures(**parameters)  # the constructor takes anything, as scikit-learn wants it
+    with pytest.raises(SpecificationError, match=message):
+        features.fit(demos)
+
+
+def test_movements_of_other_dimensions_are_refused(demos, make_movement):
+    features = DMPFeatures().fit(demos)
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 3; fit again"):
+        features.transform([make_movement(0, 3)[1]])
+
+
+def test_closed_movements_are_refused_where_the_feature_divides(demos):
+    u = np.linspace(0, 2 * np.pi, 60)
+    loop = [np.column_stack((np.sin(u), np.cos(u)))]
+    with pytest.raises(DegenerateMovementError, match=r'trajectory 0: .*use feature "shape-attractor"'):
+        DMPFeatures("weights", "original").fit(demos).transform(loop)
+    assert np.isfinite(DMPFeatures("shape-attractor", "original").fit(demos).transform(loop)).all()
+
+
+def test_errors_are_those_of_kineme(demos):
+    with pytest.raises(KinemeError):
+        DMPFeatures().fit(demos).transform([])

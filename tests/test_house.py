@@ -1,0 +1,71 @@
+"""House rules that a linter does not know: sizes, names, and nothing of anyone's machine in a tracked file."""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import subprocess
+import tokenize
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+MAX_FILE, MAX_FUNCTION = 200, 40
+
+
+def _code_lines(path):
+    """Numbers of the lines that hold code: no blank lines, comments or docstrings."""
+    text = path.read_text()
+    docstrings = {
+        line
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        for line in range(node.lineno, node.end_lineno + 1)
+    }
+    empty = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+    code = set()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type not in empty:
+            code |= set(range(token.start[0], token.end[0] + 1))
+    return code - docstrings
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT / "src")))
+def test_files_and_functions_are_short(path):
+    code = _code_lines(path)
+    assert len(code) <= MAX_FILE
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            length = len(code & set(range(node.body[0].lineno, node.end_lineno + 1)))
+            assert length <= MAX_FUNCTION, f"{node.name} has {length} lines"
+
+
+def test_no_file_is_a_drawer_for_anything():
+    drawers = {"util", "utils", "helper", "helpers", "common", "misc"}
+    assert not [path for path in SOURCES if path.stem.strip("_") in drawers or path.parent.name in drawers]
+
+
+def _tracked():
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    paths = [ROOT / name for name in listed.stdout.split("\0") if name]
+    return [path for path in paths if path.is_file() and path != Path(__file__)]
+
+
+@pytest.mark.parametrize(
+    ("what", "pattern"),
+    [
+        ("a path of someone's machine", rb"(?<![\w.}$/-])/(?:home|root|Users|work|mnt|tmp|opt)/[\w.-]+"),
+        ("the address of a package index", rb"(?:--(?:extra-)?index-url|/simple/|https?://[\w.:@-]*(?:pypi|artifactory|nexus)[\w.:/-]*)"),
+        ("a user name in an address", rb"https?://[^\s/@]+@"),
+    ],
+)  # fmt: skip
+def test_no_tracked_file_contains(what, pattern):
+    found = {
+        str(path.relative_to(ROOT)): match[0] for path in _tracked() if (match := re.search(pattern, path.read_bytes()))
+    }
+    assert not found, what

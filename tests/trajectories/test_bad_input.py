@@ -1,0 +1,120 @@
+"""Every refusal says what was expected, what came, where, and what to do."""
+
+# ruff: noqa: E501 - one case, one line, the message whole
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from kineme import DMP, Demonstrations, KinemeError, Trajectory, TrajectoryError
+
+T = np.linspace(0, 1, 8)
+X = np.column_stack((T, T**2))
+
+
+def _with(value, row=3):
+    bad = X.copy()
+    bad[row, 1] = value
+    return bad
+
+
+def _stamps(row, value):
+    bad = T.copy()
+    bad[row] = value
+    return bad
+
+
+BAD_ARRAYS = {
+    "NaN": ([X, _with(np.nan)], "trajectory 1 ('two'): expected finite positions, got [0.42857142857142855, nan] at sample 3; remove the sample"),
+    "infinity": ([_with(np.inf, 7), X], "trajectory 0 ('one'): expected finite positions, got [1.0, inf] at sample 7"),
+    "two infinities": ([_with(np.inf), _with(-np.inf)], "trajectory 0 ('one'): expected finite positions"),
+    "two samples": ([X, X[:2]], "trajectory 1 ('two'): expected at least 4 samples, got 2"),
+    "transposed": ([X, X.T], "trajectory 1 ('two'): expected at least 4 samples, got 2; samples run along the first axis: transpose the array"),
+    "mixed dimensions": ([X, X[:, :1]], "trajectory 1 ('two'): expected 2 dimensions as in trajectory 0, got 1; movements of one batch share"),
+    "three axes": ([X, X[None]], "trajectory 1 ('two'): expected positions of shape (T, d), samples by dimensions, got shape (1, 8, 2); pass many movements as a list"),
+    "a number": ([X, 3.0], "trajectory 1 ('two'): expected positions of shape (T, d), samples by dimensions, got shape ()"),
+    "no dimension": ([X, X[:, :0]], "got shape (8, 0)"),
+    "words": ([X, ["left", "right", "up", "down"]], "trajectory 1 ('two'): expected positions to be an array of numbers, got could not convert"),
+    "ragged rows": ([X, [[1, 2], [3]]], "trajectory 1 ('two'): expected positions to be an array of numbers, got setting an array element"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arrays", "message"), BAD_ARRAYS.values(), ids=BAD_ARRAYS)
+def test_bad_positions_are_refused(arrays, message):
+    with pytest.raises(TrajectoryError, match=re.escape(message)):
+        Demonstrations.from_arrays(arrays, names=["one", "two"])
+
+
+BAD_TIMES = {
+    "duplicate": (_stamps(4, T[3]), "trajectory 1 ('two'): expected strictly increasing times, got duplicate stamps 0.428571429 and 0.428571429 at samples 3 and 4; sort the samples and drop repeated ones"),
+    "decreasing": (T[::-1], "trajectory 1 ('two'): expected strictly increasing times, got decreasing stamps 1 and 0.857142857 at samples 0 and 1"),
+    "NaN": (_stamps(2, np.nan), "trajectory 1 ('two'): expected finite times, got nan at sample 2"),
+    "one too few": (T[:-1], "trajectory 1 ('two'): expected one time stamp for each of the 8 samples, got times of shape (7,)"),
+    "words": (list("abcdefgh"), "trajectory 1 ('two'): expected times in seconds, got could not convert"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("times", "message"), BAD_TIMES.values(), ids=BAD_TIMES)
+def test_bad_times_are_refused(times, message):
+    with pytest.raises(TrajectoryError, match=re.escape(message)):
+        Demonstrations.from_arrays([X, X], times=[T, times], names=["one", "two"])
+
+
+def test_the_last_and_the_next_first_stamp_may_be_in_any_order():
+    assert len(Demonstrations.from_arrays([X, X], times=[T + 10, T])) == 2
+
+
+@pytest.mark.parametrize(("times", "message"), BAD_TIMES.values(), ids=BAD_TIMES)
+def test_a_trajectory_refuses_the_same_times(times, message):
+    with pytest.raises(TrajectoryError, match=re.escape(message.partition(": ")[2])):
+        Trajectory(times, X, name="two")
+
+
+def test_a_trajectory_names_itself():
+    with pytest.raises(TrajectoryError, match=r"'take 7'\)?: expected finite positions, got \[.*nan\] at sample 3"):
+        Trajectory(T, _with(np.nan), name="take 7")
+
+
+BAD_COLLECTIONS = {
+    "nothing": (lambda: Demonstrations.of([]), "expected at least one movement, got none"),
+    "no trajectory": (lambda: Demonstrations([]), "expected at least one movement, got none"),
+    "an empty block": (lambda: Demonstrations.of(np.empty((0, 8, 2))), "expected at least one movement, got none"),
+    "an empty mask": (lambda: Demonstrations.of([X])[[False]], "expected at least one movement, got an empty selection"),
+    "a flat block": (lambda: Demonstrations.of(T), "expected an array of shape (n, T, d), movements by samples by dimensions, got shape (8,); pass one movement as [array]"),
+    "one movement": (lambda: Demonstrations.of(X), "got shape (8, 2); pass one movement as [array]"),
+    "a 4-D block": (lambda: Demonstrations.of(X[None, None]), "got shape (1, 1, 8, 2)"),
+    "a short block": (lambda: Demonstrations.of(np.zeros((5, 3, 2))), "every movement of the block: expected at least 4 samples, got 3"),
+    "a block of words": (lambda: Demonstrations.of(np.full((2, 8, 2), "a")), "expected positions to be an array of numbers, got an array of type <U1"),
+    "a block with NaN": (lambda: Demonstrations.of(np.stack((X, _with(np.nan)))), "trajectory 1: expected finite positions"),
+    "None": (lambda: Demonstrations.of(None), "expected movements as a list of (T, d) arrays or one (n, T, d) array, got NoneType"),
+    "a word": (lambda: Demonstrations.of("CShape"), "got str"),
+    "a generator": (lambda: Demonstrations.of(x for x in [X]), "got generator"),
+    "trajectories and arrays": (lambda: Demonstrations([Trajectory(T, X), X]), "expected a sequence of Trajectory, got ndarray at index 1; use Demonstrations.from_arrays"),
+    "labels": (lambda: Demonstrations.from_arrays([X, X], labels=["a"]), "expected one label for each of the 2 movements, got labels of shape (1,)"),
+    "names": (lambda: Demonstrations.from_arrays([X, X], names=["a"]), "expected one name for each of the 2 movements, got 1"),
+    "too few times": (lambda: Demonstrations.from_arrays([X, X], times=[T]), "expected times for each of the 2 movements, got 1"),
+    "one time": (lambda: Demonstrations.from_arrays([X, X], times=1.0), "expected times as a list of (T,) arrays or one (T,) array, got float"),
+    "some labels": (lambda: Demonstrations([Trajectory(T, X, "a"), Trajectory(T, X, name="b")]), "expected a label on every movement or on none, got none on trajectory 1 ('b')"),
+    "some labels of arrays": (lambda: Demonstrations.from_arrays([X, X], ["a", None]), "expected a label on every movement or on none, got none on trajectory 1"),
+    "dimensions": (lambda: Demonstrations([Trajectory(T, X), Trajectory(T, T, name="b")]), "trajectory 1 ('b'): expected 2 dimensions as in trajectory 0, got 1"),
+    "no movement at all": (lambda: DMP().learn([X, np.ones((8, 2))]), "trajectory 1: expected a movement, got 8 samples at the same place (1 of 2 movements do not move); leave them out"),
+    "rounding": (lambda: DMP().learn([1e6 + 1e-10 * X]), "trajectory 0: expected a movement"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "message"), BAD_COLLECTIONS.values(), ids=BAD_COLLECTIONS)
+def test_bad_collections_are_refused(make, message):
+    with pytest.raises(TrajectoryError, match=re.escape(message)):
+        make()
+
+
+def test_errors_are_those_that_numpy_users_catch():
+    assert issubclass(TrajectoryError, ValueError)
+    assert issubclass(TrajectoryError, KinemeError)
+
+
+def test_positions_as_large_as_numbers_go_are_finite():
+    assert len(Demonstrations.from_arrays([np.full(8, 1.7e308)])) == 1

@@ -1,0 +1,124 @@
+"""The spline and the smoother against SciPy's, plain and compiled, on movements as bad as they come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline, make_smoothing_spline
+
+from kineme import Demonstrations, Resample, Smooth, preprocess
+from kineme.trajectories.resample import relative_rows
+from kineme.trajectories.spline import spline_matrix, spline_rows
+
+CHOICES = ("always", "never")
+
+
+@pytest.fixture(params=CHOICES, scope="module")
+def compiled(request):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINEME_COMPILED", request.param)
+        yield request.param
+
+
+def _ragged(seed, least, n=6, offset=0.0, nearness=1e-3):
+    """Movements of `least` samples and more, some stamps `nearness` of a step apart, far from the origin."""
+    rng = np.random.default_rng(seed)
+    movements = []
+    for i in range(n):
+        length = least if i == 0 else int(rng.integers(least, 60))
+        gaps = rng.uniform(0.5, 1.5, length - 1)
+        gaps[rng.random(length - 1) < 0.1] = nearness
+        t = offset + np.append(0, np.cumsum(gaps)) / gaps.sum()
+        phase = rng.uniform(0, 6, 3)
+        movements.append((t, offset + np.sin(4 * (t - offset)[:, None] + phase)))
+    return movements
+
+
+def _demonstrations(movements):
+    # Every other column of a wider array: not contiguous.
+    wide = [np.repeat(x, 2, axis=1)[:, ::2] for _, x in movements]
+    return Demonstrations.from_arrays(wide, times=[t for t, _ in movements])
+
+
+any_ragged = given(seed=st.integers(0, 10**6), offset=st.sampled_from([0.0, -7.0, 1e4]))
+
+
+@any_ragged
+def test_splines_are_those_of_scipy(compiled, seed, offset):
+    movements = _ragged(seed, least=4, offset=offset)
+    rows = relative_rows(_demonstrations(movements), 0, 6, 33)
+    for (t, x), row in zip(movements, rows, strict=True):
+        even = np.linspace(0, t[-1] - t[0], 33)
+        np.testing.assert_allclose(row, CubicSpline(t - t[0], x - x[0])(even).T, atol=1e-9)
+
+
+@any_ragged
+def test_smoothing_splines_are_those_of_scipy(compiled, seed, offset):
+    movements = _ragged(seed, least=5, offset=offset)
+    smoothed = preprocess(_demonstrations(movements), [Smooth(6.0)])
+    for (t, x), one in zip(movements, smoothed, strict=True):
+        u = (t - t[0]) / (t[-1] - t[0])
+        spline = make_smoothing_spline(u, x - x[0], lam=(len(t) - 1) / (2 * np.pi * 6.0) ** 4)
+        np.testing.assert_allclose(one.positions - x[0], spline(u), atol=1e-7)
+
+
+@given(seed=st.integers(0, 10**6), nearness=st.sampled_from([1e-5, 1e-7]))
+@example(seed=0, nearness=1e-9)
+def test_nearly_duplicate_stamps_do_no_harm_to_exact_data(compiled, seed, nearness):
+    """Between samples of a cubic the spline is that cubic, though chords over 1e-7 of a step are all rounding."""
+    for t, _ in _ragged(seed, least=5, nearness=nearness):
+        cubic = np.polynomial.Polynomial([0, 1, -2, 1.5])
+        rows = spline_rows(t, cubic(t)[:, None], np.array([0, len(t)]), 50)
+        np.testing.assert_allclose(rows[0, 0], cubic(np.linspace(0, 1, 50)), atol=1e-6)
+
+
+@pytest.mark.parametrize("n_in", [4, 5, 50])
+def test_the_spline_matrix_is_the_spline_of_scipy(n_in):
+    y = np.random.default_rng(n_in).normal(size=n_in)
+    expected = CubicSpline(np.linspace(0, 1, n_in), y)(np.linspace(0, 1, 37))
+    np.testing.assert_allclose(spline_matrix(n_in, 37) @ y, expected, atol=1e-12)
+
+
+def test_the_spline_matrix_is_of_fourth_order():
+    fine = np.linspace(0, 1, 501)
+    errors = [
+        np.abs(spline_matrix(n, 501) @ np.sin(9 * np.linspace(0, 1, n)) - np.sin(9 * fine)).max() for n in (41, 81, 161)
+    ]
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 3.8).all()
+
+
+def test_spline_rows_are_of_fourth_order_on_irregular_stamps(compiled):
+    fine, errors = np.linspace(0, 1, 501), []
+    for n in (41, 81, 161):
+        v = np.linspace(0, 1, n)
+        u = v + 0.05 * np.sin(2 * np.pi * v)
+        rows = spline_rows(u, np.sin(9 * u)[:, None], np.array([0, n]), 501)
+        errors.append(np.abs(rows[0, 0] - np.sin(9 * fine)).max())
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 3.8).all()
+
+
+def test_cubics_are_resampled_exactly(compiled):
+    u = np.sort(np.append([0, 1], np.random.default_rng(0).random(20)))
+    x = 1 + u - 3 * u**2 + 2 * u**3
+    even = np.linspace(0, 1, 40)
+    np.testing.assert_allclose(
+        spline_rows(u, x[:, None], np.array([0, 22]), 40)[0, 0], even - 3 * even**2 + 2 * even**3, atol=1e-12
+    )
+
+
+def test_resampling_an_even_movement_again_changes_nothing(make_movement):
+    demos = Demonstrations.from_arrays([make_movement(i, n_samples=50 + i, even=False)[1] for i in range(4)])
+    once = preprocess(demos, [Resample(80)])
+    twice = preprocess(once, [Resample(80)])
+    np.testing.assert_allclose(twice.positions, once.positions, rtol=1e-13)
+    np.testing.assert_array_equal(twice.times, once.times)
+
+
+def test_resampling_keeps_start_goal_and_duration(make_movement):
+    t, x = make_movement(1, even=False)
+    one = preprocess(Demonstrations.from_arrays([x], times=[t + 9]), [Resample(33)])[0]
+    np.testing.assert_allclose(one.positions[[0, -1]], x[[0, -1]], rtol=1e-12)
+    assert one.duration == pytest.approx(t[-1])
+    assert len(one) == 33
