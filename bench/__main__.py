@@ -8,7 +8,7 @@ import os
 
 from bench.rows import save, table
 
-SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction")
+SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction", "rhythm")
 
 
 def main() -> int:
@@ -23,7 +23,7 @@ def main() -> int:
         rows = importlib.import_module(f"bench.{name}").measure(arguments.quick)
         missed += sum(row.met is False for row in rows)
         print(f"\n{name}\n{table(rows)}", flush=True)
-        if not arguments.quick:
+        if rows and not arguments.quick:
             save(name, rows, load)
     print(f"\n{missed} targets missed" if missed else "\nall targets met")
     return 1 if missed else 0
