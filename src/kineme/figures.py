@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+
+from kineme.errors import DataError
+from kineme.io.atomic import write_atomically
 
 #: Okabe and Ito's palette, from dark to light.
 BLUE, ORANGE, GREEN, PURPLE, GRAY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
@@ -38,15 +42,35 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+#: What each file format needs to come out the same at every run.
+FORMATS: dict[str, dict[str, Any]] = {
+    "png": {"metadata": {"Software": None}},
+    "svg": {"metadata": {"Date": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+}
+
+
+def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
+    """The figure as the bytes of a file of that kind, see `FORMATS`."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=dpi, **FORMATS[kind])
+    return buffer.getvalue()
+
+
 def render(figure: Figure, dpi: int) -> dict[str, bytes]:
     """The figure as ``{"png": ..., "svg": ...}``, byte for byte the same at every run."""
-    formats: dict[str, dict[str, Any]] = {
-        "png": {"dpi": dpi, "metadata": {"Software": None}},
-        "svg": {"metadata": {"Date": None}},
-    }
-    pictures = {}
-    for kind, options in formats.items():
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind, **options)
-        pictures[kind] = buffer.getvalue()
-    return pictures
+    return {kind: encode_figure(figure, kind, dpi) for kind in ("png", "svg")}
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write the figure in the format that the file's ending names, atomically.
+
+    Raises
+    ------
+    DataError
+        An ending that is not in `FORMATS`.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise DataError(f"expected a picture ending in one of {', '.join(FORMATS)}, got {path.suffix or 'none'!r}")
+    return write_atomically(path, encode_figure(figure, kind))

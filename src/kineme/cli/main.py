@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.generate import generate
 from kineme.cli.reproduce import reproduce
 from kineme.errors import KinemeError
 
@@ -28,4 +29,5 @@ def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 
 
+main.add_command(generate)
 main.add_command(reproduce)

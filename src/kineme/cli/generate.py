@@ -1,0 +1,98 @@
+"""``kineme generate``: move again, from a recording or a saved primitive to a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg]
+    """Numbers separated by commas: one per dimension."""
+
+    name = "x,y,..."
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
+        """Text as numbers."""
+        try:
+            return [float(part) for part in value.split(",")]
+        except ValueError:
+            self.fail(f"expected numbers separated by commas, as 0.4,0.2, got {value!r}", param, ctx)
+
+
+@click.command()
+@click.argument("source", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--start", type=Numbers(), help="Where to start.  [default: as demonstrated]")
+@click.option("--goal", type=Numbers(), help="Where to go.  [default: as demonstrated]")
+@click.option("--duration", type=float, help="Seconds.  [default: as demonstrated]")
+@click.option("--rate", type=float, default=100.0, show_default=True, help="Samples per second, at least.")
+@click.option("--settle", type=float, help="Go on past the duration until this close to the goal.")
+@click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="A point to steer around; repeatable.")
+@click.option(
+    "--index", type=click.IntRange(0), default=0, show_default=True, help="Which of several saved primitives."
+)
+@click.option("--formulation", default="bio-inspired", show_default=True, help="For a recording: how to learn it.")
+@click.option("--n-basis", type=int, default=40, show_default=True, help="For a recording: basis functions.")
+@click.option(
+    "--save", type=click.Path(dir_okay=False, path_type=Path), help="Keep the primitive in this .kineme file."
+)
+@click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), default="-", show_default=True,
+              help="A .csv, .npz or .json file; - for CSV on the screen.")  # fmt: skip
+@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: a .png, .svg or .pdf file.")
+def generate(**options: Any) -> None:
+    """Generate a movement from SOURCE, a recording (.csv, .tsv, .txt, .npz, .json) or a saved primitive (.kineme).
+
+    Example: kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
+    """
+    from kineme.generation.generate import generate as make
+    from kineme.generation.generate import primitives_from
+    from kineme.primitives.dmp import DMP
+
+    source, output = options["source"], options["output"]
+    dmp = DMP(options["formulation"], n_basis=options["n_basis"], fit="trajectory")
+    primitives = primitives_from(source, dmp)
+    if options["index"] >= len(primitives):
+        raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")
+    primitive = primitives[options["index"]]
+    wishes = _wishes(options)
+    made = make(primitive, wishes)
+    if options["save"]:
+        primitive.save(options["save"])
+    if options["plot"]:
+        _plot(options["plot"], primitive, made, wishes.obstacles)
+    _write(output, made)
+
+
+def _wishes(options: dict[str, Any]) -> Any:
+    import numpy as np
+
+    from kineme.generation.generate import Wishes
+
+    obstacles = options["obstacles"]
+    if len({len(point) for point in obstacles}) > 1:
+        raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
+    return Wishes(
+        start=None if options["start"] is None else np.array(options["start"]),
+        goal=None if options["goal"] is None else np.array(options["goal"]),
+        duration=options["duration"],
+        rate=options["rate"],
+        settle=options["settle"],
+        obstacles=np.array(obstacles) if obstacles else None,
+    )
+
+
+def _plot(path: Path, primitive: Any, made: Any, obstacles: Any) -> None:
+    from kineme.figures import save_figure
+    from kineme.generation.figure import draw_movement
+
+    save_figure(draw_movement(primitive, made, obstacles), path)
+
+
+def _write(output: Path, made: Any) -> None:
+    from kineme.io.movements import encode_movement, write_movement
+
+    if str(output) == "-":
+        click.echo(encode_movement(made, ".csv"), nl=False)
+    else:
+        write_movement(output, made)
