@@ -68,11 +68,11 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
-    steps = np.diff(times)
-    steps[offsets[1:-1] - 1] = 1.0  # from one movement to the next
-    if steps.size == 0 or steps.min() > 0:
+    increasing = times[1:] > times[:-1]
+    increasing[offsets[1:-1] - 1] = True  # from one movement to the next
+    if increasing.all():
         return
-    row = int(np.argmax(steps <= 0)) + 1
+    row = int(np.argmin(increasing)) + 1
     i = int(np.searchsorted(offsets, row, side="right")) - 1
     k = row - offsets[i]
     problem = "duplicate" if times[row] == times[row - 1] else "decreasing"

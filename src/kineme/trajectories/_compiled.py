@@ -24,7 +24,7 @@ def fill_spline_rows(parameter, positions, offsets, rows):  # type: ignore[no-un
     interval, local = np.empty(n_points, np.int64), np.empty(n_points)
     for i in range(n):
         first, length = offsets[i], offsets[i + 1] - offsets[i]
-        u = parameter[first : first + length]
+        u = parameter[first : first + length] - parameter[first]  # stamps count seconds since 1970 here and there
         for j in range(length - 1):
             h[j] = u[j + 1] - u[j]
             inv_h[j] = 1.0 / h[j]
@@ -97,23 +97,23 @@ def _evaluate(h, inv_h, length, y, slope, m, cubic, interval, local, row):  # ty
 
 @jit
 def _locate(u, length, interval, local):  # type: ignore[no-untyped-def]
-    """For each even target, its knot interval and its distance from the interval's left knot.
+    """For each even target, its knot interval and its distance from the interval's left knot; u starts at 0.
 
     Counting the knots at or below each target, then adding up, has no branch to mispredict: on
     irregular stamps it is several times faster than walking along the knots.
     """
     n_points = len(interval)
-    step = (u[length - 1] - u[0]) / (n_points - 1)
+    step = u[length - 1] / (n_points - 1)
     per_step = 1.0 / step
     interval[:] = 0
     for j in range(1, length - 1):
-        target = int(np.ceil((u[j] - u[0]) * per_step))
+        target = int(np.ceil(u[j] * per_step))
         interval[min(target, n_points - 1)] += 1
     j = 0
     for p in range(n_points):
         j += interval[p]
         interval[p] = j
-        local[p] = u[0] + p * step - u[j]
+        local[p] = p * step - u[j]
 
 
 @jit
