@@ -12,32 +12,35 @@ from kineme.control.spring import NODE_WEIGHTS, NODES
 
 
 @jit
-def advance(
-    K, D, per_u, breaks, table, gamma, beta, fading, state, u, du, goal, ratio, push, obstacles, velocities, motion
-):  # type: ignore[no-untyped-def]
-    """Write position, dx/du and x'' at u + du into `motion` (3, d); see `plain.advance`."""
+def advance(spring, table, avoidance, state, u, du, influences, motion):  # type: ignore[no-untyped-def]
+    """Write position, dx/du and x'' at u + du into `motion` (3, d); see `plain.advance`.
+
+    `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading).
+    """
+    K, D, _ = spring
+    goal, ratio, push, obstacles, velocities = influences
     d = len(goal)
-    spring, shape, held = (K, D, per_u), np.empty(d + 1), push.copy()
-    end = motion[:2]
+    shape, total, end = np.empty(d + 1), push.copy(), motion[:2]
     if len(obstacles):
-        _steer(gamma, beta, fading, state, obstacles, velocities, 0.0, held)
-        _carry(spring, breaks, table, state, u, 0.5 * du, goal, ratio, held, shape, end)
-        held[:] = push
-        _steer(gamma, beta, fading, end, obstacles, velocities, 0.5 * du, held)
-    _carry(spring, breaks, table, state, u, du, goal, ratio, held, shape, end)
-    held[:] = push
-    _steer(gamma, beta, fading, end, obstacles, velocities, du, held)
-    _look_up(breaks, table, u + du, shape)
+        _steer(avoidance, state, obstacles, velocities, 0.0, total)
+        _carry(spring, table, state, u, 0.5 * du, goal, ratio, total, shape, end)
+        total[:] = push
+        _steer(avoidance, end, obstacles, velocities, 0.5 * du, total)
+    _carry(spring, table, state, u, du, goal, ratio, total, shape, end)
+    total[:] = push
+    _steer(avoidance, end, obstacles, velocities, du, total)
+    _look_up(table, u + du, shape)
     for k in range(d):
-        forcing = shape[k] * ratio[k] + shape[d] * goal[k] + held[k]
+        forcing = shape[k] * ratio[k] + shape[d] * goal[k] + total[k]
         motion[2, k] = K * (goal[k] - motion[0, k]) - D * motion[1, k] + forcing
 
 
 @jit
-def _carry(spring, breaks, table, state, u, du, goal, ratio, push, shape, end):  # type: ignore[no-untyped-def]
+def _carry(spring, table, state, u, du, goal, ratio, push, shape, end):  # type: ignore[no-untyped-def]
     """Position and dx/du at u + du; an interval of quadrature never contains u = 1."""
     K, D, per_u = spring
     d = len(goal)
+    impulse = np.empty((len(NODES), 2))
     for k in range(d):
         end[0, k], end[1, k] = state[0, k] - goal[k], state[1, k]
     to_end = min(max(1.0 - u, 0.0), du)
@@ -47,17 +50,17 @@ def _carry(spring, breaks, table, state, u, du, goal, ratio, push, shape, end): 
             continue
         h = length / n
         c00, c01, c10, c11 = _transition(K, D, h)
-        impulse = np.empty((len(NODES), 2))
         for q in range(len(NODES)):
-            _, impulse[q, 0], _, impulse[q, 1] = _transition(K, D, h * (1.0 - NODES[q]))
+            _, s01, _, s11 = _transition(K, D, h * (1.0 - NODES[q]))
+            impulse[q, 0], impulse[q, 1] = h * NODE_WEIGHTS[q] * s01, h * NODE_WEIGHTS[q] * s11
         for i in range(n):
             for k in range(d):
                 x, v = end[0, k], end[1, k]
                 end[0, k], end[1, k] = c00 * x + c01 * v, c10 * x + c11 * v
             for q in range(len(NODES)):
-                _look_up(breaks, table, begin + h * (i + NODES[q]), shape)
+                _look_up(table, begin + h * (i + NODES[q]), shape)
                 for k in range(d):
-                    forcing = h * NODE_WEIGHTS[q] * (shape[k] * ratio[k] + shape[d] * goal[k] + push[k])
+                    forcing = shape[k] * ratio[k] + shape[d] * goal[k] + push[k]
                     end[0, k] += impulse[q, 0] * forcing
                     end[1, k] += impulse[q, 1] * forcing
     for k in range(d):
@@ -65,8 +68,9 @@ def _carry(spring, breaks, table, state, u, du, goal, ratio, push, shape, end): 
 
 
 @jit
-def _look_up(breaks, table, u, shape):  # type: ignore[no-untyped-def]
-    """`ShapeTable` at u by Clenshaw's recurrence, all columns at once."""
+def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
+    """`ShapeTable` at u: each Chebyshev polynomial once, for all columns."""
+    breaks, coefficients = table
     n_columns = len(shape)
     low, high = 0, len(breaks) - 1
     if u >= breaks[high]:
@@ -79,12 +83,14 @@ def _look_up(breaks, table, u, shape):  # type: ignore[no-untyped-def]
         else:
             low = middle
     x = 2.0 * (u - breaks[low]) / (breaks[low + 1] - breaks[low]) - 1.0
-    c = table[low]
+    terms = coefficients[low]
+    before, polynomial = 1.0, x
     for k in range(n_columns):
-        later, latest = 0.0, 0.0
-        for j in range(len(c) - 1, 0, -1):
-            later, latest = c[j, k] + 2.0 * x * later - latest, later
-        shape[k] = c[0, k] + x * later - latest
+        shape[k] = terms[0, k]
+    for j in range(1, len(terms)):
+        for k in range(n_columns):
+            shape[k] += polynomial * terms[j, k]
+        before, polynomial = polynomial, 2.0 * x * polynomial - before
 
 
 @jit
@@ -106,8 +112,9 @@ def _transition(stiffness, damping, h):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _steer(gamma, beta, fading, state, obstacles, velocities, passed, push):  # type: ignore[no-untyped-def]
+def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: ignore[no-untyped-def]
     """Add the terms of all obstacles to `push`; twin of `obstacles.steering`, with the obstacles `passed` later."""
+    gamma, beta, fading = avoidance
     d = len(push)
     r, heading = np.empty(d), np.empty(d)
     for i in range(len(obstacles)):

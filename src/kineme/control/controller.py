@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.control import inputs
-from kineme.control.options import Options, limit, wish
+from kineme.control.moving_goal import MovingGoal
+from kineme.control.options import Options, limit, one_movement
 from kineme.control.plan import Influences, Plan
 from kineme.control.running_sum import RunningSum
 from kineme.control.state import State, Status
 from kineme.control.stepping import stepper
 from kineme.errors import SpecificationError
 from kineme.primitives.primitives import Primitives
-from kineme.primitives.rollout import rollout
 from kineme.validation import Array, check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
-_ARRIVED = 1e-14  # of the new goal's distance when it was set: rounding
 
 
 class Controller:
@@ -74,7 +72,7 @@ class Controller:
     Learning Attractor Models for Motor Behaviors", Neural Computation 25(2), 2013. As there, tau grows in all
     equations, so the path stays the same.
 
-    The compiled twin is chosen when the controller is made (`KINEME_COMPILED=never` keeps to NumPy), and warmed up. A controller
+    The twin, compiled unless `KINEME_COMPILED=never`, is chosen and warmed up when the controller is made. A controller
     belongs to one thread.
     """
 
@@ -89,48 +87,38 @@ class Controller:
         velocity: ArrayLike | None = None,
         **options: Any,
     ) -> None:
-        if len(primitives) != 1:
-            raise SpecificationError(
-                f"expected one primitive to control, got {len(primitives)}; choose one, as in primitives[0].controller(dt)"
-            )
-        if duration is not None:
-            check_number("duration", duration, above=0.0)
-        d = primitives.n_dims
-        wishes = (wish("start", start, d), wish("goal", goal, d), duration, wish("velocity", velocity, d))
-        movement = rollout(primitives, *wishes)
         self.options = Options(**options)
-        self._n_dims, self._tau = d, float(movement.durations[0])
+        movement = one_movement(primitives, start, goal, duration, velocity)
+        self._n_dims, self._tau = primitives.n_dims, float(movement.durations[0])
         check_number("dt", dt, above=0.0)
         if dt > self._tau:
             raise SpecificationError(f"expected dt of at most the duration, {self._tau:g} s, got {dt!r}")
         self.dt = float(dt)
-        self._velocity_limit = limit("velocity_limit", self.options.velocity_limit, d)
-        self._acceleration_limit = limit("acceleration_limit", self.options.acceleration_limit, d)
-        settle = self.options.settle
-        self._settle = _SETTLED * float(primitives.extents.max()) if settle is None else float(settle)
+        self._velocity_limit = limit("velocity_limit", self.options.velocity_limit, self._n_dims)
+        self._acceleration_limit = limit("acceleration_limit", self.options.acceleration_limit, self._n_dims)
+        self._limited = self._velocity_limit is not None or self._acceleration_limit is not None
+        self._settle = float(self.options.settle or _SETTLED * primitives.extents.max())
         self._plan = Plan(primitives, self.options.avoidance)
         self._advance = stepper(self._plan)
         self._x0 = movement.starts[0].copy()
         self._first = (movement.goals[0] - self._x0, movement.velocities_at_start[0] * self._tau)
-        self._nothing = np.zeros(d)
+        self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, self._n_dims))
         self.reset()
 
     def reset(self) -> State:
         """Back to the start, with the first goal; returns the state there."""
-        goal, slope = self._first
-        nothing = np.zeros(self._n_dims)
+        target, slope = self._first
+        self._goal = MovingGoal(self._plan, target, self.options.goal_filter)
         self._time, self._u = RunningSum(), RunningSum()
-        self._tempo, self._rate, self._error = 1.0, 1.0 / self._tau, 0.0
-        self._target, self._ratio = goal, self._plan.ratio(goal)
-        self._lag: Array | None = None  # of the goal in force behind the target
-        self._obstacles = self._obstacle_velocities = np.zeros((0, self._n_dims))
+        self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
+        self._obstacles = self._obstacle_velocities = self._nowhere
         self._status = Status.MOVING
-        influences = Influences(goal, self._ratio, nothing, self._obstacles, self._obstacles)
-        self._motion = self._advance(np.vstack((nothing, slope)), 0.0, 0.0, influences)  # x - x0, dx/du and x''
+        influences = Influences(*self._goal.follow(0.0), self._zeros, self._nowhere, self._nowhere)
+        self._motion = self._advance(np.vstack((self._zeros, slope)), 0.0, 0.0, influences)  # x - x0, dx/du, x''
         self.state = self._report()
         return self.state
 
-    def step(  # noqa: PLR0913, PLR0917 - what can happen, a parameter each
+    def step(  # noqa: PLR0913 - what can happen, a parameter each
         self,
         position: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
@@ -165,25 +153,26 @@ class Controller:
         State
         """
         self._status = Status.MOVING
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            dt, tempo = self._pace(dt, tempo)
-            last = self._motion
+        dt, tempo = self._pace(dt, tempo)
+        last = self._motion
+        if position is not None or velocity is not None:
             self._measure(position, velocity)
-            velocity_before = self._motion[1] * self._rate
-            if goal is not None:
-                self._aim(goal)
-            self._sense(obstacles, obstacle_velocities)
-            self._rate = tempo / (self._tau * (1.0 + (self.options.phase_stopping or 0.0) * self._error))
-            self._time.add(dt)
-            self._move(dt, coupling, last)
+        if goal is not None:
+            self._aim(goal)
+        self._sense(obstacles, obstacle_velocities)
+        push = self._zeros if coupling is None else self._couple(coupling)
+        velocity_before = self._motion[1] * self._rate if self._limited else self._zeros
+        self._rate = tempo / (self._tau * (1.0 + self._slowing))
+        self._move(dt, push, last)
+        if self._limited:
             self._check_limits(velocity_before, dt)
-            self.state = self._report()
+        self.state = self._report()
         return self.state
 
     def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
         """The time and tempo of this step."""
         wanted = inputs.number(tempo)
-        if 0.0 <= wanted and wanted * self.dt <= self._tau:
+        if wanted >= 0.0 and wanted * self.dt <= self._tau:
             self._tempo = wanted
         else:
             self._status |= Status.TEMPO_REJECTED
@@ -196,86 +185,66 @@ class Controller:
         return self.dt, self._tempo
 
     def _measure(self, position: Any, velocity: Any) -> None:
-        """Go on from what was measured, or see how far from it the movement is."""
+        """Go on from what was measured, or let its distance slow the phase."""
         x = None if position is None else inputs.vector(position, self._n_dims)
         v = None if velocity is None else inputs.vector(velocity, self._n_dims)
         if (x is None and position is not None) or (v is None and velocity is not None):
             self._status |= Status.MEASUREMENT_REJECTED
-        if self.options.feedback == "phase":
+        if self.options.phase_stopping is not None:
             if x is not None:
-                difference = x - self._x0 - self._motion[0]
-                self._error = float(difference @ difference)
+                error = x - self._x0 - self._motion[0]
+                self._slowing = float(self.options.phase_stopping * error.dot(error))
             elif position is None:
-                self._error = 0.0
+                self._slowing = 0.0
             return
-        if x is not None or v is not None:
-            self._motion = self._motion.copy()
+        motion = self._motion.copy()
         if x is not None:
-            self._motion[0] = x - self._x0
+            motion[0] = x - self._x0
         if v is not None and self._rate > 0:
-            self._motion[1] = v / self._rate
+            motion[1] = v / self._rate
+        self._motion = motion
 
     def _aim(self, goal: Any) -> None:
-        """Set the goal to go to, unless it is the same or cannot be reached."""
         target = inputs.vector(goal, self._n_dims)
-        if target is None:
+        if target is None or not self._goal.aim(target - self._x0):
             self._status |= Status.GOAL_REJECTED
-            return
-        target = target - self._x0
-        if (target == self._target).all():
-            return
-        ratio = self._plan.ratio(target)
-        if not np.isfinite(ratio).all():
-            self._status |= Status.GOAL_REJECTED
-            return
-        if self.options.goal_filter is not None:
-            self._lag = self._target - target + (0.0 if self._lag is None else self._lag)
-        self._target, self._ratio = target, ratio
-
-    def _follow(self, dt: float) -> tuple[Array, Array]:
-        """The goal that acts during this step, its mean while it moves, and the ratio that belongs to it."""
-        if self._lag is None or self.options.goal_filter is None:
-            return self._target, self._ratio
-        passed = dt / self.options.goal_filter
-        mean = self._target + self._lag * (-math.expm1(-passed) / passed if passed > 0 else 1.0)
-        self._lag = self._lag * math.exp(-passed)
-        if np.abs(self._lag).max() <= _ARRIVED * np.abs(self._target).max():
-            self._lag = None
-        return mean, self._plan.ratio(mean)
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
         """Take over the obstacles, relative to x0; without any there are none."""
-        d = self._n_dims
         if obstacles is None and velocities is None:
-            if len(self._obstacles):
-                self._obstacles = self._obstacle_velocities = np.zeros((0, d))
+            self._obstacles = self._obstacle_velocities = self._nowhere
             return
-        x = inputs.rows(obstacles, d)
-        v = inputs.rows(velocities, d) if velocities is not None or x is None else np.zeros_like(x)
-        if x is None or v is None or x.shape != v.shape or d < 2:
+        x = inputs.rows(obstacles, self._n_dims)
+        v = inputs.rows(velocities, self._n_dims) if velocities is not None or x is None else np.zeros_like(x)
+        if x is None or v is None or x.shape != v.shape or self._n_dims < 2:
             self._status |= Status.OBSTACLES_REJECTED
         else:
             self._obstacles, self._obstacle_velocities = x - self._x0, v
 
-    def _move(self, dt: float, coupling: Any, last: Array) -> None:
+    def _couple(self, coupling: Any) -> Array:
+        push = inputs.vector(coupling, self._n_dims)
+        if push is not None:
+            return push
+        self._status |= Status.COUPLING_REJECTED
+        return self._zeros
+
+    def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
-        goal, ratio = self._follow(dt)
-        push = self._nothing
-        if coupling is not None:
-            given = inputs.vector(coupling, self._n_dims)
-            if given is None:
-                self._status |= Status.COUPLING_REJECTED
-            else:
-                push = given / (self._rate * self._rate)
+        goal, ratio = self._goal.follow(dt)
+        self._time.add(dt)
         du = self._rate * dt
         if du <= _STANDSTILL:
             self._rate = 0.0
             self._status = self._status & ~Status.MOVING | Status.PAUSED
             return
-        velocities = self._obstacle_velocities / self._rate if len(self._obstacles) else self._obstacle_velocities
+        if push is not self._zeros:
+            push = push / (self._rate * self._rate)
+        velocities = self._obstacle_velocities
+        if len(velocities):
+            velocities = velocities / self._rate
         influences = Influences(goal, ratio, push, self._obstacles, velocities)
         motion = self._advance(self._motion[:2], self._u.value, du, influences)
-        if math.isfinite(motion.sum()):
+        if inputs.usable(motion):
             self._motion = motion
             self._u.add(du)
         else:
@@ -293,12 +262,12 @@ class Controller:
 
     def _report(self) -> State:
         x, slope, bend = self._motion
-        rate, u, goal = self._rate, self._u.value, self._target
-        if self._lag is not None:
-            goal = goal + self._lag
-        elif u >= 1.0 and Status.MOVING in self._status:
-            if np.abs(x - goal).max() <= self._settle and np.abs(slope).max() <= self._settle:
-                self._status = self._status & ~Status.MOVING | Status.SETTLED
+        rate, u, goal = self._rate, self._u.value, self._goal.now
+        if u >= 1.0 and Status.MOVING in self._status and self._rests(x - self._goal.target, slope):
+            self._status = self._status & ~Status.MOVING | Status.SETTLED
         return State(
             self._time.value, u, self._x0 + x, slope * rate, bend * (rate * rate), self._x0 + goal, self._status
         )
+
+    def _rests(self, distance: Array, slope: Array) -> bool:
+        return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)

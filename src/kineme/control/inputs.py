@@ -36,9 +36,15 @@ def number(value: Any) -> float:
         return math.nan
 
 
+def usable(array: Array) -> bool:
+    """Whether all numbers are finite, and so far from overflow that their squares are finite too."""
+    flat = array.ravel()
+    return math.isfinite(flat.dot(flat))
+
+
 def _array(value: Any) -> Array | None:
     try:
         array = np.asarray(value, dtype=np.float64)
     except Exception:  # whatever a driver hands over, the motion goes on
         return None
-    return array if math.isfinite(array.sum()) or np.isfinite(array).all() else None
+    return array if usable(array) else None

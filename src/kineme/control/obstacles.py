@@ -37,10 +37,10 @@ class ObstacleAvoidance:
 
     Notes
     -----
-    Hoffmann et al. write the formula in three dimensions, without the factor of `reach`, which is exp(-k d) of Rai et al.
-    The component of r across v says the same without a cross product, for any d from 2 on. Where the obstacle is
-    straight ahead or at the position, within 0.0001 rad, the movement turns left (d = 2) or along the axis in which
-    it moves least (d > 2), as if the angle were 0.0001 rad.
+    Hoffmann et al. write the formula in three dimensions; the factor of `reach` is exp(-k d) of Rai et al. The
+    component of r across v says the same without a cross product, for any d from 2 on. Where the obstacle is straight
+    ahead, within 0.0001 rad, or at the position, the movement turns left (d = 2) or along the axis in which it moves
+    least (d > 2), as if the angle were 0.0001 rad.
 
     References
     ----------

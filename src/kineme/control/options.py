@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from kineme.control.obstacles import ObstacleAvoidance
 from kineme.errors import SpecificationError
+from kineme.primitives.primitives import Primitives
+from kineme.primitives.rollout import Rollout, rollout
 from kineme.validation import Array, check_choice, check_number
 
 FEEDBACK = ("state", "phase")
@@ -42,7 +44,26 @@ class Options:
             raise SpecificationError(f"expected avoidance to be an ObstacleAvoidance, got {self.avoidance!r}")
 
 
-def wish(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
+def one_movement(
+    primitives: Primitives,
+    start: ArrayLike | None,
+    goal: ArrayLike | None,
+    duration: float | None,
+    velocity: ArrayLike | None,
+) -> Rollout:
+    """The undisturbed movement of a single primitive, with the wishes of `Primitives.rollout` checked for one."""
+    if len(primitives) != 1:
+        raise SpecificationError(
+            f"expected one primitive to control, got {len(primitives)}; choose one: primitives[0].controller(dt)"
+        )
+    if duration is not None:
+        check_number("duration", duration, above=0.0)
+    d = primitives.n_dims
+    start, goal, velocity = _wish("start", start, d), _wish("goal", goal, d), _wish("velocity", velocity, d)
+    return rollout(primitives, start, goal, duration, velocity)
+
+
+def _wish(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     """A start, goal or velocity as finite (d,)."""
     if value is None:
         return None

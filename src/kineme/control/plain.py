@@ -28,6 +28,11 @@ def advance(plan: Plan, state: Array, u: float, du: float, influences: Influence
     -------
     ndarray of shape (3, d)
     """
+    with np.errstate(all="ignore"):  # the caller looks at the result
+        return _advance(plan, state, u, du, influences)
+
+
+def _advance(plan: Plan, state: Array, u: float, du: float, influences: Influences) -> Array:
     push, obstacles = influences.push, influences.obstacles
     if not len(obstacles):
         return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)

@@ -26,7 +26,7 @@ class Influences(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The equation of one primitive, ``x'' = K (g - x) - D x' + ratio scale f + coupling (g - x0)``, and its obstacles' term."""
+    """The equation of one primitive, ``x'' = K (g - x) - D x' + ratio scale f + coupling (g - x0)``, and obstacles."""
 
     primitive: Primitives  # a batch of one
     avoidance: ObstacleAvoidance

@@ -1,4 +1,4 @@
-"""A movement's forcing term and coupling as piecewise polynomials of u: quick to evaluate, whatever they are made of."""
+"""A movement's forcing term and coupling as piecewise polynomials of u: quick, whatever they are made of."""
 
 from __future__ import annotations
 

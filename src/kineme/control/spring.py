@@ -18,8 +18,8 @@ def transition(stiffness: float, damping: float, h: float) -> tuple[float, float
 
     With a = D / 2 and ``b = sqrt(|K - a^2|)``, ``exp(A h) = [[C + a S, S], [-K S, C - a S]]``, where C and S are
     ``exp(-a h)`` times cos(b h) and sin(b h) / b below critical damping, 1 and h at it, cosh(b h) and sinh(b h) / b
-    above. The hyperbolic functions are multiplied out: alone they overflow. Their slow pole is ``K / (a + b)``, since a - b
-    cancels.
+    above. The hyperbolic functions are multiplied out: alone they overflow. The slow pole is ``K / (a + b)``, since
+    a - b cancels.
     """
     a = 0.5 * damping
     square = stiffness - a * a

@@ -42,7 +42,7 @@ MESSAGES = {
     Status.MEASUREMENT_REJECTED: (
         "expected the measured position and velocity to be d finite numbers; what was not is left out"
     ),
-    Status.GOAL_REJECTED: "expected a goal of d finite numbers that the formulation can move to; the last good goal stays",
+    Status.GOAL_REJECTED: "expected a goal of d finite numbers that the formulation can reach; the last good one stays",
     Status.TEMPO_REJECTED: "expected a tempo of 0 or more, at most one duration per step; the last good tempo stays",
     Status.DT_REJECTED: "expected dt above 0 and at most one duration per step; the controller's own dt was used",
     Status.COUPLING_REJECTED: "expected a coupling of d finite accelerations; none was applied",

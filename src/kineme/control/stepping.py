@@ -30,17 +30,16 @@ def stepper(plan: Plan) -> Advance:
 def _compiled(plan: Plan) -> Advance:
     from kineme.control import _compiled as compiled
 
-    breaks, table = shape_table(plan)
-    avoidance, d = plan.avoidance, plan.primitive.n_dims
+    table, avoidance, d = tuple(shape_table(plan)), plan.avoidance, plan.primitive.n_dims
     spring = (plan.K, plan.D, plan.intervals)
     steering = (float(avoidance.gamma), float(avoidance.beta), avoidance.fading)
-    run, empty = compiled.advance, np.empty
 
     def advance(state: Array, u: float, du: float, influences: Influences) -> Array:
-        motion = empty((3, d))
-        run(*spring, breaks, table, *steering, state, u, du, *influences, motion)
+        motion = np.empty((3, d))
+        # Numba takes a plain tuple apart faster than a named one.
+        compiled.advance(spring, table, steering, state, u, du, tuple(influences), motion)
         return motion
 
-    nowhere = np.zeros((0, d))
-    advance(np.zeros((2, d)), 0.0, 0.0, Influences(*np.zeros((3, d)), nowhere, nowhere))
+    row, nowhere = np.zeros(d), np.zeros((0, d))
+    advance(np.zeros((2, d)), 0.0, 0.0, Influences(row, row, row, nowhere, nowhere))
     return advance

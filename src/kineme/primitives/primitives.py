@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,9 @@ from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import forcing_matrix
 from kineme.primitives.rollout import Rollout, rollout, samples_at_rate, settled_end
 from kineme.validation import Array, check_count
+
+if TYPE_CHECKING:
+    from kineme.control.controller import Controller
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +171,31 @@ class Primitives:
             n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
         check_count("n_samples", n_samples, 2)
         return replace(movement, n_samples=n_samples, end=end)
+
+    def controller(self, dt: float, **options: Any) -> Controller:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt, **options
+            See `kineme.control.controller.Controller`: start, goal, duration, velocity, feedback, limits and more.
+
+        Raises
+        ------
+        SpecificationError
+            More than one primitive; an option out of its range.
+
+        Examples
+        --------
+        >>> import kineme
+        >>> primitives = kineme.DMP().learn(kineme.load_lasa(["CShape"]))
+        >>> controller = primitives[0].controller(dt=0.002)
+        >>> controller.step(goal=[10.0, 5.0]).time
+        0.002
+        """
+        from kineme.control.controller import Controller
+
+        return Controller(self, dt, **options)
 
     def save(self, path: str | Path) -> Path:
         """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
