@@ -8,7 +8,7 @@ from sklearn.base import clone
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from kineme import DMPFeatures
+from kineme import DMPFeatures, Smooth
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseFeatures, product, to_tangent
 
@@ -50,6 +50,12 @@ def test_the_weight_scales_radians_and_millimeters_need_a_thousand_times_it():
     agree(weighted, plain * np.array([1.0, 0.3])[:, None, None])
     in_mm = poses * np.array([1000.0] * 3 + [1.0] * 4)
     agree(PoseFeatures(orientation_weight=200.0).fit_transform(in_mm), 1000 * PoseFeatures().fit_transform(poses))
+
+
+def test_preprocessing_is_applied_once():
+    q, steps = [tumble(0)], (Smooth(8.0),)
+    smoothed = DMPFeatures().fit_transform(to_tangent(q, steps)[0])
+    agree(PoseFeatures(DMPFeatures(preprocessing=steps)).fit_transform(q), smoothed)
 
 
 def test_they_recognize_orientation_gestures_in_a_pipeline():

@@ -14,9 +14,8 @@ from kineme.orientation.quaternions import conjugate, normalized, product
 from kineme.orientation.rates import rotation_vector_rate
 from kineme.orientation.rotation_vectors import exp, log, nearest
 from kineme.primitives.primitives import Primitives
+from kineme.primitives.rollout import broadcast_length, per_movement
 from kineme.validation import Array
-
-_ROUNDING = 1e-12  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +99,7 @@ class PosePrimitives:
             tangent_start,
             tangent_goal,
             duration,
-            velocity=None if velocity is None else self._tangent_velocity(velocity, tangent_start),
+            velocity=self._tangent_velocity(velocity, tangent_start),
             rate=rate,
             n_samples=n_samples,
             settle=settle,
@@ -109,19 +108,13 @@ class PosePrimitives:
 
     def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
         """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
-        starts = self.starts if start is None else self._as_poses(start, "start")
-        goals = self.goals if goal is None else self._as_poses(goal, "goal")
-        lengths = {"primitives": len(self), "start": len(starts), "goal": len(goals)}
-        n = max(lengths.values())
-        if any(length not in (1, n) for length in lengths.values()):
-            listed = ", ".join(f"{length} {name}" for name, length in lengths.items())
-            raise TrajectoryError(f"expected one or equally many of primitives, starts and goals, got {listed}")
+        starts, goals = self._as_poses(start, "start"), self._as_poses(goal, "goal")
+        starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
+        n = broadcast_length(len(self), {"start": starts, "goal": goals})
         learned = self.tangent.starts[:, -3:]
         p = learned
         if start is not None or goal is not None:
             p = nearest(log(product(starts[:, -4:], conjugate(goals[:, -4:]))), learned)
-            # An axis that is not turned about must stay exactly so: the original formulation divides by it.
-            p = np.where(np.abs(p - learned) <= _ROUNDING * (1.0 + np.abs(learned)), learned, p)
 
         def joined(positions: Array, vectors: Array) -> Array:
             return np.concatenate((np.broadcast_to(positions, (n, positions.shape[1])), vectors), axis=1)
@@ -129,22 +122,18 @@ class PosePrimitives:
         vectors = np.broadcast_to(p, (n, 3))
         return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
 
-    def _tangent_velocity(self, velocity: ArrayLike, starts: Array) -> Array:
-        wish = np.asarray(velocity, dtype=np.float64)
-        wish = wish[None] if wish.ndim == 1 else wish
-        d = self.tangent.n_dims
-        if wish.ndim != 2 or wish.shape[1] != d:
-            raise TrajectoryError(f"expected velocity of shape ({d},) or (n, {d}), got shape {np.shape(velocity)}")
-        if 1 not in (len(wish), len(starts)) and len(wish) != len(starts):
-            raise TrajectoryError(f"expected one velocity, or one for each of {len(starts)} movements, got {len(wish)}")
+    def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
+        wish = per_movement(velocity, "velocity", self.tangent.n_dims)
+        if wish is None:
+            return None
+        n = broadcast_length(len(starts), {"velocity": wish})
         rates = rotation_vector_rate(starts[:, -3:], wish[:, -3:])
-        return np.concatenate((np.broadcast_to(wish[:, :-3], (len(rates), d - 3)), rates), axis=1)
+        return np.concatenate((np.broadcast_to(wish[:, :-3], (n, wish.shape[1] - 3)), rates), axis=1)
 
-    def _as_poses(self, wish: ArrayLike, name: str) -> Array:
-        poses, d = np.asarray(wish, dtype=np.float64), self.n_columns
-        poses = poses[None] if poses.ndim == 1 else poses
-        if poses.ndim != 2 or poses.shape[1] != d:
-            raise TrajectoryError(f"expected {name} of shape ({d},) or (n, {d}), got shape {np.shape(wish)}")
+    def _as_poses(self, wish: ArrayLike | None, name: str) -> Array | None:
+        poses = per_movement(wish, name, self.n_columns)
+        if poses is None:
+            return None
         try:
             return np.concatenate((poses[:, :-4], normalized(poses[:, -4:])), axis=1)
         except TrajectoryError as error:

@@ -18,7 +18,7 @@ from kineme.trajectories.preprocess import Step, preprocess
 from kineme.validation import Array, describe
 
 COLUMNS = (4, 7)
-_ROUNDING = 1e-15
+_ROUNDING = 1e-13  # rad; below it quaternions do not know whether they turn
 _TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it stays in a core's cache
 
 
@@ -81,8 +81,12 @@ def _rotation_vectors(demos: Demonstrations, start: int, stop: int) -> tuple[Arr
     q = normalized_rows(demos.positions[first:last, -4:], where)
     goals = q[offsets[1:] - 1]
     relative = product(q, conjugate(np.repeat(goals, np.diff(offsets), axis=0)))
-    relative[np.linalg.norm(relative[:, 1:], axis=1) < _ROUNDING, 1:] = 0.0  # at the goal, q conj(q) is one exactly
-    return goals, unwrapped(relative, offsets, where)
+    p = unwrapped(relative, offsets, where)
+    p[offsets[1:] - 1] = 0.0  # but for rounding they are
+    # Rounding is no movement, and no axis that the original formulation could divide by.
+    flat = np.maximum.reduceat(np.abs(p), offsets[:-1]) < _ROUNDING
+    p[np.repeat(flat, np.diff(offsets), axis=0)] = 0.0
+    return goals, p
 
 
 def from_tangent(tangent: Demonstrations, references: Array) -> Demonstrations:

@@ -18,16 +18,16 @@ _SLACK = 0.1  # rad
 
 
 def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) -> Array:
-    """Logarithms of unit quaternions, continuous along each movement.
+    """Logarithms of unit quaternions relative to the last of each movement, continuous along it.
 
-    Every rotation has the rotation vectors ``(t + 2 pi k) axis``. The last sample of a movement gets the shortest
-    one, every other the one that continues its neighbor's, so that a tool that turns 4 rad about an axis gets
+    Every rotation has the rotation vectors ``(t + 2 pi k) axis``. The last sample of a movement gets 0, every other
+    the one that continues its neighbor's, so that a tool that turns 4 rad about an axis gets
     4 rad and not 2 pi - 4 rad the other way. The signs of the quaternions do not matter.
 
     Parameters
     ----------
     q : ndarray of shape (total, 4)
-        All movements, one after the other; consecutive samples less than half a turn apart.
+        All movements, one after the other, each ending at 1; consecutive samples less than half a turn apart.
     offsets : ndarray of shape (n + 1,)
         Where each movement begins.
     where : callable
@@ -46,21 +46,20 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     """
     movement = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     last = (offsets[1:] - 1)[movement]
-    odd = _parity((q[1:] * q[:-1]).sum(axis=1) < 0, offsets)
-    odd = odd ^ odd[last] ^ (q[last, 0] < 0)
+    odd = _parity((q[1:] * q[:-1]).sum(axis=1) < 0)
+    odd = odd ^ odd[last]
     q = np.where(odd[:, None], -q, q)  # along time a double cover: angles run from 0 to 2 pi and come back
     w, v = q[:, :1], q[:, 1:]
     length = np.linalg.norm(v, axis=1, keepdims=True)
     axis = _axes(v, length, offsets, movement)
     angle = 2.0 * np.arctan2(length, w)
     # Past 2 pi the axis turns over and the angle decreases: count that as going on.
-    reversed_ = _parity((axis[1:] * axis[:-1]).sum(axis=1) < 0, offsets)
+    reversed_ = _parity((axis[1:] * axis[:-1]).sum(axis=1) < 0)
     axis = np.where(reversed_[:, None], -axis, axis)
     signed = np.where(reversed_, -angle[:, 0], angle[:, 0])
     jumps = np.round(np.diff(signed, prepend=signed[0]) / (4.0 * np.pi))
-    jumps[offsets[:-1]] = 0.0
     turns = -np.cumsum(jumps)
-    turns -= turns[last]
+    turns -= turns[last]  # what came before the movement drops out too
     at_full_turn = (length < TINY) & (w < 0)
     principal = np.where(at_full_turn, signed[:, None] * axis, logarithm_factor(w, length) * v)
     p = principal + (4.0 * np.pi * turns)[:, None] * axis
@@ -68,12 +67,13 @@ def unwrapped(q: Array, offsets: NDArray[np.intp], where: Callable[[int], str]) 
     return p
 
 
-def _parity(flips: NDArray[np.bool_], offsets: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether an odd number of flips lies before each sample of its movement; flips (total - 1,), result (total,)."""
-    within = np.concatenate(([False], flips))
-    within[offsets[:-1]] = False
-    odd: NDArray[np.bool_] = np.logical_xor.accumulate(within)
-    return odd ^ np.repeat(odd[offsets[:-1]], np.diff(offsets))
+def _parity(flips: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether an odd number of flips (total - 1,) lies before each sample, shape (total,).
+
+    Counted through all movements: only differences within a movement matter.
+    """
+    odd: NDArray[np.bool_] = np.logical_xor.accumulate(np.concatenate(([False], flips)))
+    return odd
 
 
 def _axes(v: Array, length: Array, offsets: NDArray[np.intp], movement: NDArray[np.intp]) -> Array:
