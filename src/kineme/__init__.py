@@ -10,7 +10,7 @@ from typing import Any as _Any
 __version__ = "0.1.0"
 
 if _TYPE_CHECKING:
-    from kineme import datasets, kernels, styles
+    from kineme import datasets, kernels, orientation, styles
     from kineme.datasets.lasa import load_lasa
     from kineme.errors import (
         DataError,
@@ -48,6 +48,7 @@ _HOME = {
     "RhythmicFeatures": "kineme.features.rhythmic_features",
     "kernels": "kineme",
     "styles": "kineme",
+    "orientation": "kineme",
     "KinemeError": "kineme.errors",
     "TrajectoryError": "kineme.errors",
     "DegenerateMovementError": "kineme.errors",
@@ -76,6 +77,7 @@ __all__ = [  # in the order of the flow
     "datasets",
     "kernels",
     "load_lasa",
+    "orientation",
     "preprocess",
     "styles",
 ]  # fmt: skip
