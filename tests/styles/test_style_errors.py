@@ -25,6 +25,8 @@ def test_a_style_outside_the_demonstrated_range_is_refused_with_the_range(model)
     message = rf"style 1: expected parameter 1 within the demonstrated range {shown}; .* extrapolate=True"
     with pytest.raises(SpecificationError, match=message):
         model.primitive(wish)
+    with pytest.raises(SpecificationError, match=rf"style 0: expected parameter 0 .*got {model.lowest[0] - 2:.3g}"):
+        model.primitive([model.lowest[0] - 2.0, 0.0])
     assert len(model.primitive(wish, extrapolate=True)) == 2
     found = model.style_of(model.primitive(wish, extrapolate=True))
     np.testing.assert_array_equal(found.inside, [True, False])

@@ -32,7 +32,7 @@ class DMP:
 
     Parameters
     ----------
-    formulation : {"original", "bio-inspired"}, default "bio-inspired"
+    formulation : {"original", "bio-inspired", "amplitude-scaled", "decoupled"}, default "bio-inspired"
         The transformation system; see `kineme.primitives.formulations.FORMULATIONS`.
     n_basis : int, default 80
         Number N of basis functions.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
 from kineme.primitives.primitives import Primitives
-from kineme.styles.numbers import from_numbers, path_matrix, shared_label, to_numbers
+from kineme.styles.numbers import from_numbers, map_rows, path_matrix, shared_label, to_numbers
 from kineme.validation import Array, check_choice, check_count
 
 _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -56,7 +56,7 @@ class AveragePrimitive:
         check_count("n_samples", n_samples, 2)
         check_choice("of", of, list(_DERIVATIVES))
         order = _DERIVATIVES[of]
-        deviations = self.factor @ path_matrix(self.primitive.dmp, n_samples, order)  # (r, d, S)
+        deviations = map_rows(self.factor, path_matrix(self.primitive.dmp, n_samples, order))  # (r, d, S)
         variance = np.einsum("rds,rds->sd", deviations, deviations)
         return np.sqrt(variance) / self.primitive.durations[0] ** order
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import forcing_matrix
-from kineme.styles.numbers import path_matrix
+from kineme.styles.numbers import map_rows, path_matrix
 from kineme.validation import Array
 
 
@@ -30,4 +30,4 @@ METRICS: dict[str, Callable[[DMP], Array]] = {"path": _relative_path, "forcing":
 
 def compared(metric: str, dmp: DMP, theta: Array) -> Array:
     """What the styles explain, shape (n, d T): its Euclidean norm is the root mean square over the T phases."""
-    return (theta @ METRICS[metric](dmp)).reshape(len(theta), -1) / np.sqrt(dmp.n_points)
+    return map_rows(theta, METRICS[metric](dmp) / np.sqrt(dmp.n_points)).reshape(len(theta), -1)

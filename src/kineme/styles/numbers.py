@@ -33,7 +33,7 @@ def to_numbers(primitives: Primitives) -> Array:
 
 def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) -> Primitives:
     """Primitives from theta (n, d, N + 3) and tau (n,) [s]; all of them get `label`, unless it is None."""
-    path = theta @ path_matrix(dmp, dmp.n_points)
+    path = map_rows(theta, path_matrix(dmp, dmp.n_points))
     labels: NDArray[Any] | None = None if label is None else np.full(len(theta), label)
     return Primitives(
         dmp,
@@ -53,6 +53,11 @@ def path_matrix(dmp: DMP, n_samples: int, derivative: int = 0) -> Array:
     goal = response.goal[derivative]
     start = -goal if derivative else 1.0 - goal
     return np.vstack((response.Phi[derivative].T, start, goal, response.velocity[derivative]))
+
+
+def map_rows(theta: Array, matrix: Array) -> Array:
+    """``theta @ matrix``, shape (n, d, n_samples), as one product: a stack would become as many small ones."""
+    return (theta.reshape(-1, theta.shape[2]) @ matrix).reshape(*theta.shape[:2], matrix.shape[1])
 
 
 def shared_label(primitives: Primitives) -> Any:
