@@ -71,7 +71,20 @@ def _forcing(basis: GaussianBasis, formulation: Formulation, stiffness: float, u
 
 
 def transition(stiffness: float, damping: float, h: Array) -> Array:
-    """Exponentials ``exp(A h)`` of ``A = [[0, 1], [-K, -D]]`` for steps h (m,), shape (m, 2, 2)."""
-    from scipy.linalg import expm
+    """Exponentials ``exp(A h)`` of ``A = [[0, 1], [-K, -D]]`` for steps h (m,), shape (m, 2, 2).
 
-    return np.asarray(expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * h[:, None, None]))
+    With a = D / 2 and ``b = sqrt(|K - a^2|)``, ``exp(A h) = [[C + a S, S], [-K S, C - a S]]``, where C and S are
+    ``e^(-a h)`` times cos(b h) and sin(b h) / b below critical damping, 1 and h at it, cosh(b h) and sinh(b h) / b
+    above. The last two are multiplied out, for they overflow, and the slow pole is ``K / (a + b)``, for a - b cancels.
+    """
+    a = 0.5 * damping
+    b = math.sqrt(abs(stiffness - a * a))
+    if b == 0.0:
+        C = np.exp(-a * h)
+        S = C * h
+    elif stiffness > a * a:
+        C, S = np.exp(-a * h) * (np.cos(b * h), np.sin(b * h) / b)
+    else:
+        slow = 0.5 * np.exp(-stiffness / (a + b) * h)
+        C, S = slow * (1.0 + np.exp(-2.0 * b * h)), -slow * np.expm1(-2.0 * b * h) / b
+    return np.stack((C + a * S, S, -stiffness * S, C - a * S), axis=1).reshape(-1, 2, 2)
