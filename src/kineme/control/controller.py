@@ -19,6 +19,8 @@ from kineme.primitives.primitives import Primitives
 from kineme.validation import Array, check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
+_NOTHING = Status(0)
+_SHORTEST = 1e-12  # durations; shorter steps are lost in rounding
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
@@ -91,9 +93,9 @@ class Controller:
         movement = one_movement(primitives, start, goal, duration, velocity)
         self._n_dims, self._tau = primitives.n_dims, float(movement.durations[0])
         check_number("dt", dt, above=0.0)
-        if dt > self._tau:
-            raise SpecificationError(f"expected dt of at most the duration, {self._tau:g} s, got {dt!r}")
         self.dt = float(dt)
+        if not self._fits(self.dt):
+            raise SpecificationError(f"expected dt of at most the duration, {self._tau:g} s, got {dt!r} s")
         self._velocity_limit = limit("velocity_limit", self.options.velocity_limit, self._n_dims)
         self._acceleration_limit = limit("acceleration_limit", self.options.acceleration_limit, self._n_dims)
         self._limited = self._velocity_limit is not None or self._acceleration_limit is not None
@@ -112,7 +114,7 @@ class Controller:
         self._time, self._u = RunningSum(), RunningSum()
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
-        self._status = Status.MOVING
+        self._events = _NOTHING
         influences = Influences(*self._goal.follow(0.0), self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(np.vstack((self._zeros, slope)), 0.0, 0.0, influences)  # x - x0, dx/du, x''
         self.state = self._report()
@@ -152,7 +154,7 @@ class Controller:
         -------
         State
         """
-        self._status = Status.MOVING
+        self._events = _NOTHING
         dt, tempo = self._pace(dt, tempo)
         last = self._motion
         if position is not None or velocity is not None:
@@ -175,21 +177,24 @@ class Controller:
         if wanted >= 0.0 and wanted * self.dt <= self._tau:
             self._tempo = wanted
         else:
-            self._status |= Status.TEMPO_REJECTED
+            self._events |= Status.TEMPO_REJECTED
         if dt is None:
             return self.dt, self._tempo
         dt = inputs.number(dt)
-        if 0.0 < dt <= self._tau and dt * self._tempo <= self._tau:
+        if self._fits(dt) and dt * self._tempo <= self._tau:
             return dt, self._tempo
-        self._status |= Status.DT_REJECTED
+        self._events |= Status.DT_REJECTED
         return self.dt, self._tempo
+
+    def _fits(self, dt: float) -> bool:
+        return _SHORTEST * self._tau <= dt <= self._tau
 
     def _measure(self, position: Any, velocity: Any) -> None:
         """Go on from what was measured, or let its distance slow the phase."""
         x = None if position is None else inputs.vector(position, self._n_dims)
         v = None if velocity is None else inputs.vector(velocity, self._n_dims)
         if (x is None and position is not None) or (v is None and velocity is not None):
-            self._status |= Status.MEASUREMENT_REJECTED
+            self._events |= Status.MEASUREMENT_REJECTED
         if self.options.phase_stopping is not None:
             if x is not None:
                 error = x - self._x0 - self._motion[0]
@@ -207,7 +212,7 @@ class Controller:
     def _aim(self, goal: Any) -> None:
         target = inputs.vector(goal, self._n_dims)
         if target is None or not self._goal.aim(target - self._x0):
-            self._status |= Status.GOAL_REJECTED
+            self._events |= Status.GOAL_REJECTED
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
         """Take over the obstacles, relative to x0; without any there are none."""
@@ -217,7 +222,7 @@ class Controller:
         x = inputs.rows(obstacles, self._n_dims)
         v = inputs.rows(velocities, self._n_dims) if velocities is not None or x is None else np.zeros_like(x)
         if x is None or v is None or x.shape != v.shape or self._n_dims < 2:
-            self._status |= Status.OBSTACLES_REJECTED
+            self._events |= Status.OBSTACLES_REJECTED
         else:
             self._obstacles, self._obstacle_velocities = x - self._x0, v
 
@@ -225,7 +230,7 @@ class Controller:
         push = inputs.vector(coupling, self._n_dims)
         if push is not None:
             return push
-        self._status |= Status.COUPLING_REJECTED
+        self._events |= Status.COUPLING_REJECTED
         return self._zeros
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
@@ -235,7 +240,6 @@ class Controller:
         du = self._rate * dt
         if du <= _STANDSTILL:
             self._rate = 0.0
-            self._status = self._status & ~Status.MOVING | Status.PAUSED
             return
         if push is not self._zeros:
             push = push / (self._rate * self._rate)
@@ -249,25 +253,30 @@ class Controller:
             self._u.add(du)
         else:
             self._motion = last
-            self._status |= Status.STATE_KEPT
+            self._events |= Status.STATE_KEPT
 
     def _check_limits(self, velocity_before: Array, dt: float) -> None:
         velocity = self._motion[1] * self._rate
         if self._velocity_limit is not None and (np.abs(velocity) > self._velocity_limit).any():
-            self._status |= Status.VELOCITY_LIMIT
+            self._events |= Status.VELOCITY_LIMIT
         if self._acceleration_limit is not None:
-            largest = np.maximum(np.abs(self._motion[2]) * self._rate**2, np.abs(velocity - velocity_before) / dt)
+            largest = np.maximum(
+                np.abs(self._motion[2]) * (self._rate * self._rate), np.abs(velocity - velocity_before) / dt
+            )
             if (largest > self._acceleration_limit).any():
-                self._status |= Status.ACCELERATION_LIMIT
+                self._events |= Status.ACCELERATION_LIMIT
 
     def _report(self) -> State:
         x, slope, bend = self._motion
         rate, u, goal = self._rate, self._u.value, self._goal.now
-        if u >= 1.0 and Status.MOVING in self._status and self._rests(x - self._goal.target, slope):
-            self._status = self._status & ~Status.MOVING | Status.SETTLED
-        return State(
-            self._time.value, u, self._x0 + x, slope * rate, bend * (rate * rate), self._x0 + goal, self._status
-        )
+        status = Status.MOVING
+        if rate == 0.0:
+            status = Status.PAUSED
+        elif u >= 1.0 and self._rests(x - self._goal.target, slope):
+            status = Status.SETTLED
+        if self._events is not _NOTHING:
+            status |= self._events
+        return State(self._time.value, u, self._x0 + x, slope * rate, bend * (rate * rate), self._x0 + goal, status)
 
     def _rests(self, distance: Array, slope: Array) -> bool:
         return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)
