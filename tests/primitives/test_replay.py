@@ -16,7 +16,7 @@ from kineme.primitives.formulations import FORMULATIONS
 STATED = {
     "local": {10: 0.07, 20: 0.02, 40: 0.006, 80: 0.002},
     "ridge": {10: 3e-3, 20: 2e-4, 40: 1.5e-4},
-    "trajectory": {10: 6e-3, 20: 1e-3, 40: 2e-4, 80: 6e-5},
+    "trajectory": {10: 6e-3, 20: 1e-3, 40: 2e-4},
 }
 
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from kineme import DMP, Demonstrations, Smooth, SpecificationError, Trajectory, TrimRest, parallel
 from kineme.primitives import encode
@@ -50,25 +50,38 @@ def test_a_number_of_threads_that_is_none_is_refused(monkeypatch, ragged, wanted
         DMP().learn(ragged)
 
 
-def test_the_threads_of_blas_are_as_before_after_concurrent_learners(monkeypatch, ragged):
+@pytest.fixture
+def two_blas_threads(monkeypatch):
+    """Two tiles at once, and two threads of BLAS to come back to."""
     monkeypatch.setenv("KINEME_NUM_THREADS", "2")
+    with threadpool_limits(limits=2, user_api="blas"):
+        yield
+
+
+def _blas_threads():
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_tiles_hold_blas_to_one_thread(two_blas_threads):
+    seen = []
+    parallel.for_tiles(lambda start, stop: seen.append(_blas_threads()), 2, 1)
+    assert seen == [{1}, {1}]
+
+
+def test_the_threads_of_blas_are_as_before_after_concurrent_learners(monkeypatch, two_blas_threads, ragged):
     monkeypatch.setattr(encode, "_TILE_SAMPLES", 2000)
-    before = threadpool_info()
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda _: DMP().learn(ragged), range(40)))
-    assert threadpool_info() == before
+    assert _blas_threads() == {2}
 
 
-def test_the_threads_of_blas_are_as_before_after_an_error(monkeypatch):
-    monkeypatch.setenv("KINEME_NUM_THREADS", "2")
-    before = threadpool_info()
-
+def test_the_threads_of_blas_are_as_before_after_an_error(two_blas_threads):
     def fail(start, stop):
         raise ZeroDivisionError(f"{start} to {stop}")
 
     with pytest.raises(ZeroDivisionError, match="0 to 1"):
         parallel.for_tiles(fail, 4, 1)
-    assert threadpool_info() == before
+    assert _blas_threads() == {2}
 
 
 @pytest.mark.parametrize("n_rows", [0, 1, 7, 8])

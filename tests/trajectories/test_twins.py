@@ -22,17 +22,17 @@ def compiled(request):
         yield request.param
 
 
-def _ragged(seed, least, n=6, offset=0.0, nearness=1e-3):
-    """Movements of `least` samples and more, some stamps `nearness` of a step apart, far from the origin."""
+def _ragged(seed, least, n=6, origin=0.0, place=0.0, nearness=1e-3):
+    """Movements of `least` samples and more, some stamps `nearness` of a step apart, far from 0 in time and space."""
     rng = np.random.default_rng(seed)
     movements = []
     for i in range(n):
         length = least if i == 0 else int(rng.integers(least, 60))
         gaps = rng.uniform(0.5, 1.5, length - 1)
         gaps[rng.random(length - 1) < 0.1] = nearness
-        t = offset + np.append(0, np.cumsum(gaps)) / gaps.sum()
+        t = origin + np.append(0, np.cumsum(gaps)) / gaps.sum()
         phase = rng.uniform(0, 6, 3)
-        movements.append((t, offset + np.sin(4 * (t - offset)[:, None] + phase)))
+        movements.append((t, place + np.sin(4 * (t - origin)[:, None] + phase)))
     return movements
 
 
@@ -42,12 +42,16 @@ def _demonstrations(movements):
     return Demonstrations.from_arrays(wide, times=[t for t, _ in movements])
 
 
-any_ragged = given(seed=st.integers(0, 10**6), offset=st.sampled_from([0.0, -7.0, 1e4]))
+any_ragged = given(
+    seed=st.integers(0, 10**6),
+    origin=st.sampled_from([0.0, -7.0, 1.7e9]),  # the last one is a ROS stamp
+    place=st.sampled_from([0.0, -1e4]),
+)
 
 
 @any_ragged
-def test_splines_are_those_of_scipy(compiled, seed, offset):
-    movements = _ragged(seed, least=4, offset=offset)
+def test_splines_are_those_of_scipy(compiled, seed, origin, place):
+    movements = _ragged(seed, least=4, origin=origin, place=place)
     rows = relative_rows(_demonstrations(movements), 0, 6, 33)
     for (t, x), row in zip(movements, rows, strict=True):
         even = np.linspace(0, t[-1] - t[0], 33)
@@ -55,8 +59,8 @@ def test_splines_are_those_of_scipy(compiled, seed, offset):
 
 
 @any_ragged
-def test_smoothing_splines_are_those_of_scipy(compiled, seed, offset):
-    movements = _ragged(seed, least=5, offset=offset)
+def test_smoothing_splines_are_those_of_scipy(compiled, seed, origin, place):
+    movements = _ragged(seed, least=5, origin=origin, place=place)
     smoothed = preprocess(_demonstrations(movements), [Smooth(6.0)])
     for (t, x), one in zip(movements, smoothed, strict=True):
         u = (t - t[0]) / (t[-1] - t[0])
