@@ -57,29 +57,12 @@ _HOME = {
     "DegenerateMovementWarning": "kineme.errors",
 }
 
-__all__ = [  # in the order of the flow
-    "DMP",
-    "DMPFeatures",
-    "DataError",
-    "DegenerateMovementError",
+__all__ = [  # noqa: RUF022 - in the order of the flow
+    "Trajectory", "Demonstrations", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
+    "DMP", "Primitives", "RhythmicDMP", "orientation", "styles",
+    "DMPFeatures", "RhythmicFeatures", "kernels",
+    "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
-    "Demonstrations",
-    "KinemeError",
-    "Primitives",
-    "Resample",
-    "RhythmicDMP",
-    "RhythmicFeatures",
-    "Smooth",
-    "SpecificationError",
-    "Trajectory",
-    "TrajectoryError",
-    "TrimRest",
-    "datasets",
-    "kernels",
-    "load_lasa",
-    "orientation",
-    "preprocess",
-    "styles",
 ]  # fmt: skip
 
 
