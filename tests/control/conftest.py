@@ -67,7 +67,7 @@ def straight():
 def witness():
     """Eq. (1) or (4) as printed, integrated by SciPy in seconds, with an acceleration added per second squared."""
 
-    def integrate(primitive, times, *, goal, added=None, state=None, u=0.0, duration=None):  # noqa: PLR0917
+    def integrate(primitive, times, *, goal, added=None, state=None, u=0.0, duration=None):
         dmp, x0 = primitive.dmp, primitive.starts[0]
         tau = primitive.durations[0] if duration is None else duration
         w = primitive.scaled_weights[0] / dmp.K if dmp.formulation == "bio-inspired" else primitive.weights[0].T

@@ -159,6 +159,8 @@ class Controller:
         last = self._motion
         if position is not None or velocity is not None:
             self._measure(position, velocity)
+        else:
+            self._slowing = 0.0
         if goal is not None:
             self._aim(goal)
         self._sense(obstacles, obstacle_velocities)
