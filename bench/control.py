@@ -19,7 +19,7 @@ MOST = 20e-6  # seconds
 
 
 def measure(quick: bool) -> list[Row]:
-    n, repeats = (400, 5) if quick else (2_000, 15)
+    n, repeats = (400, 5) if quick else (500, 40)  # to the end of the movement
     rows = []
     for n_dims, obstacles in ((7, 0), (3, 1), (2, 1)):
         seconds = _seconds(n_dims, obstacles, n, repeats)
