@@ -137,7 +137,8 @@ class Controller:
         Parameters
         ----------
         position, velocity : array_like of shape (d,), optional
-            Measured now, at the time of `state`; see `feedback`. A velocity is read at the tempo of the last step.
+            Measured now, at the time of `state`; see `feedback`. A velocity is read at the tempo of the last step. With
+            feedback="phase", no position does not slow the phase, and one that cannot be used slows it like the last.
         goal : array_like of shape (d,), optional
             A new goal, for this step and all later ones.
         tempo : float, default 1.0
