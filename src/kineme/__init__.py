@@ -24,6 +24,7 @@ if _TYPE_CHECKING:
     from kineme.features.rhythmic_features import RhythmicFeatures
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
+    from kineme.recognition.recognizer import Recognizer
     from kineme.rhythm.rhythmic_dmp import RhythmicDMP
     from kineme.trajectories.demonstrations import Demonstrations
     from kineme.trajectories.preprocess import preprocess
@@ -46,6 +47,7 @@ _HOME = {
     "RhythmicDMP": "kineme.rhythm.rhythmic_dmp",
     "DMPFeatures": "kineme.features.dmp_features",
     "RhythmicFeatures": "kineme.features.rhythmic_features",
+    "Recognizer": "kineme.recognition.recognizer",
     "kernels": "kineme",
     "styles": "kineme",
     "orientation": "kineme",
@@ -60,7 +62,7 @@ _HOME = {
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
     "DMP", "Primitives", "RhythmicDMP", "orientation", "styles",
-    "DMPFeatures", "RhythmicFeatures", "kernels",
+    "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
 ]  # fmt: skip

@@ -1,0 +1,1 @@
+"""Recognizing movements: representations, averaged kernels, classifiers, answers."""

@@ -1,0 +1,49 @@
+"""What may differ between two movements of the same kind, taken out: place and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kineme.validation import Array, check_choice
+
+SCALES = ("path", "per-dimension", "none")
+_FLAT = 1e-6  # of the whole extent; a dimension flatter than this is not blown up
+
+
+@dataclass(frozen=True)
+class Normalization:
+    """Translation and scale; rotation belongs to the comparison, see `kernels.procrustes.Procrustes`.
+
+    Parameters
+    ----------
+    translation : bool, default True
+        Take out the place. Merges movements that differ only in where they are done.
+    scale : {"path", "per-dimension", "none"}, default "path"
+        "path" divides by the root mean square distance from the center, one number for all dimensions. Merges a dot and
+        a circle. "per-dimension" divides each dimension by its own. Merges a circle and an ellipse too. "none" keeps
+        the size, in the unit of the data.
+    """
+
+    translation: bool = True
+    scale: str = "path"
+
+    def __post_init__(self) -> None:
+        check_choice("scale", self.scale, SCALES)
+
+    def center(self, paths: Array) -> Array:
+        """The place of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
+        return paths.mean(axis=2, keepdims=True) if self.translation else np.zeros((*paths.shape[:2], 1))
+
+    def size(self, paths: Array) -> Array:
+        """The size of each path (n, d, T), shape (n, 1, 1) or (n, d, 1); 1 for a path that does not move."""
+        if self.scale == "none":
+            return np.ones((len(paths), 1, 1))
+        squares = paths.var(axis=2, keepdims=True)
+        whole = np.sqrt(squares.sum(axis=1, keepdims=True))
+        whole[whole == 0] = 1.0
+        if self.scale == "path":
+            return np.asarray(whole)
+        own = np.sqrt(squares)
+        return np.where(own > _FLAT * whole, own, whole)

@@ -1,0 +1,164 @@
+"""The recognizer: a scikit-learn classifier of movements that needs one demonstration of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.utils.validation import check_is_fitted
+
+from kineme.errors import TrajectoryError
+from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.recognition.classifiers import CLASSIFIERS, Classifier, choose
+from kineme.recognition.labels import check_labels
+from kineme.recognition.normalization import Normalization
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
+from kineme.recognition.views import view
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_choice, check_number
+
+_TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
+
+
+class Recognizer(ClassifierMixin, BaseEstimator):
+    """Recognize movements by an average of kernels over several representations.
+
+    Parameters
+    ----------
+    representations : tuple of Representation, optional
+        By default positions over arc length, forcing term over arc length, forcing term over time.
+    max_angle : float, optional
+        Largest rotation [rad] between movements of one kind; by default pi/4 in two and three dimensions, else 0. Each
+        invariance merges something: pi merges N and Z, more than a right angle V and caret.
+    scale : {"path", "per-dimension", "none"}, default "path"
+        What of the size is taken out, see `Normalization`. "path" merges a dot and a circle.
+    translation : bool, default True
+        Take out the place.
+    cutoff : float or None, default 10.0
+        Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
+    mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
+        The A-average over representations.
+    classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
+        "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
+        the SVM from eight demonstrations of every class on, else the nearest.
+
+    Attributes
+    ----------
+    classes_ : ndarray of shape (C,)
+        Labels, sorted.
+    demonstrations_ : Demonstrations
+        The training movements, ordered by class.
+    widths_ : ndarray of shape (R,)
+        Kernel width of each representation.
+    n_dims_ : int
+
+    Examples
+    --------
+    >>> import kineme
+    >>> demos = kineme.load_lasa()
+    >>> one_shot = kineme.Recognizer().fit(demos[::7])
+    >>> float(one_shot.score(demos, demos.labels))
+    1.0
+    """
+
+    def __init__(  # noqa: PLR0913, PLR0917 - one parameter per choice, as scikit-learn's searches need them
+        self,
+        representations: tuple[Representation, ...] | None = None,
+        max_angle: float | None = None,
+        scale: str = "path",
+        translation: bool = True,
+        cutoff: float | None = 10.0,
+        mean: str = "arithmetic",
+        classifier: str = "auto",
+    ) -> None:
+        self.representations = representations
+        self.max_angle = max_angle
+        self.scale = scale
+        self.translation = translation
+        self.cutoff = cutoff
+        self.mean = mean
+        self.classifier = classifier
+
+    def fit(self, X: Any, y: Any = None) -> Self:
+        """Store the demonstrations as the recognizer sees them.
+
+        Parameters
+        ----------
+        X : movements
+            Whatever `Demonstrations.of` accepts.
+        y : array_like of shape (n,), optional
+            Labels; by default those of the demonstrations.
+        """
+        check_choice("mean", self.mean, list(LOG_MEANS))
+        check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
+        if self.cutoff is not None:
+            check_number("cutoff", self.cutoff, above=0.0)
+        demos = Demonstrations.of(X)
+        labels = check_labels(demos, y)
+        self.n_dims_ = demos.n_dims
+        self.procrustes_ = Procrustes(demos.n_dims, self._angle(demos.n_dims))
+        order = np.argsort(labels, kind="stable")
+        self.classes_, first = np.unique(labels[order], return_index=True)
+        self.demonstrations_ = demos[order]
+        self.labels_ = labels[order]
+        self.first_ = first  # of each class, in the order of the demonstrations
+        self.views_ = self._view(self.demonstrations_)
+        widths = impostor_widths(self.procrustes_, self.views_, self.labels_)
+        self.widths_ = widths
+        self.similarity_ = AveragedSimilarity(self.procrustes_, widths, self.mean)
+        self.classifier_: Classifier = choose(self.classifier, np.diff(first, append=len(labels)))
+        self.classifier_.fit(self)
+        return self
+
+    def log_similarity(self, X: Any) -> Array:
+        """Logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""
+        check_is_fitted(self)
+        return self.similarity_.log_average(self.look_at(X), self.views_)
+
+    def look_at(self, X: Any) -> tuple[Prepared, ...]:
+        """Movements as rows per representation, ready to be compared with the stored ones."""
+        check_is_fitted(self)
+        demos = Demonstrations.of(X)
+        if demos.n_dims != self.n_dims_:
+            raise TrajectoryError(
+                f"expected movements of {self.n_dims_} dimensions as in fit, got {demos.n_dims}; select the dimensions"
+            )
+        return self._view(demos)
+
+    def decision_function(self, X: Any) -> Array:
+        """Score of each class, shape (n, C): larger is more like it; scales depend on the classifier."""
+        seen = self.look_at(X)
+        return np.concatenate([self.classifier_.scores(self, tile) for tile in self._tiles(seen)])
+
+    def predict(self, X: Any) -> NDArray[Any]:
+        """The most similar class of each movement, shape (n,)."""
+        return np.asarray(self.classes_[self.decision_function(X).argmax(axis=1)])
+
+    def predict_proba(self, X: Any) -> Array:
+        """Each class's share of the similarity, shape (n, C); rows sum to 1.
+
+        A ranking made comparable, not a calibrated probability; `recognize` gives calibrated p-values.
+        """
+        scores = self.decision_function(X)
+        shares = np.exp(scores - scores.max(axis=1, keepdims=True))
+        return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+
+    def _angle(self, n_dims: int) -> float:
+        if self.max_angle is not None:
+            return float(self.max_angle)
+        return math.pi / 4 if n_dims in (2, 3) else 0.0
+
+    def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
+        representations = DEFAULT_REPRESENTATIONS if self.representations is None else tuple(self.representations)
+        seen = view(demos, representations, Normalization(self.translation, self.scale), self.cutoff)
+        return tuple(self.procrustes_.prepare(block) for block in seen)
+
+    def _tiles(self, seen: tuple[Prepared, ...]) -> Iterator[tuple[Prepared, ...]]:
+        n, step = len(seen[0].rows), max(1, _TILE_PAIRS // len(self.labels_))
+        for start in range(0, n, step):
+            yield tuple(one.take(slice(start, start + step)) for one in seen)

@@ -1,0 +1,87 @@
+"""How a recognizer looks at a movement: which phase, which quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from kineme.primitives.dmp import DMP
+from kineme.primitives.operators import encoder, forcing_matrix
+from kineme.recognition.normalization import Normalization
+from kineme.trajectories.arc_length import arc_length_phase, resample_by_phase
+from kineme.validation import Array, check_choice, check_number
+
+QUANTITIES = ("positions", "forcing")
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One way to describe an evenly sampled, smooth path by a row of numbers.
+
+    Parameters
+    ----------
+    quantity : {"positions", "forcing"}
+        The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
+        DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
+    arc_share : float
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length does not see uneven
+        timing; time tells movements apart that differ in nothing else.
+    n_points : int, default 100
+        Samples along the phase.
+    n_basis, stiffness, ridge
+        Of the DMP.
+    """
+
+    quantity: str
+    arc_share: float
+    n_points: int = 100
+    n_basis: int = 40
+    stiffness: float = 100.0
+    ridge: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_choice("quantity", self.quantity, QUANTITIES)
+        check_number("arc_share", self.arc_share, least=0.0)
+
+    @property
+    def name(self) -> str:
+        """As in "forcing over arc length"."""
+        phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
+        return f"{self.quantity} over {phase}"
+
+    def rows(self, paths: Array, normalization: Normalization) -> Array:
+        """Rows (n, d * n_points), dimension-major, of smooth even paths (n, d, T)."""
+        along = resample_by_phase(paths, arc_length_phase(paths, self.arc_share), self.n_points)
+        size = normalization.size(along)
+        if self.quantity == "positions":
+            described = (along - normalization.center(along)) / size
+        else:
+            relative = (along - along[:, :, :1]).reshape(-1, self.n_points)
+            described = (relative @ _forcing_operator(self)).reshape(along.shape) / size
+        return np.ascontiguousarray(described.reshape(len(paths), -1))
+
+
+#: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".
+DEFAULT_REPRESENTATIONS = (
+    Representation("positions", arc_share=1.0),
+    Representation("forcing", arc_share=1.0),
+    Representation("forcing", arc_share=0.0),
+)
+
+
+@lru_cache(maxsize=32)
+def _forcing_operator(representation: Representation) -> Array:
+    """From positions relative to the start to f at as many points, (T, T): encode, then Eq. (2)."""
+    dmp = DMP(
+        "bio-inspired",
+        n_basis=representation.n_basis,
+        stiffness=representation.stiffness,
+        fit="trajectory",
+        ridge=representation.ridge,
+        n_points=representation.n_points,
+    )
+    operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
+    operator.setflags(write=False)
+    return operator
