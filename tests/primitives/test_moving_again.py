@@ -1,6 +1,7 @@
 """Generation in batch: invariances of Section 2, derivatives, broadcasting, settling, wrong wishes."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -223,3 +224,13 @@ class TestWrongWishes:
         primitives = kineme.DMP("bio-inspired", damping=0.01).learn(strokes())
         with pytest.raises(kineme.SpecificationError, match=r"within 1e-06 of its goal in 10 durations"):
             primitives.rollout(settle=1e-6)
+
+
+@FORMULATION
+@pytest.mark.parametrize("gating", ["none", "phase"])
+def test_paths_past_the_end_do_not_depend_on_the_rate(formulation, gating):
+    """Even where a sample interval straddles the end, at which an ungated f has a kink."""
+    primitives = kineme.DMP(formulation, n_basis=20, gating=gating).learn(strokes())
+    movement = primitives.rollout(goal=[2.0, 1.0])
+    coarse, fine = (replace(movement, n_samples=n, end=3.0).positions for n in (61, 1201))
+    np.testing.assert_allclose(coarse, fine[:, ::20], atol=1e-12)

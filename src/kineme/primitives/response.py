@@ -51,6 +51,13 @@ def spring_damper_response(
     at_nodes = (starts[:, None] + nodes).ravel()
     forcing = _forcing(basis, formulation, stiffness, at_nodes).reshape(len(starts), len(nodes), -1)
     driven = np.einsum("qz,kqf->kzf", impulse, forcing)  # what each step adds to (x, x')
+    at_end = np.flatnonzero((starts < 1.0) & (starts + h > 1.0))
+    for k in at_end:  # one step at most: an ungated f has a kink at u = 1, which quadrature must not straddle
+        driven[k] = 0.0
+        for left, right in ((starts[k], 1.0), (1.0, starts[k] + h)):
+            inside = left + 0.5 * (right - left) * (_NODES + 1.0)
+            weighted = transition(stiffness, damping, starts[k] + h - inside)[:, :, 1] * _NODE_WEIGHTS[:, None]
+            driven[k] += 0.5 * (right - left) * weighted.T @ _forcing(basis, formulation, stiffness, inside)
     states = np.zeros((len(u), 3, basis.n_basis + 2))
     states[0, 1, -1] = 1.0
     state = states[0, :2]
