@@ -1,11 +1,12 @@
 # make demo   the paper's tables and figures, in out/
 # make test   formatter, linter, type checker, tests
 # make bench  speed and accuracy side by side with other libraries
+# make figures  the pictures of docs/
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
 
-.PHONY: demo test check bench lock clean
+.PHONY: demo test bench figures lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -32,9 +33,24 @@ define environment
 	touch $@
 endef
 
+bench: .venv-bench/ready
+	PYTHONPATH=src .venv-bench/bin/python -m bench
+
+# Two steps: the peer that comes as source is compiled with pinned tools, nothing is fetched aside.
+.venv-bench/ready: requirements/run.txt bench/build.txt bench/peers.txt
+	$(PYTHON) -m venv --clear .venv-bench
+	.venv-bench/bin/pip install --quiet --require-hashes -r requirements/run.txt -r bench/build.txt
+	.venv-bench/bin/pip install --quiet --require-hashes --no-build-isolation -r bench/peers.txt
+	touch $@
+
+figures: .venv-dev/ready
+	.venv-dev/bin/python docs/make_figures.py
+
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
+	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
+	uv pip compile bench/peers.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 
 clean:
 	rm -rf .venv .venv-dev .venv-bench out

@@ -174,13 +174,14 @@ def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
     if not checked:
         raise TrajectoryError("expected at least one movement, got none")
     n_dims = checked[0].shape[1]
-    odd = next((i for i, x in enumerate(checked) if x.shape[1] != n_dims), None)
-    if odd is not None:
+    if len({x.shape[1] for x in checked}) > 1:
+        odd = next(i for i, x in enumerate(checked) if x.shape[1] != n_dims)
         raise TrajectoryError(
             f"{describe(odd, names)}: expected {n_dims} dimensions as in trajectory 0, "
             f"got {checked[odd].shape[1]}; movements of one batch share their dimensions"
         )
-    return np.concatenate(checked), np.concatenate(([0], np.cumsum([len(x) for x in checked])))
+    lengths = np.fromiter(map(len, checked), np.intp, len(checked))
+    return np.concatenate(checked), np.concatenate(([0], np.cumsum(lengths)))
 
 
 def _join_times(
