@@ -13,7 +13,7 @@ from kineme.primitives.operators import encoder
 from kineme.primitives.primitives import Primitives
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.preprocess import preprocess
-from kineme.trajectories.resample import even_rows, relative_rows
+from kineme.trajectories.resample import even_rows, extents_of, relative_rows
 from kineme.validation import Array, describe
 
 _TILE_SAMPLES = 100_000  # numbers in one tile: with its product it stays in a core's cache
@@ -26,7 +26,7 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
     n_samples = demos.even_length or dmp.n_points
     operator = encoder(dmp, n_samples)
     weights = np.empty((n, n_dims, dmp.n_basis))
-    amplitudes, velocities, extents = np.empty((n, n_dims)), np.empty((n, n_dims)), np.empty((n, n_dims))
+    velocities, extents = np.empty((n, n_dims)), np.empty((n, n_dims))
 
     def learn_tile(start: int, stop: int) -> None:
         # Even movements are multiplied as they are: their operator contains the resampling.
@@ -34,8 +34,7 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
         flat = rows.reshape(-1, n_samples)  # a stack of matrices would become as many small products
         np.matmul(flat, operator.weights, out=weights[start:stop].reshape(len(flat), -1))
         np.matmul(flat, operator.velocity, out=velocities[start:stop].reshape(-1))
-        amplitudes[start:stop] = rows[:, :, -1]
-        np.subtract(rows.max(axis=2), rows.min(axis=2), out=extents[start:stop])
+        extents[start:stop] = extents_of(rows)
 
     for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
     starts = demos.positions[demos.offsets[:-1]]

@@ -8,6 +8,30 @@ from kineme.compiled import jit
 
 
 @jit
+def fill_even_rows(block, rows):  # type: ignore[no-untyped-def]
+    """Movements (n, T, d) as rows (n, d, T) minus their start; see `resample.even_rows`."""
+    n, n_samples, n_dims = block.shape
+    for i in range(n):
+        for k in range(n_dims):
+            row, start = rows[i, k], block[i, 0, k]
+            for t in range(n_samples):
+                row[t] = block[i, t, k] - start
+
+
+@jit
+def fill_extents(rows, extents):  # type: ignore[no-untyped-def]
+    """Largest minus smallest of each row (n, d, T), in one pass; see `resample.extents_of`."""
+    n, n_dims, n_samples = rows.shape
+    for i in range(n):
+        for k in range(n_dims):
+            row = rows[i, k]
+            low, high = row[0], row[0]
+            for t in range(1, n_samples):
+                low, high = min(low, row[t]), max(high, row[t])
+            extents[i, k] = high - low
+
+
+@jit
 def fill_spline_rows(parameter, positions, offsets, rows):  # type: ignore[no-untyped-def]
     """Not-a-knot cubic spline of every movement at even parameters; see `spline.spline_rows`.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kineme.compiled import use_compiled
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.spline import spline_matrix, spline_rows
@@ -58,5 +59,23 @@ def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_point
 def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
     """Evenly sampled movements start:stop as they are, minus their start, shape (stop - start, d, T)."""
     first, last = demonstrations.offsets[[start, stop]]
-    block = demonstrations.positions[first:last].reshape(stop - start, -1, demonstrations.n_dims).transpose(0, 2, 1)
-    return np.subtract(block, block[:, :, :1], out=np.empty(block.shape))
+    block = demonstrations.positions[first:last].reshape(stop - start, -1, demonstrations.n_dims)
+    rows = np.empty((len(block), block.shape[2], block.shape[1]))
+    if use_compiled(block.size):
+        from kineme.trajectories._compiled import fill_even_rows
+
+        fill_even_rows(block, rows)
+        return rows
+    by_dimension = block.transpose(0, 2, 1)
+    return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
+
+
+def extents_of(rows: Array) -> Array:
+    """Largest minus smallest of each row (n, d, T), shape (n, d)."""
+    if not use_compiled(rows.size):
+        return np.asarray(rows.max(axis=2) - rows.min(axis=2))
+    from kineme.trajectories._compiled import fill_extents
+
+    extents = np.empty(rows.shape[:2])
+    fill_extents(rows, extents)
+    return extents
