@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from kineme.io.atomic import write_atomically
 from kineme.parallel import n_threads
-from kineme.reproduction.table import Table
+from kineme.table import Table
 
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
@@ -126,7 +126,7 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
 
 def _write_tables(out: Path, tables: list[Table], figures: dict[str, Any], facts: dict[str, Any]) -> list[Path]:
     from kineme.reproduction.report import write_report
-    from kineme.reproduction.table import to_text
+    from kineme.table import to_text
 
     html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
     text = "\n\n".join(map(to_text, tables)) + "\n"

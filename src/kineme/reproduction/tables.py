@@ -11,7 +11,7 @@ from kineme.reproduction import paper
 from kineme.reproduction.experiments import PENALTIES
 from kineme.reproduction.protocol import PENALTY
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS
-from kineme.reproduction.table import Table, spread
+from kineme.table import Table, spread
 
 _LARGE = (
     "Four of the 182 movements (Sharpc 5, Spoon 3 and 5, Trapezoid 4) end in one dimension exactly where they start. "

@@ -1,0 +1,1 @@
+"""Recognizers side by side: protocols, methods, report."""
