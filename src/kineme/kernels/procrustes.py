@@ -61,9 +61,13 @@ class Procrustes:
             )
 
     def prepare(self, rows: Array) -> Prepared:
-        """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once."""
+        """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once.
+
+        The products run in the rows' own precision, float64 or float32; the norms are float64.
+        """
         in_plane = self.n_dims == 2 and self.max_angle > 0
-        return Prepared(as_complex(rows) if in_plane else rows, np.einsum("ij,ij->i", rows, rows))
+        squares = np.einsum("ij,ij->i", rows, rows, dtype=np.float64)
+        return Prepared(as_complex(rows) if in_plane else rows, squares)
 
     def squared_distances(self, A: Prepared, B: Prepared) -> Array:
         """Squared distances (n, m) between prepared rows."""
@@ -91,7 +95,7 @@ class Procrustes:
         return _turned_back(_best_rotations(_covariances(a[None], B)[0]), self.max_angle)
 
 
-def as_complex(rows: Array) -> NDArray[np.complex128]:
+def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     """Rows x_1 ... x_S, y_1 ... y_S as complex rows x + i y."""
     half = rows.shape[1] // 2
     return rows[:, :half] + 1j * rows[:, half:]

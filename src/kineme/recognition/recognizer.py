@@ -156,7 +156,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
         representations = DEFAULT_REPRESENTATIONS if self.representations is None else tuple(self.representations)
         seen = view(demos, representations, Normalization(self.translation, self.scale), self.cutoff)
-        return tuple(self.procrustes_.prepare(block) for block in seen)
+        # Single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
+        return tuple(self.procrustes_.prepare(block.astype(np.float32)) for block in seen)
 
     def _tiles(self, seen: tuple[Prepared, ...]) -> Iterator[tuple[Prepared, ...]]:
         n, step = len(seen[0].rows), max(1, _TILE_PAIRS // len(self.labels_))
