@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.io.container import write_container
 from kineme.orientation.pose_rollout import PoseRollout
 from kineme.orientation.quaternions import conjugate, normalized, product
 from kineme.orientation.rates import rotation_vector_rate
 from kineme.orientation.rotation_vectors import exp, log, nearest
+from kineme.primitives.persistence import Arrays, check_array, load_as, pack, unpack
 from kineme.primitives.primitives import Primitives
 from kineme.primitives.rollout import broadcast_length, per_movement
 from kineme.validation import Array
 
+_KIND = "pose primitives"  # in the file
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class PosePrimitives:
     """n primitives of orientations or poses; made by `PoseDMP.learn`.
 
@@ -35,15 +41,64 @@ class PosePrimitives:
     references: Array
 
     def __post_init__(self) -> None:
-        self.references.setflags(write=False)
+        view = self.references.view()
+        view.setflags(write=False)
+        object.__setattr__(self, "references", view)
 
     def __len__(self) -> int:
         return len(self.tangent)
+
+    def __repr__(self) -> str:
+        what = "orientations" if self.n_columns == 4 else "poses"
+        return f"PosePrimitives({len(self)} movements of {what}, {self.tangent.dmp})"
 
     def __getitem__(self, index: Any) -> PosePrimitives:
         """The chosen primitives as a batch; an integer gives a batch of one."""
         chosen = np.atleast_1d(np.arange(len(self))[index])
         return PosePrimitives(self.tangent[chosen], self.references[chosen])
+
+    @classmethod
+    def join(cls, batches: Sequence[PosePrimitives]) -> PosePrimitives:
+        """Several batches as one, in the order given; errors as in `Primitives.join`."""
+        wrong = [type(batch).__name__ for batch in batches if not isinstance(batch, cls)]
+        if wrong:
+            raise TrajectoryError(f"expected batches of PosePrimitives, got {wrong[0]}")
+        tangent = Primitives.join([batch.tangent for batch in batches])
+        return cls(tangent, np.concatenate([batch.references for batch in batches]))
+
+    def save(self, path: str | Path) -> Path:
+        """Write to one file of plain data; see `Primitives.save`."""
+        header, arrays = pack(self.tangent)
+        return write_container(Path(path), _KIND, header, {**arrays, "references": self.references})
+
+    @classmethod
+    def load(cls, path: str | Path) -> PosePrimitives:
+        """Read a file of `save`; see `Primitives.load`."""
+        return load_as(_KIND, path, cls._unpacked)
+
+    @classmethod
+    def _unpacked(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
+        tangent, references = unpack(Primitives, header, arrays), arrays["references"]
+        if tangent.n_dims not in {3, 6}:
+            raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {tangent.n_dims}")
+        check_array("references", references, (len(tangent), 4))
+        normalized(references)  # refuses what is no rotation; the numbers stay as they were saved
+        return cls(tangent, references)
+
+    @property
+    def labels(self) -> NDArray[Any] | None:
+        """Labels of the demonstrations, shape (n,), or None."""
+        return self.tangent.labels
+
+    @property
+    def names(self) -> tuple[str | None, ...] | None:
+        """Where each demonstration came from, or None."""
+        return self.tangent.names
+
+    @property
+    def durations(self) -> Array:
+        """Duration tau of each demonstration, shape (n,) [s]."""
+        return self.tangent.durations
 
     @property
     def n_columns(self) -> int:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
 from kineme.io.container import read_container, write_container
-from kineme.primitives.dmp import DMP
-from kineme.primitives.primitives import Primitives
+from kineme.primitives.batch import Batch
 from kineme.trajectories.resample import Resample
 from kineme.trajectories.smooth import Smooth
 from kineme.trajectories.trim import TrimRest
@@ -19,45 +20,71 @@ from kineme.trajectories.trim import TrimRest
 #: The preprocessing steps that a file can name. Files carry names of this table, never of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 
-_ARRAYS = ("scaled_weights", "starts", "goals", "velocities", "durations", "extents")
 _LABEL_TYPES = (str, int, float, bool)
 
-
-def save_primitives(primitives: Primitives, path: str | Path) -> Path:
-    """Write a batch of primitives to one file; see `Primitives.save`."""
-    labels = None if primitives.labels is None else np.asarray(primitives.labels).tolist()
-    if labels is not None and not all(isinstance(label, _LABEL_TYPES) for label in labels):
-        raise DataError(f"expected labels that are text or numbers, to save them, got {type(labels[0]).__name__}")
-    header = {
-        "dmp": specification_to_dict(primitives.dmp),
-        "labels": labels,
-        "names": None if primitives.names is None else list(primitives.names),
-    }
-    return write_container(Path(path), "primitives", header, {name: getattr(primitives, name) for name in _ARRAYS})
+Arrays = dict[str, NDArray[Any]]
+B = TypeVar("B", bound=Batch)
+T = TypeVar("T")
 
 
-def load_primitives(path: str | Path) -> Primitives:
-    """Read a file of `save_primitives`; see `Primitives.load`."""
-    path = Path(path)
-    header, arrays = read_container(path, "primitives")
+def save_batch(batch: Batch, path: str | Path) -> Path:
+    """Write a batch of primitives to one file; see `Batch.save`."""
+    return write_container(Path(path), batch.KIND, *pack(batch))
+
+
+def load_batch(cls: type[B], path: str | Path) -> B:
+    """Read a file of `save_batch`; see `Batch.load`."""
+    return load_as(cls.KIND, path, lambda header, arrays: unpack(cls, header, arrays))
+
+
+def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays], T]) -> T:
+    """Read a file of one kind and build what it holds; a header or arrays that do not fit are a `DataError`."""
+    header, arrays = read_container(Path(path), kind)
     try:
-        dmp = specification_from_dict(header["dmp"])
-        _check_shapes(arrays, dmp)
-        labels, names = header["labels"], header["names"]
-        return Primitives(
-            dmp,
-            **{name: arrays[name] for name in _ARRAYS},
-            labels=None if labels is None else np.asarray(labels),
-            names=None if names is None else tuple(names),
-        )
+        return build(header, arrays)
     except (KeyError, TypeError, ValueError) as error:
         reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
         raise DataError(
-            f"expected {path} to hold complete primitives, got a header that does not fit ({reason})"
+            f"expected {path} to hold complete {kind}, got a header that does not fit ({reason})"
         ) from error
 
 
-def specification_to_dict(dmp: DMP) -> dict[str, Any]:
+def pack(batch: Batch) -> tuple[dict[str, Any], Arrays]:
+    """A batch as a header of plain data and arrays."""
+    labels = None if batch.labels is None else np.asarray(batch.labels).tolist()
+    if labels is not None and not all(isinstance(label, _LABEL_TYPES) for label in labels):
+        raise DataError(f"expected labels that are text or numbers, to save them, got {type(labels[0]).__name__}")
+    header = {
+        "dmp": specification_to_dict(batch.dmp),
+        "labels": labels,
+        "names": None if batch.names is None else list(batch.names),
+    }
+    return header, {name: getattr(batch, name) for name in batch.ROWS}
+
+
+def unpack(cls: type[B], header: dict[str, Any], arrays: Arrays) -> B:
+    """What `pack` has packed."""
+    dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
+    sizes = {"N": dmp.n_basis} | dict(zip("nd", arrays[next(iter(cls.ROWS))].shape, strict=False))
+    for name, letters in cls.ROWS.items():
+        check_array(name, arrays[name], tuple(sizes[letter] for letter in letters))
+    labels, names = header["labels"], header["names"]
+    build: Callable[..., B] = cls
+    return build(
+        dmp,
+        **{name: arrays[name] for name in cls.ROWS},
+        labels=None if labels is None else np.asarray(labels),
+        names=None if names is None else tuple(names),
+    )
+
+
+def check_array(name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
+    """Refuse an array of another shape, of anything but float64 or whole numbers, or with NaN."""
+    if array.shape != shape or array.dtype not in (np.float64, np.intp) or not np.isfinite(array).all():
+        raise ValueError(f"{name} should be finite float64 of shape {shape}, is {array.dtype} of shape {array.shape}")
+
+
+def specification_to_dict(dmp: Any) -> dict[str, Any]:
     """A specification as plain data."""
     by_type = {step: name for name, step in STEPS.items()}
     unknown = [step for step in dmp.preprocessing if type(step) not in by_type]
@@ -67,22 +94,10 @@ def specification_to_dict(dmp: DMP) -> dict[str, Any]:
     return {field.name: getattr(dmp, field.name) for field in fields(dmp)} | {"preprocessing": steps}
 
 
-def specification_from_dict(data: dict[str, Any]) -> DMP:
+def specification_from_dict(specification: type[T], data: dict[str, Any]) -> T:
     """Plain data as a specification; every parameter is checked as if a user had typed it."""
     steps = []
     for record in data["preprocessing"]:
         parameters = dict(record)
         steps.append(STEPS[parameters.pop("step")](**parameters))
-    return DMP(**{**data, "preprocessing": tuple(steps)})
-
-
-def _check_shapes(arrays: dict[str, np.ndarray], dmp: DMP) -> None:
-    n, d = arrays["starts"].shape
-    expected: dict[str, tuple[int, ...]] = dict.fromkeys(_ARRAYS, (n, d))
-    expected |= {"scaled_weights": (n, d, dmp.n_basis), "durations": (n,)}
-    for name, shape in expected.items():
-        array = arrays[name]
-        if array.shape != shape or array.dtype != np.float64 or not np.isfinite(array).all():
-            raise ValueError(
-                f"{name} should be finite float64 of shape {shape}, is {array.dtype} of shape {array.shape}"
-            )
+    return specification(**{**data, "preprocessing": tuple(steps)})

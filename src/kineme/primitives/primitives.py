@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.primitives.amplitudes import safe_amplitudes
+from kineme.primitives.batch import Batch
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import forcing_matrix
 from kineme.primitives.rollout import Rollout, rollout, samples_at_rate, settled_end
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from kineme.control.controller import Controller
 
 
-@dataclass(frozen=True, eq=False)
-class Primitives:
+@dataclass(frozen=True, eq=False, repr=False)
+class Primitives(Batch):
     """n primitives of d dimensions that share one specification; made by `DMP.learn`.
 
     Attributes
@@ -44,6 +44,17 @@ class Primitives:
     names : tuple of str or None
     """
 
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "starts": "nd",
+        "goals": "nd",
+        "velocities": "nd",
+        "durations": "n",
+        "extents": "nd",
+    }
+    SPECIFICATION = DMP
+    KIND = "primitives"
+
     dmp: DMP
     scaled_weights: Array
     starts: Array
@@ -53,31 +64,6 @@ class Primitives:
     extents: Array
     labels: NDArray[Any] | None = None
     names: tuple[str | None, ...] | None = None
-
-    def __post_init__(self) -> None:
-        for field in ("scaled_weights", "starts", "goals", "velocities", "durations", "extents"):
-            view = getattr(self, field).view()
-            view.setflags(write=False)
-            object.__setattr__(self, field, view)
-
-    def __len__(self) -> int:
-        return len(self.starts)
-
-    def __getitem__(self, index: Any) -> Primitives:
-        """The chosen primitives as a batch; an integer gives a batch of one."""
-        chosen = np.atleast_1d(np.arange(len(self))[index])
-        arrays = ("scaled_weights", "starts", "goals", "velocities", "durations", "extents")
-        return replace(
-            self,
-            **{field: getattr(self, field)[chosen] for field in arrays},
-            labels=None if self.labels is None else self.labels[chosen],
-            names=None if self.names is None else tuple(self.names[i] for i in chosen),
-        )
-
-    @property
-    def n_dims(self) -> int:
-        """Number of dimensions d."""
-        return int(self.starts.shape[1])
 
     @property
     def weights(self) -> Array:
@@ -196,33 +182,6 @@ class Primitives:
         from kineme.control.controller import Controller
 
         return Controller(self, dt, **options)
-
-    def save(self, path: str | Path) -> Path:
-        """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
-
-        Raises
-        ------
-        DataError
-            Labels or preprocessing steps that plain data cannot hold.
-        OSError
-            The file cannot be written; what was there before stays.
-        """
-        from kineme.primitives.persistence import save_primitives
-
-        return save_primitives(self, path)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Primitives:
-        """Read a file of `save`. The file is data: nothing in it is executed.
-
-        Raises
-        ------
-        DataError
-            The file is foreign, truncated, damaged, of another kind or of a later version.
-        """
-        from kineme.primitives.persistence import load_primitives
-
-        return load_primitives(path)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

@@ -61,11 +61,11 @@ def spring_damper_response(
     states = np.zeros((len(u), 3, basis.n_basis + 2))
     states[0, 1, -1] = 1.0
     state = states[0, :2]
-    for k, added in enumerate(driven):
+    for done, added in enumerate(driven, start=1):
         state = carry @ state
         state[:, :-1] += added
-        if (k + 1) % n_steps == 0:
-            states[(k + 1) // n_steps, :2] = state
+        if done % n_steps == 0:
+            states[done // n_steps, :2] = state
     states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
     states[:, 2, :-1] += _forcing(basis, formulation, stiffness, u)
     by_part = states.transpose(1, 0, 2)

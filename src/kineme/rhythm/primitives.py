@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.primitives.batch import Batch
 from kineme.rhythm.operators import forcing_matrix
 from kineme.rhythm.rhythmic_dmp import RhythmicDMP
 from kineme.rhythm.rollout import RhythmicRollout, rollout
@@ -16,11 +17,9 @@ from kineme.validation import Array, check_count
 if TYPE_CHECKING:
     from kineme.rhythm.controller import RhythmicController
 
-_ARRAYS = ("scaled_weights", "baselines", "amplitudes", "periods", "phases", "aligned_on", "explained")
 
-
-@dataclass(frozen=True, eq=False)
-class RhythmicPrimitives:
+@dataclass(frozen=True, eq=False, repr=False)
+class RhythmicPrimitives(Batch):
     """n limit cycles of d dimensions that share one specification; made by `RhythmicDMP.learn`.
 
     Attributes
@@ -47,6 +46,18 @@ class RhythmicPrimitives:
     names : tuple of str or None
     """
 
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "baselines": "nd",
+        "amplitudes": "n",
+        "periods": "n",
+        "phases": "n",
+        "aligned_on": "n",
+        "explained": "n",
+    }
+    SPECIFICATION = RhythmicDMP
+    KIND = "rhythmic primitives"
+
     dmp: RhythmicDMP
     scaled_weights: Array
     baselines: Array
@@ -57,28 +68,6 @@ class RhythmicPrimitives:
     explained: Array
     labels: NDArray[Any] | None = None
     names: tuple[str | None, ...] | None = None
-
-    def __post_init__(self) -> None:
-        for field in _ARRAYS:
-            getattr(self, field).setflags(write=False)
-
-    def __len__(self) -> int:
-        return len(self.baselines)
-
-    def __getitem__(self, index: Any) -> RhythmicPrimitives:
-        """The chosen primitives as a batch; an integer gives a batch of one."""
-        chosen = np.atleast_1d(np.arange(len(self))[index])
-        return replace(
-            self,
-            **{field: getattr(self, field)[chosen] for field in _ARRAYS},
-            labels=None if self.labels is None else self.labels[chosen],
-            names=None if self.names is None else tuple(self.names[i] for i in chosen),
-        )
-
-    @property
-    def n_dims(self) -> int:
-        """Number of dimensions d."""
-        return int(self.baselines.shape[1])
 
     @property
     def weights(self) -> Array:

@@ -1,0 +1,129 @@
+"""What every batch of learned movements can do: count, choose, join, show, save and load its members."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError, TrajectoryError
+
+
+class Batch:
+    """Base of frozen records of n learned movements of d dimensions, with one specification of N basis functions.
+
+    A subclass lists its arrays once, in `ROWS`; protection, selection, joining and files follow from that list.
+    """
+
+    #: Array -> its shape in the letters n, d, N.
+    ROWS: ClassVar[dict[str, str]]
+    #: The class of `dmp`.
+    SPECIFICATION: ClassVar[type]
+    #: What a saved file says that it holds.
+    KIND: ClassVar[str]
+
+    dmp: Any
+    labels: NDArray[Any] | None
+    names: tuple[str | None, ...] | None
+
+    def __post_init__(self) -> None:
+        for name in self.ROWS:
+            view = getattr(self, name).view()
+            view.setflags(write=False)
+            object.__setattr__(self, name, view)
+
+    def __len__(self) -> int:
+        return len(getattr(self, next(iter(self.ROWS))))
+
+    def __getitem__(self, index: Any) -> Self:
+        """The chosen primitives as a batch; an integer gives a batch of one."""
+        chosen = np.atleast_1d(np.arange(len(self))[index])
+        return self._with(
+            {name: getattr(self, name)[chosen] for name in self.ROWS},
+            None if self.labels is None else self.labels[chosen],
+            None if self.names is None else tuple(self.names[i] for i in chosen),
+        )
+
+    def __repr__(self) -> str:
+        labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
+        return f"{type(self).__name__}({len(self)} movements, {self.n_dims} dims{labels}, {self.dmp})"
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return int(getattr(self, next(iter(self.ROWS))).shape[1])
+
+    @classmethod
+    def join(cls, batches: Sequence[Self]) -> Self:
+        """Several batches as one, in the order given.
+
+        Raises
+        ------
+        SpecificationError
+            Batches of different specifications: their numbers mean different things.
+        TrajectoryError
+            No batch, something else, batches of different dimensions, labels on some batches only.
+        """
+        if not batches or not all(isinstance(batch, cls) for batch in batches):
+            got = next((type(batch).__name__ for batch in batches if not isinstance(batch, cls)), "none")
+            raise TrajectoryError(f"expected at least one batch of {cls.__name__}, got {got}")
+        first = batches[0]
+        for i, batch in enumerate(batches):
+            _check_alike(first, batch, i)
+        labels = [batch.labels for batch in batches if batch.labels is not None]
+        if len(labels) not in (0, len(batches)):
+            raise TrajectoryError(
+                f"expected labels on every batch or on none, got them on {len(labels)} of {len(batches)}"
+            )
+        named = any(batch.names is not None for batch in batches)
+        return first._with(
+            {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in cls.ROWS},
+            np.concatenate(labels) if labels else None,
+            tuple(name for batch in batches for name in batch.names or (None,) * len(batch)) if named else None,
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write to one file of plain data, atomically; `load` gives back the same numbers bit for bit.
+
+        Raises
+        ------
+        DataError
+            Labels or preprocessing steps that plain data cannot hold.
+        OSError
+            The file cannot be written; what was there before stays.
+        """
+        from kineme.primitives.persistence import save_batch
+
+        return save_batch(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a file of `save`. The file is data: nothing in it is executed.
+
+        Raises
+        ------
+        DataError
+            The file is foreign, truncated, damaged, of another kind or of a later version.
+        """
+        from kineme.primitives.persistence import load_batch
+
+        return load_batch(cls, path)
+
+    def _with(self, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None) -> Self:
+        changed: Self = replace(self, **arrays, labels=labels, names=names)  # type: ignore[type-var]
+        return changed
+
+
+def _check_alike(first: Batch, batch: Batch, i: int) -> None:
+    if batch.dmp != first.dmp:
+        name = next(f.name for f in fields(first.dmp) if getattr(first.dmp, f.name) != getattr(batch.dmp, f.name))
+        raise SpecificationError(
+            f"batch {i}: expected {name}={getattr(first.dmp, name)!r} as in batch 0, got {getattr(batch.dmp, name)!r}; "
+            "primitives of one batch share one specification: learn them again with it"
+        )
+    if batch.n_dims != first.n_dims:
+        raise TrajectoryError(f"batch {i}: expected {first.n_dims} dimensions as in batch 0, got {batch.n_dims}")
