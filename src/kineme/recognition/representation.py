@@ -11,6 +11,7 @@ from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import encoder, forcing_matrix
 from kineme.recognition.normalization import Normalization
 from kineme.trajectories.arc_length import arc_length_phase, resample_by_phase
+from kineme.trajectories.spline import spline_matrix
 from kineme.validation import Array, check_choice, check_number
 
 QUANTITIES = ("positions", "forcing")
@@ -51,16 +52,21 @@ class Representation:
         phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
         return f"{self.quantity} over {phase}"
 
-    def rows(self, paths: Array, normalization: Normalization) -> Array:
-        """Rows (n, d * n_points), dimension-major, of smooth even paths (n, d, T)."""
-        along = resample_by_phase(paths, arc_length_phase(paths, self.arc_share), self.n_points)
+    def along(self, paths: Array) -> Array:
+        """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
+        if self.arc_share == 0:
+            return np.asarray(paths @ spline_matrix(paths.shape[2], self.n_points).T)
+        return resample_by_phase(paths, arc_length_phase(paths, self.arc_share), self.n_points)
+
+    def describe(self, along: Array, normalization: Normalization) -> Array:
+        """Rows (n, d * n_points), dimension-major, of paths sampled along the phase."""
         size = normalization.size(along)
         if self.quantity == "positions":
             described = (along - normalization.center(along)) / size
         else:
             relative = (along - along[:, :, :1]).reshape(-1, self.n_points)
             described = (relative @ _forcing_operator(self)).reshape(along.shape) / size
-        return np.ascontiguousarray(described.reshape(len(paths), -1))
+        return described.reshape(len(along), -1)
 
 
 #: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from kineme.parallel import for_tiles
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import Representation
 from kineme.trajectories.demonstrations import Demonstrations
@@ -13,6 +16,7 @@ from kineme.trajectories.resample import relative_rows
 from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array
 
+_TILE_SAMPLES = 100_000  # numbers in one tile of paths
 N_POINTS = 200  # even samples between the recording and the phases
 
 
@@ -23,7 +27,19 @@ def view(
     demos = Demonstrations.of(movements)
     if cutoff is not None and demos.lengths.min() > 4:
         demos = preprocess(demos, [Smooth(cutoff)])
-    paths = relative_rows(demos, 0, len(demos), N_POINTS)
-    if not normalization.translation:
-        paths = paths + demos.positions[demos.offsets[:-1]][:, :, None]
-    return tuple(one.rows(paths, normalization) for one in representations)
+    n, d = len(demos), demos.n_dims
+    rows = tuple(np.empty((n, d * one.n_points)) for one in representations)
+
+    def see(start: int, stop: int) -> None:
+        paths = relative_rows(demos, start, stop, N_POINTS)
+        if not normalization.translation:
+            paths = paths + demos.positions[demos.offsets[start:stop]][:, :, None]
+        along: dict[tuple[float, int], Array] = {}  # representations share their phases
+        for one, block in zip(representations, rows, strict=True):
+            phase = (one.arc_share, one.n_points)
+            if phase not in along:
+                along[phase] = one.along(paths)
+            block[start:stop] = one.describe(along[phase], normalization)
+
+    for_tiles(see, n, max(1, _TILE_SAMPLES // (d * N_POINTS)))
+    return rows

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from kineme.compiled import use_compiled
 from kineme.errors import TrajectoryError
+from kineme.parallel import for_tiles
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_number, describe
 
 _OPERATIONS_PER_SAMPLE = 300  # elementary operations that SciPy's smoothing spline costs per sample and dimension
 _MIN_SAMPLES = 5
+_TILE_MOVEMENTS = 256
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,11 @@ class Smooth:
         if use_compiled(_OPERATIONS_PER_SAMPLE * len(u) * n_dims):
             from kineme.trajectories._compiled import fill_smoothed
 
-            fill_smoothed(u, demonstrations.positions, offsets, penalties, smoothed)
+            def smooth_tile(start: int, stop: int) -> None:
+                tile = offsets[start : stop + 1]
+                fill_smoothed(u, demonstrations.positions, tile, penalties[start:stop], smoothed)
+
+            for_tiles(smooth_tile, len(lengths), _TILE_MOVEMENTS)
         else:
             _fill_smoothed(u, demonstrations.positions, offsets, penalties, smoothed)
         return replace(demonstrations.movements, positions=smoothed)
