@@ -26,6 +26,7 @@ if _TYPE_CHECKING:
     from kineme.primitives.primitives import Primitives
     from kineme.recognition.recognizer import Recognizer
     from kineme.rhythm.rhythmic_dmp import RhythmicDMP
+    from kineme.segmentation.segment import segment
     from kineme.trajectories.demonstrations import Demonstrations
     from kineme.trajectories.preprocess import preprocess
     from kineme.trajectories.resample import Resample
@@ -36,6 +37,7 @@ if _TYPE_CHECKING:
 _HOME = {
     "Trajectory": "kineme.trajectories.trajectory",
     "Demonstrations": "kineme.trajectories.demonstrations",
+    "segment": "kineme.segmentation.segment",
     "preprocess": "kineme.trajectories.preprocess",
     "TrimRest": "kineme.trajectories.trim",
     "Smooth": "kineme.trajectories.smooth",
@@ -60,7 +62,7 @@ _HOME = {
 }
 
 __all__ = [  # noqa: RUF022 - in the order of the flow
-    "Trajectory", "Demonstrations", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
+    "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
     "DMP", "Primitives", "RhythmicDMP", "orientation", "styles",
     "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",

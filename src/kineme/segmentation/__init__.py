@@ -1,0 +1,1 @@
+"""Cutting one continuous recording into movements."""
