@@ -10,7 +10,7 @@ import numpy as np
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import encoder, forcing_matrix
 from kineme.recognition.normalization import Normalization
-from kineme.trajectories.arc_length import arc_length_phase, resample_by_phase
+from kineme.trajectories.arc_length import resample_by_arc_length
 from kineme.trajectories.spline import spline_matrix
 from kineme.validation import Array, check_choice, check_number
 
@@ -56,7 +56,7 @@ class Representation:
         """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
         if self.arc_share == 0:
             return np.asarray(paths @ spline_matrix(paths.shape[2], self.n_points).T)
-        return resample_by_phase(paths, arc_length_phase(paths, self.arc_share), self.n_points)
+        return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
     def describe(self, along: Array, normalization: Normalization) -> Array:
         """Rows (n, d * n_points), dimension-major, of paths sampled along the phase."""

@@ -205,3 +205,32 @@ def _solve_smoother(x, inv_h, n, diagonal, above, second, m):  # type: ignore[no
         m[j + 1] -= above[j] * m[j + 2]
         if j < n - 2:
             m[j + 1] -= second[j] * m[j + 3]
+
+
+@jit
+def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
+    """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
+    n, n_dims, n_samples = paths.shape
+    n_points = rows.shape[2]
+    phase = np.empty(n_samples)
+    for i in range(n):
+        phase[0] = 0.0
+        for t in range(1, n_samples):
+            square = 0.0
+            for k in range(n_dims):
+                step = paths[i, k, t] - paths[i, k, t - 1]
+                square += step * step
+            phase[t] = phase[t - 1] + np.sqrt(square)
+        total = phase[n_samples - 1]
+        share = a if total > 0.0 else 0.0
+        per_length = share / total if total > 0.0 else 0.0
+        for t in range(n_samples):
+            phase[t] = per_length * phase[t] + (1.0 - share) * t / (n_samples - 1)
+        j = 0
+        for p in range(n_points):
+            target = p / (n_points - 1)
+            while j < n_samples - 2 and phase[j + 1] <= target:
+                j += 1
+            weight = min(1.0, (target - phase[j]) / (phase[j + 1] - phase[j]))
+            for k in range(n_dims):
+                rows[i, k, p] = paths[i, k, j] + weight * (paths[i, k, j + 1] - paths[i, k, j])

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from kineme.compiled import use_compiled
 from kineme.validation import Array
 
+_OPERATIONS_PER_SAMPLE = 5
 _TIME_SHARE = 1e-3  # of the phase; keeps it increasing through pauses
 
 
@@ -37,12 +39,23 @@ def arc_length_phase(paths: Array, share: float = 1.0) -> Array:
     return a * arc + (1.0 - a) * time
 
 
-def resample_by_phase(paths: Array, phase: Array, n_points: int) -> Array:
-    """Linear interpolation of paths (n, d, T) at `n_points` even values of their phase (n, T).
+def resample_by_arc_length(paths: Array, n_points: int, share: float = 1.0) -> Array:
+    """Linear interpolation of paths (n, d, T) at `n_points` even values of `arc_length_phase`, (n, d, n_points).
 
     Linear, because the phase is the length of the polygon through the samples; a spline through knots as
     uneven as these can swing.
     """
+    if use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
+        from kineme.trajectories._compiled import fill_arc_rows
+
+        rows = np.empty((*paths.shape[:2], n_points))
+        fill_arc_rows(np.ascontiguousarray(paths), (1.0 - _TIME_SHARE) * share, rows)
+        return rows
+    return resample_by_phase(paths, arc_length_phase(paths, share), n_points)
+
+
+def resample_by_phase(paths: Array, phase: Array, n_points: int) -> Array:
+    """Linear interpolation of paths (n, d, T) at `n_points` even values of any increasing phase (n, T)."""
     n, n_dims, _ = paths.shape
     # One increasing parameter for all movements, so that one call interpolates them without a Python loop.
     shift = 2.0 * np.arange(n)[:, None]
