@@ -170,41 +170,39 @@ def fill_smoothed(u, positions, offsets, penalties, smoothed):  # type: ignore[n
 def _factor_smoother(inv_h, n, lam, diagonal, above, second):  # type: ignore[no-untyped-def]
     """L D L' factors of the pentadiagonal matrix R + lam Q'Q of the n inner knots.
 
-    `diagonal` holds 1 / D, `above` and `second` the off-diagonals of L.
+    `diagonal` holds 1 / D, `above` and `second` the off-diagonals of L. The last two rows are carried in
+    scalars: one division per knot is all that the chain waits for.
     """
+    pivot_1 = pivot_2 = above_1 = second_1 = second_2 = 0.0  # of the rows one and two before
     for j in range(n):
         a, b = inv_h[j], inv_h[j + 1]
+        c = inv_h[j + 2] if j < n - 1 else 0.0
         row = (1.0 / a + 1.0 / b) / 3.0 + lam * (a * a + b * b + (a + b) * (a + b))
-        next_one = 1.0 / (6.0 * b) - lam * b * (a + 2.0 * b + inv_h[j + 2]) if j < n - 1 else 0.0
-        next_two = lam * b * inv_h[j + 2] if j < n - 2 else 0.0
-        if j > 0:
-            row -= above[j - 1] * above[j - 1] / diagonal[j - 1]
-            next_one -= above[j - 1] * second[j - 1] / diagonal[j - 1]
-        if j > 1:
-            row -= second[j - 2] * second[j - 2] / diagonal[j - 2]
-        diagonal[j] = 1.0 / row
-        above[j] = next_one * diagonal[j]
-        second[j] = next_two * diagonal[j]
+        pivot = row - above_1 * above_1 * pivot_1 - second_2 * second_2 * pivot_2
+        next_one = 1.0 / (6.0 * b) - lam * b * (a + 2.0 * b + c) - above_1 * second_1 * pivot_1 if j < n - 1 else 0.0
+        next_two = lam * b * c if j < n - 2 else 0.0
+        reciprocal = 1.0 / pivot
+        diagonal[j], above[j], second[j] = reciprocal, next_one * reciprocal, next_two * reciprocal
+        pivot_2, pivot_1 = pivot_1, pivot
+        second_2, second_1, above_1 = second_1, second[j], above[j]
 
 
 @jit
 def _solve_smoother(x, inv_h, n, diagonal, above, second, m):  # type: ignore[no-untyped-def]
     """Second derivatives at the inner knots, in m[1] to m[n]; m[0] and m[n + 1] are 0."""
-    m[0] = 0.0
-    m[n + 1] = 0.0
+    value_1 = value_2 = above_1 = second_1 = second_2 = 0.0
     for j in range(n):
         value = (x[j + 2] - x[j + 1]) * inv_h[j + 1] - (x[j + 1] - x[j]) * inv_h[j]
-        if j > 0:
-            value -= above[j - 1] * m[j]
-        if j > 1:
-            value -= second[j - 2] * m[j - 1]
-        m[j + 1] = value
-    for j in range(n):
-        m[j + 1] *= diagonal[j]
-    for j in range(n - 2, -1, -1):
-        m[j + 1] -= above[j] * m[j + 2]
-        if j < n - 2:
-            m[j + 1] -= second[j] * m[j + 3]
+        value -= above_1 * value_1 + second_2 * value_2
+        m[j + 1] = value * diagonal[j]
+        value_2, value_1 = value_1, value
+        second_2, second_1, above_1 = second_1, second[j], above[j]
+    m[0] = m[n + 1] = 0.0
+    below_1 = below_2 = 0.0
+    for j in range(n - 1, -1, -1):
+        below = m[j + 1] - above[j] * below_1 - second[j] * below_2
+        m[j + 1] = below
+        below_2, below_1 = below_1, below
 
 
 @jit
