@@ -104,7 +104,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         weight = np.sqrt(self.m_ / (max(1.0, float(self.sigma)) * per_row))
         values = (weight * seen).reshape(-1)
         index = np.int32 if n * per_row <= _COLUMNS else np.int64  # scikit-learn's linear models want 32 bits
-        ends = np.arange(n + 1, dtype=index) * index(per_row)
+        ends = np.arange(n + 1, dtype=index) * per_row  # stays of that type
         Z = csr_array((values, columns.ravel(), ends), shape=(n, int(self.bins_.sum())))
         Z.eliminate_zeros()
         if self.sigma > 1:
