@@ -15,7 +15,7 @@ test: .venv-dev/ready
 	.venv-dev/bin/ruff format --check .
 	.venv-dev/bin/ruff check .
 	.venv-dev/bin/mypy
-	.venv-dev/bin/pytest
+	.venv-dev/bin/pytest -n 2 --dist loadscope
 
 .venv/ready: requirements/run.txt pyproject.toml
 	$(call environment,.venv,requirements/run.txt)
