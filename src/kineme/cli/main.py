@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
 from kineme.cli.reproduce import reproduce
 from kineme.errors import KinemeError
@@ -29,5 +30,6 @@ def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 
 
+main.add_command(evaluate)
 main.add_command(generate)
 main.add_command(reproduce)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,10 @@ class Perturbation:
     def __post_init__(self) -> None:
         for name in _STREAMS:
             check_number(name, getattr(self, name), least=0.0)
+
+    def in_dimensions(self, n_dims: int) -> Perturbation:
+        """The same, without the rotation that movements of neither two nor three dimensions cannot have."""
+        return self if n_dims in (2, 3) else replace(self, rotation=0.0)
 
     def apply(self, demonstrations: Demonstrations, seed: int | Sequence[int]) -> Demonstrations:
         """The movements, perturbed, at 200 even samples; labels, names, durations stay.

@@ -1,0 +1,33 @@
+"""The recognizer of this library as a contender: its defaults, nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numpy.typing import NDArray
+
+from kineme.recognition.recognizer import Recognizer
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+
+class Ours:
+    """`Recognizer`; familiarity is the score of the best class, the logarithm of the averaged kernel for few shots."""
+
+    def __init__(self, max_angle: float | None) -> None:
+        self.recognizer = Recognizer(max_angle=max_angle)
+
+    def fit(self, demonstrations: Demonstrations) -> None:
+        """Learn from labeled movements."""
+        self.recognizer.fit(demonstrations)
+
+    def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+        """Class and familiarity of each movement."""
+        scores = self.recognizer.decision_function(demonstrations)
+        return self.recognizer.classes_[scores.argmax(axis=1)], scores.max(axis=1)
+
+    @property
+    def answer_partial(self) -> Callable[[Demonstrations], NDArray[Any]] | None:
+        """Class of each movement of which only the beginning has been seen; None where the recognizer has no such."""
+        return getattr(self.recognizer, "predict_partial", None)
