@@ -84,6 +84,11 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:
     """Check that one movement's time stamps are (n_samples,) numbers."""
+    if getattr(getattr(times, "dtype", None), "kind", "") in ("M", "m"):
+        raise TrajectoryError(
+            f"{who}: expected times in seconds, got {times.dtype}, which counts in a unit of its own; "  # type: ignore[union-attr]
+            "pass (times - times[0]) / np.timedelta64(1, 's')"
+        )
     try:
         t = np.asarray(times, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -93,3 +93,12 @@ def test_a_mirrored_goal_mirrors_the_original_formulation_only(learn, steps):
             primitive.controller(0.02, velocity=-primitive.velocities[0]), 100, goal=shifted(primitive, -1.0)
         )
         assert np.allclose(mirrored - x0, x0 - as_shown, atol=1e-9) is mirrors
+
+
+def test_in_one_dimension_a_number_will_do(learn):
+    primitive = learn(n_dims=1)
+    one, other = primitive.controller(0.02, goal=3.0), primitive.controller(0.02, goal=[3.0])
+    for _ in range(3):
+        np.testing.assert_array_equal(one.step(goal=2.0).position, other.step(goal=[2.0]).position)
+    np.testing.assert_array_equal(one.step(0.5, 0.1).position, other.step([0.5], [0.1]).position)
+    assert not one.state.status.rejected

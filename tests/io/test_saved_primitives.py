@@ -129,6 +129,11 @@ def test_a_missing_file_is_file_not_found(tmp_path):
         kineme.Primitives.load(tmp_path / "nothing")
 
 
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"expected a folder .*nowhere to write x\.kineme into, there is none"):
+        learned().save(tmp_path / "nowhere" / "x.kineme")
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = learned().save(tmp_path / "x")
     before = path.read_bytes()

@@ -234,3 +234,16 @@ def test_paths_past_the_end_do_not_depend_on_the_rate(formulation, gating):
     movement = primitives.rollout(goal=[2.0, 1.0])
     coarse, fine = (replace(movement, n_samples=n, end=3.0).positions for n in (61, 1201))
     np.testing.assert_allclose(coarse, fine[:, ::20], atol=1e-12)
+
+
+def test_in_one_dimension_a_number_will_do():
+    learned = kineme.DMP(n_basis=15).learn([np.linspace(0, 1, 50) ** 2])
+    for name in ("start", "goal", "velocity"):
+        as_number, as_row = (learned.rollout(**{name: wish}).positions for wish in (2.0, [2.0]))
+        np.testing.assert_array_equal(as_number, as_row)
+
+
+def test_a_rollout_shows_itself_in_one_line():
+    shown = repr(kineme.DMP(n_basis=15).learn([np.linspace(0, 1, 50) ** 2]).rollout(n_samples=30))
+    assert shown.startswith("Rollout(1 movements of 30 samples from Primitives(1 movements, 1 dims, DMP(")
+    assert "\n" not in shown

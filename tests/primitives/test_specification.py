@@ -73,6 +73,7 @@ BAD_WISHES = [
     ({"start": [1.0]}, TrajectoryError, "expected start of shape (2,) or (n, 2), got shape (1,)"),
     ({"goal": np.zeros((3, 3))}, TrajectoryError, "expected goal of shape (2,) or (n, 2), got shape (3, 3)"),
     ({"goal": [0.0, NAN]}, TrajectoryError, "expected finite numbers for goal, got [0.0, nan]"),
+    ({"goal": "home"}, TrajectoryError, "expected numbers for goal, got 'home'"),
     ({"velocity": 1.0}, TrajectoryError, "expected velocity of shape (2,) or (n, 2), got shape ()"),
     ({"duration": 0.0}, SpecificationError, "expected duration above 0 seconds, got 0 for movement 0"),
     ({"duration": [1.0, 2.0, 3.0]}, TrajectoryError, "expected one or equally many of primitives"),

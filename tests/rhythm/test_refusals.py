@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import RhythmicDMP, SpecificationError, Trajectory, TrajectoryError
+from kineme import RhythmicDMP, Smooth, SpecificationError, Trajectory, TrajectoryError
 
 T = np.linspace(0.0, 3.0, 100)
 WAVE = Trajectory(T, np.sin(2 * np.pi * T), name="wave")
@@ -63,3 +63,10 @@ def test_recordings(parameters, movements, message):
 def test_wishes(wishes, error, message):
     with pytest.raises(error, match=message):
         RhythmicDMP().learn(WAVE).rollout(**wishes)
+
+
+def test_a_step_needs_its_parentheses():
+    with pytest.raises(
+        SpecificationError, match=r"expected a tuple of steps such as .kineme\.TrimRest\(\), .*Smooth'>"
+    ):
+        RhythmicDMP(preprocessing=(Smooth,))

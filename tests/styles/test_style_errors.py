@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import DMP, SpecificationError, TrajectoryError
-from kineme.styles import learn_styles
+from kineme.styles import average, average_by_label, learn_styles
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +86,12 @@ def test_a_new_demonstration_of_another_kind(model, learned, make_movement):
         model.style_of(DMP(n_basis=16, n_points=60).learn([make_movement(1)[1]]))
     with pytest.raises(SpecificationError, match="movements of 2 dimensions, got 3"):
         model.style_of([make_movement(1, 3)[1]])
+
+
+@pytest.mark.parametrize("function", [average, average_by_label, learn_styles])
+def test_movements_must_be_learned_first(demonstrate, function):
+    message = (
+        r"expected kineme\.Primitives, got Demonstrations; learn movements first, kineme\.DMP\(\)\.learn\(movements\)"
+    )
+    with pytest.raises(TrajectoryError, match=message):
+        function(demonstrate(5, 30))

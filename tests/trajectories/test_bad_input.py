@@ -53,6 +53,7 @@ BAD_TIMES = {
     "decreasing": (T[::-1], "trajectory 1 ('two'): expected strictly increasing times, got decreasing stamps 1 and 0.857142857 at samples 0 and 1"),
     "NaN": (_stamps(2, np.nan), "trajectory 1 ('two'): expected finite times, got nan at sample 2"),
     "one too few": (T[:-1], "trajectory 1 ('two'): expected one time stamp for each of the 8 samples, got times of shape (7,)"),
+    "dates": ((1000 * T).astype("M8[ms]"), "trajectory 1 ('two'): expected times in seconds, got datetime64[ms], which counts in a unit of its own; pass (times - times[0]) / np.timedelta64(1, 's')"),
     "words": (list("abcdefgh"), "trajectory 1 ('two'): expected times in seconds, got could not convert"),
 }  # fmt: skip
 

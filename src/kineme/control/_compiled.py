@@ -8,7 +8,9 @@ import numpy as np
 
 from kineme.compiled import jit
 from kineme.control.obstacles import AHEAD
-from kineme.control.spring import NODE_WEIGHTS, NODES
+from kineme.control.spring import NODE_WEIGHTS, NODES, transition
+
+_transition = jit(transition)
 
 
 @jit
@@ -91,24 +93,6 @@ def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
         for k in range(n_columns):
             shape[k] += polynomial * terms[j, k]
         before, polynomial = polynomial, 2.0 * x * polynomial - before
-
-
-@jit
-def _transition(stiffness, damping, h):  # type: ignore[no-untyped-def]
-    """Twin of `spring.transition`."""
-    a = 0.5 * damping
-    square = stiffness - a * a
-    b = math.sqrt(abs(square))
-    if b * h < 1e-8:
-        C = math.exp(-a * h)
-        S = C * h
-    elif square > 0:
-        decay = math.exp(-a * h)
-        C, S = decay * math.cos(b * h), decay * math.sin(b * h) / b
-    else:
-        slow, ratio = math.exp(-stiffness / (a + b) * h), math.exp(-2.0 * b * h)
-        C, S = 0.5 * slow * (1.0 + ratio), -0.5 * slow * math.expm1(-2.0 * b * h) / b
-    return C + a * S, S, -stiffness * S, C - a * S
 
 
 @jit

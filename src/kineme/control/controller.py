@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kineme.control import inputs
 from kineme.control.moving_goal import MovingGoal
-from kineme.control.options import Options, limit, one_movement
+from kineme.control.options import limit, one_movement, options_from
 from kineme.control.plan import Influences, Plan
 from kineme.control.running_sum import RunningSum
 from kineme.control.state import State, Status
@@ -89,7 +89,7 @@ class Controller:
         velocity: ArrayLike | None = None,
         **options: Any,
     ) -> None:
-        self.options = Options(**options)
+        self.options = options_from(options)
         movement = one_movement(primitives, start, goal, duration, velocity)
         self._n_dims, self._tau = primitives.n_dims, float(movement.durations[0])
         check_number("dt", dt, above=0.0)

@@ -13,8 +13,10 @@ _LARGEST = 1e150
 
 
 def vector(value: Any, n_dims: int) -> Array | None:
-    """`value` as (d,) finite float64, or None."""
+    """`value` as (d,) finite float64, or None; a number serves one dimension."""
     array = _array(value)
+    if array is not None and array.ndim == 0:
+        array = array[None]
     return array if array is not None and array.shape == (n_dims,) else None
 
 

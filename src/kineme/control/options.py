@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +45,15 @@ class Options:
             raise SpecificationError(f"expected avoidance to be an ObstacleAvoidance, got {self.avoidance!r}")
 
 
+def options_from(keywords: dict[str, Any]) -> Options:
+    """The options that a user typed; one that does not exist is a TypeError, as for any function."""
+    known = [field.name for field in fields(Options)]
+    unknown = [name for name in keywords if name not in known]
+    if unknown:
+        raise TypeError(f"expected options out of {known} for a controller, got {unknown[0]!r}")
+    return Options(**keywords)
+
+
 def one_movement(
     primitives: Primitives,
     start: ArrayLike | None,
@@ -68,6 +78,7 @@ def _wish(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     if value is None:
         return None
     array = _numbers(name, value)
+    array = array[None] if array.ndim == 0 else array  # a number serves one dimension
     if array.shape != (n_dims,) or not np.isfinite(array).all():
         raise SpecificationError(f"expected {name} to be {n_dims} finite numbers, one per dimension, got {value!r}")
     return array

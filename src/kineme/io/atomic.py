@@ -14,6 +14,8 @@ def write_atomically(path: Path, data: bytes) -> Path:
     OSError
         The folder is missing, read-only or full; what was at `path` is as it was.
     """
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, there is none; create it")
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with beside.open("wb") as file:

@@ -20,7 +20,7 @@ from kineme.validation import Array
 _TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it stays in a core's cache
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PoseRollout:
     """n generated movements of T samples; computed when asked for.
 
@@ -37,6 +37,9 @@ class PoseRollout:
 
     def __len__(self) -> int:
         return len(self.tangent)
+
+    def __repr__(self) -> str:
+        return f"PoseRollout({len(self)} movements of {self.tangent.n_samples} samples)"
 
     @property
     def times(self) -> Array:

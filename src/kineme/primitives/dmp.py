@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,17 +9,16 @@ from kineme.primitives.basis import GaussianBasis
 from kineme.primitives.fits import FITS, REGRESSIONS
 from kineme.primitives.formulations import FORMULATIONS, Formulation
 from kineme.primitives.phase import ExponentialPhase
+from kineme.primitives.spring_damper import SpringDamper
 from kineme.trajectories.preprocess import check_steps
-from kineme.validation import check_choice, check_count, check_number
+from kineme.validation import check_choice, check_count
 
 if TYPE_CHECKING:
     from kineme.primitives.primitives import Primitives
 
-_DEFAULT_RIDGE = {"forcing": 1e-8, "trajectory": 1e-6}
-
 
 @dataclass(frozen=True)
-class DMP:
+class DMP(SpringDamper):
     """A Dynamical Movement Primitive, as a frozen specification.
 
     In normalized time u = t / tau, with one canonical system s(u) shared by all dimensions,
@@ -88,31 +86,12 @@ class DMP:
         check_choice("formulation", self.formulation, list(FORMULATIONS))
         check_choice("fit", self.fit, FITS)
         check_choice("regression", self.regression, REGRESSIONS)
-        check_number("stiffness", self.stiffness, above=0.0)
+        self._check_spring_damper()
         check_count("n_points", self.n_points, 10)
-        if self.damping is not None:
-            check_number("damping", self.damping, above=0.0)
-        if self.ridge is not None:
-            check_number("ridge", self.ridge, least=0.0)
         if self.fit == "trajectory":
             check_count("n_basis", self.n_basis, 3)
         object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
         _ = self.basis  # checks its own parameters
-
-    @property
-    def K(self) -> float:
-        """Stiffness."""
-        return float(self.stiffness)
-
-    @property
-    def D(self) -> float:
-        """Damping."""
-        return 2.0 * math.sqrt(self.stiffness) if self.damping is None else float(self.damping)
-
-    @property
-    def ridge_strength(self) -> float:
-        """The ridge penalty in force."""
-        return _DEFAULT_RIDGE[self.fit] if self.ridge is None else float(self.ridge)
 
     @property
     def basis(self) -> GaussianBasis:

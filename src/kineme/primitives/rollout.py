@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
 from kineme.parallel import for_tiles
+from kineme.primitives.batch import Batch
 from kineme.primitives.operators import decoder
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_number, describe
@@ -24,7 +25,7 @@ _LONGEST = 10.0  # durations after which a movement that has not settled will no
 _SETTLING_SAMPLES = 400
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rollout:
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
 
@@ -49,6 +50,9 @@ class Rollout:
     def __len__(self) -> int:
         return len(self.starts)
 
+    def __repr__(self) -> str:
+        return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
+
     @property
     def times(self) -> Array:
         """Times of the samples (n, T) [s]."""
@@ -72,11 +76,7 @@ class Rollout:
     @property
     def trajectories(self) -> Demonstrations:
         """The movements as `Demonstrations`, with the labels and names of their primitives."""
-        labels, names = self.primitives.labels, self.primitives.names
-        if len(self.primitives) < len(self):
-            labels = None if labels is None else np.repeat(labels, len(self))
-            names = None if names is None else names * len(self)
-        return Demonstrations.from_arrays(self.positions, labels, list(self.times), names, copy=False)
+        return as_demonstrations(self.primitives, self.times, self.positions)
 
     def _derivative(self, order: int) -> Array:
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
@@ -105,6 +105,15 @@ class Rollout:
 
         for_tiles(tile, len(self), max(1, _TILE_SAMPLES // (d * self.n_samples)))
         return result.transpose(0, 2, 1)
+
+
+def as_demonstrations(primitives: Batch, times: Array, positions: Array) -> Demonstrations:
+    """Generated movements (n, T), (n, T, d) with labels and names of their primitives, one for each or one for all."""
+    labels, names = primitives.labels, primitives.names
+    if len(primitives) < len(positions):
+        labels = None if labels is None else np.repeat(labels, len(positions))
+        names = None if names is None else names * len(positions)
+    return Demonstrations.from_arrays(positions, labels, list(times), names, copy=False)
 
 
 def rollout(
@@ -143,10 +152,15 @@ def rollout(
 
 
 def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
-    """A wish as (1, d) or (n, d), durations as (1,) or (n,)."""
+    """A wish as (1, d) or (n, d), durations as (1,) or (n,); a number serves a movement of one dimension."""
     if wish is None:
         return None
-    value = np.asarray(wish, dtype=np.float64)
+    try:
+        value = np.asarray(wish, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f"expected numbers for {name}, got {wish!r}") from error
+    if n_dims == 1 and value.ndim == 0:
+        value = value[None]
     if n_dims is None:
         value = value[None] if value.ndim == 0 else value
         fits = value.ndim == 1

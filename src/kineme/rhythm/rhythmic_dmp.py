@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kineme.primitives.fits import FITS
+from kineme.primitives.spring_damper import SpringDamper
 from kineme.rhythm.basis import VonMisesBasis
+from kineme.trajectories.preprocess import check_steps
 from kineme.validation import check_choice, check_count, check_number
 
 if TYPE_CHECKING:
     from kineme.rhythm.primitives import RhythmicPrimitives
 
 APERIODIC = ("raise", "accept")
-_DEFAULT_RIDGE = {"forcing": 1e-8, "trajectory": 1e-6}
 
 
 @dataclass(frozen=True)
-class RhythmicDMP:
+class RhythmicDMP(SpringDamper):
     """A rhythmic Dynamical Movement Primitive, as a frozen specification: a limit cycle that attracts.
 
     With the phase ``phi = 2 pi t / period`` shared by all dimensions, and in time u = t / period (' = d/du),
@@ -96,32 +96,14 @@ class RhythmicDMP:
     def __post_init__(self) -> None:
         check_choice("fit", self.fit, FITS)
         check_choice("aperiodic", self.aperiodic, APERIODIC)
-        check_number("stiffness", self.stiffness, above=0.0)
-        for name in ("damping", "period"):
-            if getattr(self, name) is not None:
-                check_number(name, getattr(self, name), above=0.0)
-        if self.ridge is not None:
-            check_number("ridge", self.ridge, least=0.0)
+        self._check_spring_damper()
+        if self.period is not None:
+            check_number("period", self.period, above=0.0)
         if self.align_on is not None:
             check_count("align_on", self.align_on, 0)
         _ = self.basis  # checks its own parameters
         check_count("n_points", self.n_points, 2 * self.n_basis)
-        object.__setattr__(self, "preprocessing", tuple(self.preprocessing))
-
-    @property
-    def K(self) -> float:
-        """Stiffness."""
-        return float(self.stiffness)
-
-    @property
-    def D(self) -> float:
-        """Damping."""
-        return 2.0 * math.sqrt(self.stiffness) if self.damping is None else float(self.damping)
-
-    @property
-    def ridge_strength(self) -> float:
-        """The ridge penalty in force."""
-        return _DEFAULT_RIDGE[self.fit] if self.ridge is None else float(self.ridge)
+        object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
 
     @property
     def basis(self) -> VonMisesBasis:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.primitives.response import transition
-from kineme.primitives.rollout import broadcast_length, per_movement
+from kineme.primitives.rollout import as_demonstrations, broadcast_length, per_movement
 from kineme.rhythm.harmonics import as_real, waves
 from kineme.rhythm.operators import limit_cycle
 from kineme.trajectories.demonstrations import Demonstrations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from kineme.rhythm.primitives import RhythmicPrimitives
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RhythmicRollout:
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
 
@@ -42,6 +42,9 @@ class RhythmicRollout:
 
     def __len__(self) -> int:
         return len(self.baselines)
+
+    def __repr__(self) -> str:
+        return f"RhythmicRollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
 
     @property
     def times(self) -> Array:
@@ -66,11 +69,7 @@ class RhythmicRollout:
     @property
     def trajectories(self) -> Demonstrations:
         """The movements as `Demonstrations`, with the labels and names of their primitives."""
-        labels, names = self.primitives.labels, self.primitives.names
-        if len(self.primitives) < len(self):
-            labels = None if labels is None else np.repeat(labels, len(self))
-            names = None if names is None else names * len(self)
-        return Demonstrations.from_arrays(self.positions, labels, list(self.times), names, copy=False)
+        return as_demonstrations(self.primitives, self.times, self.positions)
 
     @property
     def _u(self) -> Array:

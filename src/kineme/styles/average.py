@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
 from kineme.primitives.primitives import Primitives
-from kineme.styles.numbers import from_numbers, map_rows, path_matrix, shared_label, to_numbers
+from kineme.styles.numbers import check_primitives, from_numbers, map_rows, path_matrix, shared_label, to_numbers
 from kineme.validation import Array, check_choice, check_count
 
 _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
@@ -99,6 +99,7 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
     TrajectoryError
         No primitive, or weights of the wrong number, negative, not finite, or all zero.
     """
+    check_primitives(primitives)
     p = _shares(weights, len(primitives))
     tempo = np.log(primitives.durations / primitives.durations[0])
     theta = np.column_stack((to_numbers(primitives).reshape(len(p), -1), tempo))
@@ -121,6 +122,7 @@ def average_by_label(primitives: Primitives) -> dict[Any, AveragePrimitive]:
     TrajectoryError
         Primitives without labels.
     """
+    check_primitives(primitives)
     if primitives.labels is None:
         raise TrajectoryError(
             "expected labeled primitives, got none with a label; learn them from demonstrations with labels, "

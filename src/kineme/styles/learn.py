@@ -19,7 +19,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.primitives import Primitives
 from kineme.styles.metrics import METRICS, compared
 from kineme.styles.model import StyleModel
-from kineme.styles.numbers import shared_label, to_numbers
+from kineme.styles.numbers import check_primitives, shared_label, to_numbers
 from kineme.validation import Array, check_choice, check_count, check_number
 
 
@@ -55,6 +55,7 @@ def learn_styles(
     SpecificationError
         More styles than the demonstrations can tell apart; both `n_styles` and `variance`; a parameter out of range.
     """
+    check_primitives(primitives)
     check_choice("metric", metric, list(METRICS))
     if len(primitives) < 2:
         raise TrajectoryError(f"expected at least 2 demonstrations to learn styles from, got {len(primitives)}")

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import TrajectoryError
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import decoder
 from kineme.primitives.primitives import Primitives
@@ -26,9 +27,19 @@ from kineme.validation import Array
 
 def to_numbers(primitives: Primitives) -> Array:
     """The numbers theta of each primitive, shape (n, d, N + 3)."""
+    check_primitives(primitives)
     tangents = primitives.velocities * primitives.durations[:, None]  # dx/du at the start
     rest = np.stack((primitives.starts, primitives.goals, tangents), axis=2)
     return np.concatenate((primitives.scaled_weights, rest), axis=2)
+
+
+def check_primitives(primitives: Any) -> None:
+    """Refuse movements that are not learned yet, and rhythms and poses, which are no such numbers."""
+    if not isinstance(primitives, Primitives):
+        raise TrajectoryError(
+            f"expected kineme.Primitives, got {type(primitives).__name__}; learn movements first, "
+            "kineme.DMP().learn(movements), and take the tangent of pose primitives"
+        )
 
 
 def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) -> Primitives:
