@@ -45,7 +45,7 @@ class Motion:
 
 
 def observe(recording: Trajectory, resolution: float) -> Motion:
-    """Smooth a recording until its noise moves at a third of ``resolution * peak``, and measure its speed.
+    """Smooth a recording until its noise moves at a quarter of ``resolution * peak``, and measure its speed.
 
     White noise of variance sigma^2 per dimension, sampled at rate r, passes the smoothing spline (see `Smooth`) of
     cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
@@ -76,7 +76,7 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
         speed = np.linalg.norm(np.gradient(smooth, t, axis=0), axis=1)
         peak = peak_speed(speed, t)
         noise = float(np.sqrt(passed * cutoff**3))
-        aim = resolution * peak / 3.0
+        aim = resolution * peak / 4.0
         if noise <= 1.05 * aim or cutoff <= slowest:
             break
         cutoff = max((aim**2 / passed) ** (1.0 / 3.0), slowest)

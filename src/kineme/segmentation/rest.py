@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.segmentation.bouts import Rows, durations_of, join_across, moving_bouts, typical_duration
+from kineme.segmentation.bouts import Rows, consecutive, durations_of, join_across, moving_bouts, typical_duration
 from kineme.segmentation.motion import Motion
+from kineme.segmentation.onset import onset_rows
 from kineme.validation import check_number
 
-_MIN_REST, _MIN_MOVEMENT = 0.05, 0.1  # of the typical duration of a movement
+_MIN_REST, _MIN_MOVEMENT = 0.02, 0.1  # of the typical duration of a movement
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Rest:
         Share of the recording's peak speed below which it rests. A movement that never exceeds twice this share is
         not seen: lower it where slow and fast movements share a recording.
     min_rest : float, optional
-        A shorter rest is a pause within a movement [s]; by default a twentieth of the typical movement. A movement that
-        stops and turns back smoothly spends about as long below the default speed.
+        A shorter rest is a pause within a movement [s]; by default a fiftieth of the typical movement. Measured
+        between extrapolated ends, so that to stop and turn back smoothly is not a rest, however slow.
     min_movement : float, optional
         A shorter movement is a twitch within a rest [s]; by default a tenth of the typical movement.
 
@@ -75,6 +76,9 @@ class Rest:
         bouts = moving_bouts(motion.speed, low, 2.0 * low)
         if not len(bouts):  # motion so even and slow that nothing stands out
             return np.array([[0, len(motion.times)]]), np.array([True])
+        # How long it rests is judged between extrapolated ends: for a movement that stops and turns back smoothly that is
+        # not at all, however long it is slow.
+        bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
         typical = typical_duration(durations_of(bouts, motion.times))
         bouts = join_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
         lasting = durations_of(bouts, motion.times)

@@ -1,0 +1,152 @@
+"""Known movements inside one long recording, with unknown between them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.segmentation.bouts import Rows
+from kineme.segmentation.motion import Motion, observe
+from kineme.segmentation.rest import Rest
+from kineme.segmentation.segment import as_recording, moving
+from kineme.segmentation.segmentation import pieces_of
+from kineme.segmentation.speed_minima import SpeedMinima
+from kineme.trajectories.trajectory import Trajectory
+from kineme.validation import Array, check_count, check_number
+
+if TYPE_CHECKING:
+    from kineme.recognition.recognizer import Recognizer
+
+_MIN_SAMPLES = 8
+_TEMPO = 3.0  # a movement lasts between a third and three times what was demonstrated
+_IMPOSTOR = -4.0  # log similarity of a typical impostor: the kernels' width is 0.35 of its distance
+_PER_MOVEMENT = 0.2  # cost of one more movement, in typical durations: one long movement rather than three short ones
+
+
+class Spotted(NamedTuple):
+    """One stretch of motion: from when to when [s], what it is (None: no known movement), and how sure.
+
+    `confidence` is the p-value of the label, or for None one minus the largest p-value of any.
+    """
+
+    start: float
+    end: float
+    label: Any
+    confidence: float
+
+
+def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
+    """Find the movements that a recognizer knows in a recording; see `Recognizer.spot`."""
+    check_number("error_rate", error_rate, above=0.0)
+    if error_rate >= 1:
+        raise SpecificationError(f"expected error_rate below 1, got {error_rate!r}; 0.05 is five in a hundred")
+    check_count("max_pieces", max_pieces, 1)
+    whole = as_recording(recording)
+    if whole.n_dims != recognizer.n_dims_:
+        raise TrajectoryError(
+            f"expected a recording of {recognizer.n_dims_} dimensions as in fit, got {whole.n_dims}; "
+            "select the dimensions"
+        )
+    atoms, bout = _atoms(whole)
+    first, last = _unions(len(atoms), max_pieces)
+    rows = np.column_stack((atoms[first, 0], atoms[last, 1]))
+    long_enough = rows[:, 1] - rows[:, 0] >= _MIN_SAMPLES
+    first, last, rows = first[long_enough], last[long_enough], rows[long_enough]
+    if not len(rows):
+        return []
+    best, p, score = _recognized(recognizer, whole, rows, error_rate)
+    chosen = _best_chain(first, last, score, len(atoms))
+    found = [(first[c], last[c], recognizer.classes_[best[c]], float(p[c, best[c]])) for c in chosen]
+    unknown = _left_over(first, last, chosen, bout)
+    p_of = {(a, b): float(row.max()) for a, b, row in zip(first.tolist(), last.tolist(), p, strict=True)}
+    found += [(a, b, None, 1.0 - p_of.get((a, b), 0.0)) for a, b in unknown]
+    t = whole.times
+    return [
+        Spotted(float(t[atoms[a, 0]]), float(t[atoms[b, 1] - 1]), *rest) for a, b, *rest in sorted(found, key=_start)
+    ]
+
+
+def _start(found: tuple[Any, ...]) -> int:
+    return int(found[0])
+
+
+def _atoms(recording: Trajectory) -> tuple[Rows, NDArray[np.intp]]:
+    """The smallest pieces, rows (n, 2), and which stretch between rests each is from."""
+    rest, minima = Rest(), SpeedMinima(depth=0.5)
+    motion: Motion = observe(recording, min(rest.resolution, minima.resolution))
+    bouts = moving(motion, rest.pieces(motion), rest.resolution)
+    cuts = minima.inner_cuts(motion)
+    of = np.searchsorted(bouts[:, 0], cuts, side="right") - 1
+    inside = (of >= 0) & (cuts - _MIN_SAMPLES > bouts[of, 0]) & (cuts + _MIN_SAMPLES < bouts[of, 1])
+    starts = np.sort(np.concatenate((bouts[:, 0], cuts[inside])))
+    stops = np.sort(np.concatenate((bouts[:, 1], cuts[inside])))
+    return np.column_stack((starts, stops)), np.searchsorted(bouts[:, 0], starts, side="right") - 1
+
+
+def _unions(n: int, longest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and last piece of every run of at most `longest` neighbors."""
+    first, length = np.meshgrid(np.arange(n), np.arange(min(longest, n)), indexing="ij")
+    last = first + length
+    return first[last < n], last[last < n]
+
+
+def _recognized(
+    recognizer: Recognizer, whole: Trajectory, rows: Rows, error_rate: float
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Best class, p-values (n, C), and score of each candidate; the score is positive where it counts as known."""
+    candidates = pieces_of(whole, rows)
+    logs = np.maximum.reduceat(recognizer.log_similarity(candidates), recognizer.first_, axis=1)
+    p = _p_values(recognizer, candidates, logs)
+    durations = whole.times[rows[:, 1] - 1] - whole.times[rows[:, 0]]
+    demos = recognizer.demonstrations_
+    if demos.movements.times is not None:  # else durations of the demonstrations are not known
+        shortest = np.minimum.reduceat(demos.durations, recognizer.first_) / _TEMPO
+        longest = np.maximum.reduceat(demos.durations, recognizer.first_) * _TEMPO
+        plausible = (durations[:, None] >= shortest) & (durations[:, None] <= longest)
+        p, logs = np.where(plausible, p, 0.0), np.where(plausible, logs, -np.inf)
+    best = logs.argmax(axis=1)
+    one = np.arange(len(rows))
+    closeness = np.maximum(1.0 - logs[one, best] / _IMPOSTOR, 0.0)
+    typical = float(np.median(durations))
+    score = closeness * durations - _PER_MOVEMENT * typical
+    return best, p, np.where(p[one, best] >= error_rate, score, 0.0)
+
+
+def _p_values(recognizer: Recognizer, candidates: Any, logs: Array) -> Array:
+    return np.where(logs > 0.5 * _IMPOSTOR, np.exp(logs), 0.0)
+
+
+def _best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
+    """Candidates that do not overlap, of largest summed score: dynamic programming over the pieces."""
+    total = np.zeros(n + 1)  # of the best chain within the first j pieces
+    taken = np.full(n + 1, -1)
+    ending = np.split(np.argsort(last, kind="stable"), np.cumsum(np.bincount(last, minlength=n))[:-1])
+    for j, here in enumerate(ending):
+        values = total[first[here]] + score[here]
+        total[j + 1] = total[j]
+        if len(here) and values.max() > total[j]:
+            total[j + 1], taken[j + 1] = values.max(), here[values.argmax()]
+    chain, j = [], n
+    while j > 0:
+        if taken[j] < 0:
+            j -= 1
+        else:
+            chain.append(int(taken[j]))
+            j = int(first[taken[j]])
+    return chain[::-1]
+
+
+def _left_over(
+    first: NDArray[np.intp], last: NDArray[np.intp], chosen: list[int], bout: NDArray[np.intp]
+) -> list[tuple[int, int]]:
+    """Runs of pieces that no chosen candidate holds, each from one stretch between rests."""
+    free = np.ones(len(bout), dtype=bool)
+    for c in chosen:
+        free[first[c] : last[c] + 1] = False
+    kind = np.where(free, bout, -1)
+    edges = np.flatnonzero(np.diff(np.concatenate(([-1], kind, [-1]))))
+    return [(int(a), int(b) - 1) for a, b in pairwise(edges) if kind[a] >= 0]
