@@ -6,19 +6,13 @@ from dataclasses import fields, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, TransformerMixin
-from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import TrajectoryError
-from kineme.features.dmp_features import FEATURES, features_of
+from kineme.features.movement_features import MovementFeatures
 from kineme.rhythm.rhythmic_dmp import RhythmicDMP
-from kineme.trajectories.axes import axis_names
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import check_choice, check_count
 
 
-class RhythmicFeatures(TransformerMixin, BaseEstimator):
+class RhythmicFeatures(MovementFeatures):
     """Describe each recording by its rhythmic DMP: one cycle, whatever part of it came first, rows as in Eq. (9).
 
     Parameters
@@ -83,9 +77,7 @@ class RhythmicFeatures(TransformerMixin, BaseEstimator):
         TrajectoryError
             Recordings that cannot be used; see `RhythmicDMP.learn`.
         """
-        check_choice("feature", self.feature, list(FEATURES))
-        check_count("n_samples", self.n_samples, 2)
-        check_choice("dtype", self.dtype, ("float64", "float32"))
+        self._check_parameters()
         shared = {field.name for field in fields(RhythmicDMP)} - {"fit"}
         dmp = RhythmicDMP(fit=self.fit_to, **{name: getattr(self, name) for name in shared})
         demonstrations = Demonstrations.of(X)
@@ -95,33 +87,3 @@ class RhythmicFeatures(TransformerMixin, BaseEstimator):
         self.dmp_ = dmp
         self.n_dims_ = demonstrations.n_dims
         return self
-
-    def transform(self, X: Any) -> NDArray[Any]:
-        """Features of recordings, shape (n, d * S), or (n, d * N) for weights.
-
-        Raises
-        ------
-        TrajectoryError
-            Recordings that cannot be used, or of other dimensions than those of `fit`.
-        """
-        check_is_fitted(self)
-        demonstrations = Demonstrations.of(X)
-        if demonstrations.n_dims != self.n_dims_:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims_} dimensions as in fit, got {demonstrations.n_dims}; "
-                "fit again, or select the dimensions"
-            )
-        return features_of(self.dmp_.learn(demonstrations), self.feature, self.n_samples).astype(self.dtype, copy=False)
-
-    def get_feature_names_out(self, input_features: Any = None) -> NDArray[Any]:
-        """Names x_1 ... x_S, y_1 ... y_S; beyond three dimensions q1_1 ... q1_S, q2_1 ..."""
-        check_is_fitted(self)
-        size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
-        names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
-        return np.array(names, dtype=object)
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.input_tags.two_d_array = False
-        tags.input_tags.three_d_array = True
-        return tags
