@@ -148,6 +148,33 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
+    def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Any]:
+        """Find known movements in one long recording, with unknown between them.
+
+        The recording is cut finely, at rests and at minima of speed; every run of neighboring pieces is a candidate, all
+        are recognized in one batch, and the chain of candidates that do not overlap with the largest summed score is
+        chosen. A candidate of similarity K scores its duration times ``1 - log K / log K_impostor``, less a fixed cost.
+
+        Parameters
+        ----------
+        recording : Trajectory or array_like of shape (T, d)
+            Unlabeled; pass a `Trajectory`, the time stamps matter.
+        error_rate : float, default 0.05
+            Share of true movements that may be called unknown.
+        max_pieces : int, default 8
+            Most pieces that one movement may consist of; cost grows with it.
+
+        Returns
+        -------
+        list of Spotted
+            ``(start, end, label, confidence)`` in order of time; label None is motion of no known kind. Rests are left
+            out. A movement is looked for between a third and three times the durations demonstrated for it.
+        """
+        from kineme.recognition.spotting import spot
+
+        check_is_fitted(self)
+        return list(spot(self, recording, error_rate, max_pieces))
+
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:
             return float(self.max_angle)

@@ -100,7 +100,7 @@ def _recognized(
     """Best class, p-values (n, C), and score of each candidate; the score is positive where it counts as known."""
     candidates = pieces_of(whole, rows)
     logs = np.maximum.reduceat(recognizer.log_similarity(candidates), recognizer.first_, axis=1)
-    p = _p_values(recognizer, candidates, logs)
+    p = recognizer.p_values(candidates) if hasattr(recognizer, "p_values") else _p_values(logs)
     durations = whole.times[rows[:, 1] - 1] - whole.times[rows[:, 0]]
     demos = recognizer.demonstrations_
     if demos.movements.times is not None:  # else durations of the demonstrations are not known
@@ -116,7 +116,7 @@ def _recognized(
     return best, p, np.where(p[one, best] >= error_rate, score, 0.0)
 
 
-def _p_values(recognizer: Recognizer, candidates: Any, logs: Array) -> Array:
+def _p_values(logs: Array) -> Array:
     return np.where(logs > 0.5 * _IMPOSTOR, np.exp(logs), 0.0)
 
 
