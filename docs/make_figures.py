@@ -10,7 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import kineme
+from kineme.control import ObstacleAvoidance
 from kineme.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
+from kineme.styles.figure import draw_morph
 
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
 LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
@@ -69,7 +71,35 @@ def many_goals() -> Figure:
     return figure
 
 
-FIGURES = {"three-issues": three_issues, "many-goals": many_goals}
+def around_obstacles() -> Figure:
+    """A handwritten G and its replay around two obstacles."""
+    primitive = kineme.DMP("bio-inspired", fit="trajectory").learn(kineme.load_lasa(["GShape"])[3:4])
+    obstacles = np.array([[-27.0, 0.0], [10.0, -21.0]])
+    figure = new_figure(4.2, 3.8)
+    axes = figure.subplots()
+    axes.plot(*primitive.rollout().positions[0].T, color=GRAY, linewidth=4, alpha=0.5, label="demonstrated")
+    for gamma, color, line in zip((500, 1500, 4500), (BLUE, ORANGE, GREEN), ("-", "--", ":"), strict=True):
+        control = primitive.controller(dt=0.005, avoidance=ObstacleAvoidance(gamma=gamma, reach=10.0))
+        steps = round(float(primitive.durations[0]) / 0.005)
+        path = np.array([control.step(obstacles=obstacles).position for _ in range(steps)])
+        axes.plot(*path.T, color=color, linestyle=line, label=f"γ = {gamma}")
+    axes.plot(*obstacles.T, "X", color="black", markersize=9, linestyle="none", label="obstacle")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
+def styles() -> Figure:
+    """Movements between two styles that were recorded under one name."""
+    return draw_morph(kineme.DMP("bio-inspired").learn(kineme.load_lasa(["Multi_Models_3"])))
+
+
+FIGURES = {
+    "around-obstacles": around_obstacles,
+    "styles": styles,
+    "three-issues": three_issues,
+    "many-goals": many_goals,
+}
 
 
 def main(folder: Path) -> None:

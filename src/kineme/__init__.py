@@ -10,7 +10,7 @@ from typing import Any as _Any
 __version__ = "0.1.0"
 
 if _TYPE_CHECKING:
-    from kineme import datasets, kernels, orientation, styles
+    from kineme import control, datasets, kernels, orientation, styles
     from kineme.datasets.lasa import load_lasa
     from kineme.errors import (
         DataError,
@@ -46,6 +46,7 @@ _HOME = {
     "load_lasa": "kineme.datasets.lasa",
     "DMP": "kineme.primitives.dmp",
     "Primitives": "kineme.primitives.primitives",
+    "control": "kineme",
     "RhythmicDMP": "kineme.rhythm.rhythmic_dmp",
     "DMPFeatures": "kineme.features.dmp_features",
     "RhythmicFeatures": "kineme.features.rhythmic_features",
@@ -63,7 +64,7 @@ _HOME = {
 
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
-    "DMP", "Primitives", "RhythmicDMP", "orientation", "styles",
+    "DMP", "Primitives", "control", "RhythmicDMP", "orientation", "styles",
     "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
