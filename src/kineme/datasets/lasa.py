@@ -32,6 +32,9 @@ LASA_26 = (
     "Trapezoid", "WShape", "Worm", "Zshape", "heee",
 )  # fmt: skip
 
+#: All thirty names, with the four that hold several shapes each.
+LASA_30 = (*LASA_26, *(f"Multi_Models_{k}" for k in range(1, 5)))
+
 
 def load_lasa(shapes: Iterable[str] | None = None) -> Demonstrations:
     """Load LASA handwriting demonstrations, labeled with their shape.
