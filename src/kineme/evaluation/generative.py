@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.evaluation.neighbors import standard_paths
-from kineme.evaluation.optional import require
+from kineme.evaluation.optional import optional_module
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
@@ -26,7 +26,7 @@ class HiddenMarkov:
 
     def fit(self, demonstrations: Demonstrations) -> None:
         """Learn one model per class."""
-        require("hmmlearn")
+        self.hmm = optional_module("hmmlearn.hmm")
         logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it reports steps of EM that are smaller than rounding
         labels = require_labels(demonstrations)
         series = _series(demonstrations)
@@ -34,10 +34,8 @@ class HiddenMarkov:
         self.models = [self._model(series[labels == label]) for label in self.classes]
 
     def _model(self, series: Array) -> Any:
-        from hmmlearn.hmm import GaussianHMM
-
         n, length, d = series.shape
-        model = GaussianHMM(
+        model = self.hmm.GaussianHMM(
             _N_STATES, "diag", min_covar=_MIN_VARIANCE, n_iter=10, init_params="", params="tmc", random_state=self.seed
         )
         stay = 1.0 - _N_STATES / length

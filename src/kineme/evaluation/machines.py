@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.evaluation.neighbors import standard_paths
-from kineme.evaluation.optional import require
+from kineme.evaluation.optional import optional_module
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
@@ -30,14 +30,11 @@ class AlignmentSVM:
 
     def fit(self, demonstrations: Demonstrations) -> None:
         """Learn from labeled movements."""
-        require("tslearn")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it warns of formats that are not asked for
-            from tslearn.metrics import sigma_gak
         from sklearn.svm import SVC
 
+        self.metrics = optional_module("tslearn.metrics")
         self.stored = self._series(demonstrations)
-        self.width = float(sigma_gak(self.stored, random_state=self.seed))
+        self.width = float(self.metrics.sigma_gak(self.stored, random_state=self.seed))
         self.model = SVC(kernel="precomputed", C=_PENALTY)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # many classes of few movements are meant
@@ -49,9 +46,7 @@ class AlignmentSVM:
         return np.asarray(self.model.predict(gram)), _familiarity(self.model.decision_function(gram))
 
     def _gram(self, series: Array) -> Array:
-        from tslearn.metrics import cdist_gak
-
-        return np.asarray(cdist_gak(series, self.stored, sigma=self.width))
+        return np.asarray(self.metrics.cdist_gak(series, self.stored, sigma=self.width))
 
     @staticmethod
     def _series(demonstrations: Demonstrations) -> Array:
@@ -66,10 +61,8 @@ class MiniRocket:
 
     def fit(self, demonstrations: Demonstrations) -> None:
         """Learn from labeled movements."""
-        require("aeon")
-        from aeon.classification.convolution_based import MiniRocketClassifier
-
-        self.model = MiniRocketClassifier(random_state=self.seed, n_jobs=1)
+        aeon = optional_module("aeon.classification.convolution_based")
+        self.model = aeon.MiniRocketClassifier(random_state=self.seed, n_jobs=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # many classes of few movements are meant
             self.model.fit(standard_paths(demonstrations), require_labels(demonstrations))

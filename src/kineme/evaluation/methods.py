@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from kineme.evaluation.generative import HiddenMarkov
 from kineme.evaluation.machines import AlignmentSVM, MiniRocket
 from kineme.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures, PointCloud
+from kineme.evaluation.optional import why_missing
 from kineme.evaluation.ours import Ours
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
@@ -64,7 +64,7 @@ class Method:
         """Why the method cannot take part, or ""."""
         if self.only_dims not in (None, n_dims):
             return f"works in {self.only_dims} dimensions only"
-        return f"not installed: {self.needs}" if self.needs and find_spec(self.needs) is None else ""
+        return why_missing(self.needs) if self.needs else ""
 
 
 OURS = "kineme"
@@ -75,9 +75,11 @@ METHODS: dict[str, Method] = {
     "paper": Method("paper, original form", lambda _: PaperFeatures("original", "shape-attractor")),
     "paper-bio": Method("paper, bio-inspired form", lambda _: PaperFeatures("bio-inspired", "forcing")),
     "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor()),
-    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance"),
-    "gak-svm": Method("GAK-SVM", lambda wishes: AlignmentSVM(wishes.seed), needs="tslearn"),
-    "minirocket": Method("MiniRocket + ridge", lambda wishes: MiniRocket(wishes.seed), needs="aeon"),
+    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim"),
+    "gak-svm": Method("GAK-SVM", lambda wishes: AlignmentSVM(wishes.seed), needs="tslearn.metrics"),
+    "minirocket": Method(
+        "MiniRocket + ridge", lambda wishes: MiniRocket(wishes.seed), needs="aeon.classification.convolution_based"
+    ),
     "point-cloud": Method("$P point cloud", lambda _: PointCloud(), needs="dollarpy", only_dims=2, slow=True),
-    "hmm": Method("HMM", lambda wishes: HiddenMarkov(wishes.seed), needs="hmmlearn"),
+    "hmm": Method("HMM", lambda wishes: HiddenMarkov(wishes.seed), needs="hmmlearn.hmm"),
 }

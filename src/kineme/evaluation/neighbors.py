@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from kineme.errors import DegenerateMovementWarning
-from kineme.evaluation.optional import require
+from kineme.evaluation.optional import optional_module
 from kineme.features.dmp_features import DMPFeatures
 from kineme.recognition.normalization import Normalization
 from kineme.trajectories.arc_length import arc_length_phase, resample_by_phase
@@ -75,9 +75,7 @@ class DTWNeighbor(_Nearest):
         return np.ascontiguousarray(standard_paths(demonstrations).transpose(0, 2, 1))
 
     def distances(self, A: Array, B: Array) -> Array:  # noqa: D102 - see _Nearest
-        require("dtaidistance")
-        from dtaidistance import dtw_ndim
-
+        dtw_ndim = optional_module("dtaidistance.dtw_ndim")
         n, window = len(A), round(_BAND * N_POINTS)
         both, block = np.concatenate((A, B)), ((0, n), (n, n + len(B)))
         whole = dtw_ndim.distance_matrix_fast(both, block=block, window=window, parallel=False)
@@ -96,13 +94,11 @@ class PointCloud(_Nearest):
         return np.array([self._from_one(one, B) for one in A])
 
     def _from_one(self, one: Array, B: Array) -> Array:
-        require("dollarpy")
-        from dollarpy import Point, Recognizer, Template
-
+        dollarpy = optional_module("dollarpy")
         # A recognizer per pair, and fresh lists: it inserts points into those it is given.
-        points = [[Point(x, y) for x, y in path.T.tolist()] for path in (one, *B)]
+        points = [[dollarpy.Point(x, y) for x, y in path.T.tolist()] for path in (one, *B)]
         found = []
         for cloud in points[1:]:
-            _, score = Recognizer([Template("other", cloud)]).recognize(list(points[0]), _CLOUD)
+            _, score = dollarpy.Recognizer([dollarpy.Template("other", cloud)]).recognize(list(points[0]), _CLOUD)
             found.append(2.0 - 2.0 * score)
         return np.array(found)
