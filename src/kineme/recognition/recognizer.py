@@ -151,7 +151,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Any]:
         """Find known movements in one long recording, with unknown between them.
 
-        The recording is cut finely, at rests and at minima of speed; every run of neighboring pieces is a candidate, all
+        The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all
         are recognized in one batch, and the chain of candidates that do not overlap with the largest summed score is
         chosen. A candidate of similarity K scores its duration times ``1 - log K / log K_impostor``, less a fixed cost.
 
