@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import RhythmicDMP, SpecificationError, TrajectoryError
+from kineme.control.state import Status
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +95,31 @@ def test_a_change_that_cannot_be_is_refused_and_nothing_changes(learned, name, v
 def test_the_step_is_a_positive_number(learned):
     with pytest.raises(SpecificationError, match="expected dt to be a number above 0, got -1"):
         learned.controller(-1)
+
+
+def test_a_measurement_is_where_the_movement_goes_on(learned):
+    one, other = learned.controller(0.01), learned.controller(0.01)
+    where, speed = one.positions + 2.0, one.velocities * 0.5
+    other.positions, other.velocities = where, speed
+    np.testing.assert_array_equal(one.step(where, speed), other.step())
+    np.testing.assert_array_equal(one.step([3.0, 1.0]), other.step(np.tile([3.0, 1.0], (2, 1))))
+    assert one.status == Status.MOVING
+
+
+class Broken:
+    def __array__(self, *_, **__):
+        raise RuntimeError("the driver died")
+
+
+BAD = [[np.nan, 0.0], np.ones(3), np.ones((3, 2)), "left", [1e300, 0.0], 1.0, [], object(), Broken()]
+
+
+@pytest.mark.parametrize("value", BAD, ids=repr)
+@pytest.mark.parametrize("name", ["position", "velocity"])
+def test_a_measurement_that_cannot_be_used_is_left_out_and_said_so(learned, name, value):
+    one, other = learned.controller(0.01), learned.controller(0.01)
+    for k in range(4):
+        bad = {name: value} if k == 2 else {}
+        np.testing.assert_array_equal(one.step(**bad), other.step())
+        assert one.status == (Status.MOVING | Status.MEASUREMENT_REJECTED if bad else Status.MOVING)
+        assert one.status.rejected is bool(bad)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.control.inputs import usable
+from kineme.control.state import Status
 from kineme.errors import TrajectoryError
 from kineme.primitives.response import transition
 from kineme.primitives.rollout import per_movement
@@ -57,11 +59,14 @@ class RhythmicController:
     baseline : ndarray of shape (n, d)
     amplitude, period : ndarray of shape (n,)
         A number sets all of them.
+    status : kineme.control.Status
+        Of the last step: MOVING, and MEASUREMENT_REJECTED where a measurement could not be used.
     """
 
     def __init__(self, primitives: RhythmicPrimitives, dt: float, phase: ArrayLike = 0.0) -> None:
         check_number("dt", dt, above=0.0)
         self._primitives, self._dt = primitives, float(dt)
+        self.status = Status.MOVING
         self.baseline = primitives.baselines
         self.amplitude = primitives.amplitudes
         self.period = primitives.periods
@@ -71,8 +76,18 @@ class RhythmicController:
         self._positions: Array = self._baseline + here[0]
         self._velocities: Array = here[1] / self._period[:, None]
 
-    def step(self) -> Array:
-        """Go on by ``dt``; returns the positions (n, d), a copy."""
+    def step(self, position: Any = None, velocity: Any = None) -> Array:
+        """Go on by ``dt``; returns the positions (n, d), a copy. Never raises, whatever a sensor delivers.
+
+        Parameters
+        ----------
+        position, velocity : array_like of shape (d,) or (n, d), optional
+            Measured now, before the step: the movement goes on from there. What cannot be used is left out, and
+            `status` says so.
+        """
+        self.status = Status.MOVING
+        self._positions = self._measured(position, self._positions)
+        self._velocities = self._measured(velocity, self._velocities)
         carry, impulse, turns, n_steps = self._stepping
         weights = self._primitives.scaled_weights * (self._amplitude / self._primitives.amplitudes)[:, None, None]
         state = np.stack((self._positions - self._baseline, self._velocities * self._period[:, None]), axis=1)
@@ -84,6 +99,18 @@ class RhythmicController:
         self._positions = state[:, 0] + self._baseline
         self._velocities = state[:, 1] / self._period[:, None]
         return self.positions
+
+    def _measured(self, value: Any, last: Array) -> Array:
+        if value is None:
+            return last
+        try:
+            array = self._vectors(value, "position")
+        except Exception:  # whatever a driver hands over, the motion goes on
+            array = None
+        if array is not None and usable(array):
+            return array
+        self.status |= Status.MEASUREMENT_REJECTED
+        return last
 
     @property
     def positions(self) -> Array:  # noqa: D102 - documented by the class
