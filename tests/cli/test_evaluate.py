@@ -1,0 +1,90 @@
+"""``kineme evaluate`` as a user runs it."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
+from kineme.evaluation.methods import METHODS
+from kineme.evaluation.protocols import PROTOCOLS
+from kineme.io.movements import write_movement
+
+
+def run(*arguments):
+    command = [sys.executable, "-W", "error", "-m", "kineme", "evaluate", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, make_movement):
+    folder = tmp_path_factory.mktemp("a folder of Ünïcode")
+    for k, label in enumerate(("wave", "point", "stir", "push")):
+        (folder / label).mkdir()
+        for i in range(3):
+            t, x = make_movement([k, 0], n_samples=50)
+            write_movement(folder / label / f"{i}.csv", {"times": t, "positions": (1 + 0.1 * i) * x})
+    (folder / "wave" / "notes.txt").write_text("not a movement")
+    return folder
+
+
+def test_the_names_are_those_of_the_tables():
+    assert tuple(PROTOCOLS) == PROTOCOL_NAMES
+    assert tuple(METHODS) == METHOD_NAMES
+
+
+def test_a_folder_of_recordings_is_evaluated(folder, tmp_path):
+    done = run(folder, "--quick", "--method", "kineme", "--method", "euclidean", "--jobs", 1, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Few shots" in done.stdout
+    assert "left out wave/notes.txt: " in done.stderr
+    content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
+    assert content["data"] == folder.name
+    assert content["splits"] == 2
+    assert content["shots"] == [1, 3, 5]
+    assert content["protocols"]["few-shot"]["kineme"]["1 shot"]["accuracy"]["mean"] == 1.0
+    assert (tmp_path / "evaluation.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
+    done = run(
+        folder, "--protocol", "few-shot", "--method", "euclidean", "--splits", 3, "--shots", 2, "--seed", 9,
+        "--jobs", 2, "--out", tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
+    assert (content["splits"], content["shots"], content["seed"]) == (3, [2], 9)
+    assert list(content["protocols"]) == ["few-shot"]
+    assert len(content["protocols"]["few-shot"]["euclidean"]["2 shots"]["accuracy"]["by_split"]) == 3
+
+
+def test_data_that_are_not_there_are_one_line_and_exit_status_1(tmp_path):
+    done = run(tmp_path / "nothing", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert done.stderr.startswith("kineme: expected lasa, lasa-letters or a folder, found no folder")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_class_is_one_line_and_exit_status_1(folder, tmp_path):
+    (tmp_path / "wave").mkdir()
+    for path in (folder / "wave").glob("*.csv"):
+        (tmp_path / "wave" / path.name).write_bytes(path.read_bytes())
+    done = run(tmp_path)
+    assert done.returncode == 1
+    assert "at least two folders of at least two recordings" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--protocol", "guess"), ("--method", "oracle"), ("--splits", 0), ("--shots", 0), ("--jobs", 0), ("--seed", -1)],
+)
+def test_options_that_make_no_sense_are_a_usage_error(folder, arguments):
+    done = run(folder, *arguments)
+    assert done.returncode == 2
+    assert arguments[0] in done.stderr
+
+
+def test_data_are_asked_for():
+    assert run().returncode == 2
