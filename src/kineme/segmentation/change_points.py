@@ -86,6 +86,6 @@ def _ruptures() -> Any:
     except ImportError:
         raise SpecificationError(
             'expected the library ruptures for by="change-points", found none; '
-            'pip install kineme[segmentation], or choose by="rest" or by="speed"'
+            'pip install "kineme[segmentation]", or choose by="rest" or by="speed"'
         ) from None
     return ruptures

@@ -35,6 +35,8 @@ class Motion:
         recording that mostly rests has the peak speed of its movements.
     noise : float
         Root mean square speed that is left of the noise [unit/s].
+    cutoff : float
+        Of the smoothing [Hz].
     """
 
     times: Array
@@ -42,6 +44,7 @@ class Motion:
     speed: Array
     peak: float
     noise: float
+    cutoff: float
 
 
 def observe(recording: Trajectory, resolution: float) -> Motion:
@@ -86,7 +89,7 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
             f"{who}: expected some movement, got {recording.duration:.3g} s at rest: the smoothed positions stay "
             f"within {extent:.3g}, the noise is {sigma:.3g}; check the dimensions and the unit of the recording"
         )
-    return Motion(recording.times, smooth, speed, peak, noise)
+    return Motion(recording.times, smooth, speed, peak, noise, cutoff)
 
 
 def noise_variance(positions: Array) -> float:

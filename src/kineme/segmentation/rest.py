@@ -76,8 +76,8 @@ class Rest:
         bouts = moving_bouts(motion.speed, low, 2.0 * low)
         if not len(bouts):  # motion so even and slow that nothing stands out
             return np.array([[0, len(motion.times)]]), np.array([True])
-        # How long it rests is judged between extrapolated ends: for a movement that stops and turns back smoothly that is
-        # not at all, however long it is slow.
+        # How long it rests is judged between extrapolated ends: to stop and turn back smoothly is no rest at all,
+        # however long it is slow.
         bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
         typical = typical_duration(durations_of(bouts, motion.times))
         bouts = join_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
