@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,18 +10,10 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import TrajectoryError
-from kineme.primitives.primitives import Primitives
-from kineme.rhythm.primitives import RhythmicPrimitives
+from kineme.features.rows import FEATURES, features_of
 from kineme.trajectories.axes import axis_names
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import check_choice, check_count
-
-#: Feature name -> (primitives, S) -> array (n, size, d).
-FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any]]] = {
-    "shape-attractor": lambda primitives, n_samples: primitives.shape_attractor(n_samples),
-    "forcing": lambda primitives, n_samples: primitives.forcing(n_samples),
-    "weights": lambda primitives, _: primitives.weights,
-}
 
 
 class MovementFeatures(TransformerMixin, BaseEstimator):
@@ -73,9 +64,3 @@ class MovementFeatures(TransformerMixin, BaseEstimator):
         tags.input_tags.two_d_array = False
         tags.input_tags.three_d_array = True
         return tags
-
-
-def features_of(primitives: Primitives | RhythmicPrimitives, feature: str, n_samples: int) -> NDArray[Any]:
-    """Feature rows (n, d * size) of learned primitives, dimension-major as in Eq. (9)."""
-    by_time = FEATURES[feature](primitives, n_samples)
-    return by_time.transpose(0, 2, 1).reshape(len(primitives), -1)

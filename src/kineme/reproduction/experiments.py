@@ -15,6 +15,7 @@ from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DegenerateMovementWarning
 from kineme.kernels import RBF, TruncatedEuclidean
 from kineme.reproduction import paper
+from kineme.reproduction.choices import PENALTIES
 from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, svm_accuracy
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
@@ -22,9 +23,6 @@ from kineme.validation import Array
 
 #: The paper's nine letters, and its "larger datasets".
 DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
-
-#: Penalties for the table that shows why an SVM can land at 1 / 9.
-PENALTIES = (1.0, 10.0, 1000.0)
 
 
 @lru_cache(maxsize=2)

@@ -15,8 +15,7 @@ from sklearn.model_selection import LeaveOneOut
 from sklearn.neighbors import NearestNeighbors
 from sklearn.svm import SVC
 
-#: Penalty of the SVM. The paper does not print its own; scikit-learn's 1 makes the RBF columns collapse.
-PENALTY = 1000.0
+from kineme.reproduction.choices import PENALTY
 
 
 def draw(labels: NDArray[Any], per_class: int, seed: int, index: int) -> NDArray[np.intp]:

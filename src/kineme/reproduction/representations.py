@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kineme.features.movement_features import features_of
+from kineme.features.rows import features_of
 from kineme.primitives.dmp import DMP
 from kineme.primitives.fits import forcing_target, local_regression
 from kineme.reproduction.paper import N_BASIS, N_POINTS, N_SAMPLES, STIFFNESS

@@ -8,8 +8,7 @@ import numpy as np
 
 from kineme.datasets.lasa import LASA_26
 from kineme.reproduction import paper
-from kineme.reproduction.experiments import PENALTIES
-from kineme.reproduction.protocol import PENALTY
+from kineme.reproduction.choices import PENALTIES, PENALTY
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.table import Table, spread
 
