@@ -88,3 +88,15 @@ def test_rests_shorter_than_asked_are_pauses_within_a_movement(make_recording):
     for least in np.sort(rests) + 0.08:
         found = kineme.segment(known.recording, min_rest=float(least))
         assert len(found) == 1 + (rests > least).sum()
+
+
+@given(seed=seeds, n=st.sampled_from([1, 3, 9]), noise=st.sampled_from([0.0, 0.005]))
+def test_change_points_separate_movements_from_rests(make_recording, seed, n, noise):
+    pytest.importorskip("ruptures", reason="by='change-points' needs pip install kineme[segmentation]")
+    known = make_recording(seed, n=n, noise=noise)
+    cuts = kineme.segment(known.recording, "change-points").cuts
+    middles = known.truth.mean(axis=1)
+    assert n <= len(cuts) <= n + n // 3  # now and then one velocity is cut in two: within a reach it changes all along
+    assert ((cuts[:, 0] < middles[:, None]) & (middles[:, None] < cuts[:, 1])).any(axis=1).all()
+    told = kineme.segment(known.recording, "change-points", n_pieces=2 * n + 1, cover=True)
+    assert len(told) == 2 * n + 1

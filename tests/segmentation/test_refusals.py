@@ -50,8 +50,8 @@ BAD_PARAMETERS = {
     "apart": ({"by": "speed", "min_movement": -2}, "expected min_movement to be a number of at least 0, got -2"),
     "penalty": ({"by": "change-points", "penalty": 0}, "expected penalty to be a number above 0, got 0"),
     "points": ({"by": "change-points", "n_points": 5}, "expected n_points to be a whole number of at least 10, got 5"),
-    "movements": ({"by": "change-points", "n_movements": 0}, "expected n_movements to be a whole number of at least 1, got 0"),
-    "too many": ({"by": "change-points", "n_movements": 30, "n_points": 100}, "expected n_points of at least 5 per movement, got 100 for 30 movements"),
+    "movements": ({"by": "change-points", "n_pieces": 0}, "expected n_pieces to be a whole number of at least 1, got 0"),
+    "too many": ({"by": "change-points", "n_pieces": 30, "n_points": 100}, "expected n_points of at least 5 per piece, got 100 for 30 pieces"),
 }  # fmt: skip
 
 

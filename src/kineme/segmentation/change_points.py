@@ -25,10 +25,11 @@ class ChangePoints:
 
     Parameters
     ----------
-    penalty : float, default 1.0
-        Cost of one more cut, in multiples of ``log(n_points)``: larger means fewer cuts. Not used with
-        ``n_movements``.
-    n_movements : int, optional
+    penalty : float, default 0.1
+        Cost of one more cut: larger means fewer cuts. In multiples of what a characteristic time costs, the root of
+        mean squared speed over mean squared acceleration, when it is unlike the rest of its piece; so neither the
+        tempo nor the length of the recording matters. Not used with ``n_pieces``.
+    n_pieces : int, optional
         The number of pieces, where you know it; resting pieces count.
     n_points : int, default 1000
         Time resolution; the cost grows with its square.
@@ -39,19 +40,19 @@ class ChangePoints:
     Machine Learning Research 20, 2019.
     """
 
-    penalty: float = 1.0
-    n_movements: int | None = None
+    penalty: float = 0.1
+    n_pieces: int | None = None
     n_points: int = 1000
 
     def __post_init__(self) -> None:
         check_number("penalty", self.penalty, above=0.0)
         check_count("n_points", self.n_points, 2 * _MIN_POINTS)
-        if self.n_movements is not None:
-            check_count("n_movements", self.n_movements, 1)
-            if self.n_movements * _MIN_POINTS > self.n_points:
+        if self.n_pieces is not None:
+            check_count("n_pieces", self.n_pieces, 1)
+            if self.n_pieces * _MIN_POINTS > self.n_points:
                 raise SpecificationError(
-                    f"expected n_points of at least {_MIN_POINTS} per movement, got {self.n_points} for "
-                    f"{self.n_movements} movements"
+                    f"expected n_points of at least {_MIN_POINTS} per piece, got {self.n_points} for "
+                    f"{self.n_pieces} pieces"
                 )
 
     @property
@@ -66,18 +67,22 @@ class ChangePoints:
         velocity = np.gradient(motion.positions, t, axis=0) / motion.peak
         signal = np.column_stack([np.interp(even, t, column) for column in velocity.T])
         detector = _ruptures().KernelCPD(kernel="rbf", min_size=_MIN_POINTS, params={"gamma": 1.0}).fit(signal)
-        if self.n_movements == 1:
+        if self.n_pieces == 1:
             return np.zeros(0, dtype=np.intp)
-        if self.n_movements is not None:
-            found = detector.predict(n_bkps=self.n_movements - 1)
+        if self.n_pieces is not None:
+            found = detector.predict(n_bkps=self.n_pieces - 1)
         else:
-            found = detector.predict(pen=self.penalty * np.log(self.n_points))
+            acceleration = np.gradient(velocity, t, axis=0)
+            characteristic = np.sqrt((velocity**2).sum() / (acceleration**2).sum())
+            found = detector.predict(pen=self.penalty * float(characteristic) / even[1])
         rows = np.searchsorted(t, even[np.array(found[:-1], dtype=np.intp)])
         return np.unique(rows[(rows > 0) & (rows < len(t) - 1)])
 
     def pieces(self, motion: Motion) -> Rows:
-        """The pieces between cuts, rows (n, 2)."""
-        return consecutive(self.inner_cuts(motion), len(motion.times))
+        """The pieces between cuts that move most of the time, rows (n, 2)."""
+        pieces = consecutive(self.inner_cuts(motion), len(motion.times))
+        fast = motion.speed > 2.0 * max(self.resolution * motion.peak, 2.0 * motion.noise)
+        return pieces[2 * np.add.reduceat(fast, pieces[:, 0], dtype=np.intp) > pieces[:, 1] - pieces[:, 0]]
 
 
 def _ruptures() -> Any:
