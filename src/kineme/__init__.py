@@ -25,6 +25,7 @@ if _TYPE_CHECKING:
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
     from kineme.recognition.recognizer import Recognizer
+    from kineme.rhythm.primitives import RhythmicPrimitives
     from kineme.rhythm.rhythmic_dmp import RhythmicDMP
     from kineme.segmentation.segment import segment
     from kineme.trajectories.demonstrations import Demonstrations
@@ -48,6 +49,7 @@ _HOME = {
     "Primitives": "kineme.primitives.primitives",
     "control": "kineme",
     "RhythmicDMP": "kineme.rhythm.rhythmic_dmp",
+    "RhythmicPrimitives": "kineme.rhythm.primitives",
     "DMPFeatures": "kineme.features.dmp_features",
     "RhythmicFeatures": "kineme.features.rhythmic_features",
     "Recognizer": "kineme.recognition.recognizer",
@@ -64,7 +66,7 @@ _HOME = {
 
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
-    "DMP", "Primitives", "control", "RhythmicDMP", "orientation", "styles",
+    "DMP", "Primitives", "control", "RhythmicDMP", "RhythmicPrimitives", "orientation", "styles",
     "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
