@@ -1,12 +1,13 @@
 # make demo   the paper's tables and figures, in out/
 # make test   formatter, linter, type checker, tests
 # make bench  speed and accuracy side by side with other libraries
+# make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
 
-.PHONY: demo test bench figures lock clean
+.PHONY: demo test bench evaluate figures lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -43,6 +44,12 @@ bench: .venv-bench/ready
 	.venv-bench/bin/pip install --quiet --require-hashes --no-build-isolation -r bench/peers.txt
 	touch $@
 
+evaluate: .venv-rivals/ready
+	.venv-rivals/bin/kineme evaluate lasa --out out/
+
+.venv-rivals/ready: bench/rivals.txt pyproject.toml
+	$(call environment,.venv-rivals,bench/rivals.txt)
+
 figures: .venv-dev/ready
 	.venv-dev/bin/python docs/make_figures.py
 
@@ -51,6 +58,7 @@ lock:
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
 	uv pip compile bench/peers.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
+	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-bench out
+	rm -rf .venv .venv-dev .venv-bench .venv-rivals out

@@ -8,7 +8,7 @@ import os
 
 from bench.rows import save, table
 
-SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction", "rhythm", "control")
+SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction", "rhythm", "control", "recognize")
 
 
 def main() -> int:

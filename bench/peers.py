@@ -53,3 +53,12 @@ def replay_pydmps(_times: Array, positions: Array, n_basis: int) -> tuple[Array,
     dmp.imitate_path(positions.T)
     path, _, _ = dmp.rollout()
     return np.arange(1, len(path) + 1) / n_steps, path  # its first sample is the state after one step
+
+
+def dtw_nearest(asked: Array, stored: Array, window: int) -> Any:
+    """Index (n,) of the nearest of the stored paths (m, T, d) for each asked one (n, T, d), on all cores."""
+    from dtaidistance import dtw_ndim
+
+    n = len(asked)
+    both, block = np.concatenate((asked, stored)), ((0, n), (n, n + len(stored)))
+    return dtw_ndim.distance_matrix_fast(both, block=block, window=window, parallel=True)[:n, n:].argmin(axis=1)
