@@ -53,6 +53,11 @@ def test_recordings(parameters, movements, message):
         ({"n_periods": 0}, SpecificationError, "expected n_periods to be a number above 0, got 0"),
         ({"period": -2.0}, SpecificationError, "expected period above 0 seconds, got -2 for movement 0"),
         ({"rate": 10.0, "n_samples": 9}, SpecificationError, "expected either rate or n_samples, got both"),
+        (
+            {"rate": 3.0, "period": 0.8},
+            SpecificationError,
+            "a rate of at least 5 Hz, that is 4 samples per period, got 3",
+        ),
         ({"rate": 0}, SpecificationError, "expected rate to be a number above 0, got 0"),
         ({"n_samples": 1}, SpecificationError, "expected n_samples to be a whole number of at least 2, got 1"),
         ({"start": [1.0, 2.0]}, TrajectoryError, r"expected start of shape \(1,\) or \(n, 1\), got shape \(2,\)"),

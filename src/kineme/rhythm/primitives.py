@@ -126,7 +126,7 @@ class RhythmicPrimitives(Batch):
         TrajectoryError
             A wish of the wrong shape; numbers of movements that do not go together.
         SpecificationError
-            A period or n_periods of 0 or less.
+            A period or n_periods of 0 or less, a rate too low to show a period.
         """
         wishes = {"period": period, "amplitude": amplitude, "phase": phase}
         wishes |= {"baseline": baseline, "start": start, "velocity": velocity}

@@ -15,6 +15,7 @@ from kineme.primitives.response import transition
 from kineme.primitives.rollout import as_demonstrations, broadcast_length, per_movement
 from kineme.rhythm.harmonics import as_real, waves
 from kineme.rhythm.operators import limit_cycle
+from kineme.rhythm.periods import SAMPLES_PER_PERIOD
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_count, check_number
 
@@ -152,6 +153,12 @@ def _samples(n_points: int, n_periods: float, periods: Array, rate: float | None
         raise SpecificationError("expected either rate or n_samples, got both")
     if rate is not None:
         check_number("rate", rate, above=0.0)
+        least = SAMPLES_PER_PERIOD / float(periods.min())
+        if rate < least:
+            raise SpecificationError(
+                f"expected a rate of at least {least:.3g} Hz, that is {SAMPLES_PER_PERIOD} samples per period, got "
+                f"{rate:g} Hz"
+            )
         return max(2, math.ceil(float(periods.max()) * n_periods * rate * (1 - 1e-12)) + 1)
     if n_samples is None:
         return max(2, math.ceil(n_periods * n_points * (1 - 1e-12)) + 1)
