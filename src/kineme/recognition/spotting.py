@@ -22,9 +22,10 @@ if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
 _MIN_SAMPLES = 8
-_TEMPO = 3.0  # a movement lasts between a third and three times what was demonstrated
+_TEMPO = 1.5  # one standard deviation of the ratio of durations, for one person's movements of one kind
+_MAX_TEMPO = 3.0  # beyond this ratio of durations it is not looked for
 _IMPOSTOR = -4.0  # log similarity of a typical impostor: the kernels' width is 0.35 of its distance
-_PER_MOVEMENT = 0.2  # cost of one more movement, in typical durations: one long movement rather than three short ones
+_PER_MOVEMENT = 0.5  # typical durations that a movement costs: it pays from half way to an impostor on
 
 
 class Spotted(NamedTuple):
@@ -100,24 +101,43 @@ def _recognized(
     """Best class, p-values (n, C), and score of each candidate; the score is positive where it counts as known."""
     candidates = pieces_of(whole, rows)
     logs = np.maximum.reduceat(recognizer.log_similarity(candidates), recognizer.first_, axis=1)
-    p = recognizer.p_values(candidates) if hasattr(recognizer, "p_values") else _p_values(logs)
     durations = whole.times[rows[:, 1] - 1] - whole.times[rows[:, 0]]
-    demos = recognizer.demonstrations_
-    if demos.movements.times is not None:  # else durations of the demonstrations are not known
-        shortest = np.minimum.reduceat(demos.durations, recognizer.first_) / _TEMPO
-        longest = np.maximum.reduceat(demos.durations, recognizer.first_) * _TEMPO
-        plausible = (durations[:, None] >= shortest) & (durations[:, None] <= longest)
-        p, logs = np.where(plausible, p, 0.0), np.where(plausible, logs, -np.inf)
+    far = _log_tempo(recognizer, durations)
+    logs = logs - 0.5 * (far / np.log(_TEMPO)) ** 2
+    p = recognizer.p_values(candidates) if hasattr(recognizer, "p_values") else _p_values(recognizer, logs)
+    plausible = far <= np.log(_MAX_TEMPO)
+    p, logs = np.where(plausible, p, 0.0), np.where(plausible, logs, -np.inf)
     best = logs.argmax(axis=1)
     one = np.arange(len(rows))
     closeness = np.maximum(1.0 - logs[one, best] / _IMPOSTOR, 0.0)
-    typical = float(np.median(durations))
+    timed = recognizer.demonstrations_.movements.times is not None
+    typical = float(np.median(recognizer.demonstrations_.durations if timed else durations))
     score = closeness * durations - _PER_MOVEMENT * typical
     return best, p, np.where(p[one, best] >= error_rate, score, 0.0)
 
 
-def _p_values(logs: Array) -> Array:
-    return np.where(logs > 0.5 * _IMPOSTOR, np.exp(logs), 0.0)
+def _log_tempo(recognizer: Recognizer, durations: Array) -> Array:
+    """How far, in logarithms, each duration is from those demonstrated for each class, shape (n, C)."""
+    demos = recognizer.demonstrations_
+    if demos.movements.times is None:  # arrays without time stamps: no duration is known
+        return np.zeros((len(durations), len(recognizer.classes_)))
+    demonstrated = np.log(demos.durations)
+    low, high = (which.reduceat(demonstrated, recognizer.first_) for which in (np.minimum, np.maximum))
+    seen = np.log(durations)[:, None]
+    return np.asarray(np.maximum(np.maximum(low - seen, seen - high), 0.0))
+
+
+def _p_values(recognizer: Recognizer, logs: Array) -> Array:
+    """Share of demonstrations that are less like their own class, shape (n, C); 0 beyond half way to an impostor.
+
+    Each demonstration is compared with the others of its class. Where no class has two, only the bound decides.
+    """
+    among = recognizer.similarity_.log_average(recognizer.views_, recognizer.views_)
+    other = recognizer.labels_[:, None] != recognizer.labels_
+    genuine = np.where(other | np.eye(len(other), dtype=bool), -np.inf, among).max(axis=1)
+    genuine = np.sort(genuine[np.isfinite(genuine)])
+    p = (1.0 + np.searchsorted(genuine, logs, side="right")) / (1.0 + len(genuine))
+    return np.where(logs > 0.5 * _IMPOSTOR, p, 0.0)
 
 
 def _best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:

@@ -1,0 +1,146 @@
+"""Known movements are found inside unlabeled motion, and what is between them is called unknown."""
+
+# ruff: noqa: E501 - one case, one line, the message whole
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme import Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme.recognition.spotting import Spotted, _best_chain, _left_over, _unions
+
+KNOWN = ["CShape", "NShape", "Sshape", "WShape"]
+UNKNOWN = ["heee", "Spoon", "Khamesh"]
+RATE = 100
+
+
+@cache
+def _recognizer():
+    demos = kineme.load_lasa(KNOWN)
+    return Recognizer().fit(demos[np.flatnonzero(np.arange(len(demos)) % 7 < 4)])
+
+
+def _stream(seed, shapes, noise=0.0, rest=0.6):
+    """Recordings of demonstrations not trained on, one after the other: other sizes and places, rests between them."""
+    rng = np.random.default_rng(seed)
+    x, truth = [np.zeros((int(rest * RATE), 2))], []
+    for shape in shapes:
+        one = kineme.load_lasa([shape])[int(rng.integers(4, 7))]
+        even = np.linspace(one.times[0], one.times[-1], int(one.duration * rng.uniform(0.8, 1.25) * RATE))
+        path = np.column_stack([np.interp(even, one.times, column) for column in one.positions.T])
+        start = sum(map(len, x))
+        truth.append((start / RATE, (start + len(path) - 1) / RATE, shape if shape in KNOWN else None))
+        x.append(x[-1][-1] + (path - path[0]) * rng.uniform(0.7, 1.4))
+        x.append(np.repeat(x[-1][-1:], int(rest * RATE), axis=0))
+    x = np.concatenate(x)
+    x = x + noise * 30.0 * rng.normal(size=x.shape)
+    return Trajectory(np.arange(len(x)) / RATE, x), truth
+
+
+def _frames(segments, times):
+    """Label of each sample; "" at rest, "?" in unknown motion."""
+    labels = np.full(len(times), "", dtype=object)
+    for start, end, label, *_ in segments:
+        labels[(times >= start) & (times <= end)] = "?" if label is None else label
+    return labels
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_known_movements_are_found_where_they_are(seed, noise):
+    order = np.random.default_rng(seed).permutation(KNOWN).tolist()
+    recording, truth = _stream(seed, order, noise)
+    found = _recognizer().spot(recording)
+    frames, true = _frames(found, recording.times), _frames(truth, recording.times)
+    assert (frames == true)[true != ""].mean() > 0.9
+    for start, end, label in truth:
+        middle = frames[(recording.times > start) & (recording.times < end)]
+        assert (middle == label).mean() > 0.8, label
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_unknown_movements_between_known_ones_are_called_unknown(seed):
+    order = [x for pair in zip(KNOWN, UNKNOWN, strict=False) for x in pair]
+    recording, truth = _stream(seed, order, 0.002)
+    frames, true = _frames(_recognizer().spot(recording, 0.1), recording.times), _frames(truth, recording.times)
+    assert (frames == true)[true != ""].mean() > 0.75
+
+
+def test_segments_are_in_order_apart_and_say_how_sure_they_are():
+    recording, _ = _stream(3, [*KNOWN, *UNKNOWN])
+    found = _recognizer().spot(recording)
+    assert all(isinstance(one, Spotted) for one in found)
+    bounds = np.array([(one.start, one.end) for one in found]).ravel()
+    assert (np.diff(bounds) > -2 / RATE).all()
+    assert all(0.0 <= one.confidence <= 1.0 for one in found)
+    assert {one.label for one in found} <= {*KNOWN, None}
+
+
+def test_unit_place_and_origin_of_time_do_not_matter():
+    recording, _ = _stream(1, ["NShape", "heee", "CShape"])
+    moved = Trajectory(recording.times + 50.0, 1e3 * recording.positions + 1e4)
+    for one, other in zip(_recognizer().spot(recording), _recognizer().spot(moved), strict=True):
+        assert one.label == other.label
+        np.testing.assert_allclose((one.start + 50.0, one.end + 50.0), (other.start, other.end), atol=3 / RATE)
+
+
+def test_arrays_without_time_stamps_have_no_duration_to_compare():
+    demos = kineme.load_lasa(KNOWN)
+    arrays = [one.positions for one in demos]
+    recording, _ = _stream(2, ["WShape", "CShape"])
+    found = Recognizer().fit(arrays, demos.labels).spot(recording)
+    assert [one.label for one in found if one.label is not None] == ["WShape", "CShape"]
+
+
+def test_the_best_chain_is_that_of_all_chains():
+    """Against enumeration."""
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        n = int(rng.integers(1, 6))
+        first, last = _unions(n, 4)
+        score = rng.normal(size=len(first))
+        chain = _best_chain(first, last, score, n)
+        best = 0.0
+        for chosen in range(2 ** len(first)):
+            members = [c for c in range(len(first)) if chosen >> c & 1]
+            if len(members) <= n and all(last[a] < first[b] for a, b in pairwise(members)):
+                best = max(best, score[members].sum())
+        assert score[chain].sum() == pytest.approx(best)
+
+
+def test_runs_of_neighbors_are_counted_once():
+    first, last = _unions(5, 3)
+    assert len(set(zip(first.tolist(), last.tolist(), strict=True))) == len(first) == 5 + 4 + 3
+    assert (last - first).max() == 2
+
+
+def test_what_is_left_over_is_joined_within_one_stretch_of_motion_only():
+    first, last = np.array([1]), np.array([1])
+    bout = np.array([0, 0, 0, 0, 1, 1])
+    assert _left_over(first, last, [0], bout) == [(0, 0), (2, 3), (4, 5)]
+
+
+BAD = {
+    "dimensions": ((Trajectory(np.arange(20.0), np.zeros((20, 3))),), TrajectoryError, "expected a recording of 2 dimensions as in fit, got 3; select the dimensions"),
+    "rest": ((Trajectory(np.arange(20.0), np.zeros((20, 2))),), TrajectoryError, "expected some movement, got 19 s at rest"),
+    "error rate 1": ((np.zeros((20, 2)), 1.0), SpecificationError, "expected error_rate below 1, got 1.0; 0.05 is five in a hundred"),
+    "error rate 0": ((np.zeros((20, 2)), 0.0), SpecificationError, "expected error_rate to be a number above 0, got 0.0"),
+    "pieces": ((np.zeros((20, 2)), 0.05, 0), SpecificationError, "expected max_pieces to be a whole number of at least 1, got 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "error", "message"), BAD.values(), ids=BAD)
+def test_bad_input_is_refused(arguments, error, message):
+    with pytest.raises(error, match=re.escape(message)):
+        _recognizer().spot(*arguments)
+
+
+def test_it_is_fitted_first():
+    with pytest.raises(ValueError, match="not fitted"):
+        Recognizer().spot(np.zeros((20, 2)))
