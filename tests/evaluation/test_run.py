@@ -64,6 +64,8 @@ def test_the_page_needs_no_other_file_and_escapes_names(done):
     assert re.findall(r'(?:src|href)="(?!data:)', html) == []
     assert "<script" not in html
     assert "small &amp; &lt;simple&gt;" in html
+    assert "<simple>" not in html
+    assert "<numbers>" not in html
     assert "expected &lt;numbers&gt;" in html
     assert html.count("<img") == 2  # few shots and robustness
     for name in PLAN[0]:
