@@ -12,13 +12,16 @@ from kineme.orientation.rotation_vectors import exp, log, slerp
 from kineme.orientation.tangent import from_tangent, to_tangent
 
 if _TYPE_CHECKING:
+    from kineme.orientation.pose_controller import PoseController, PoseState
     from kineme.orientation.pose_features import PoseFeatures
 
 __all__ = [
+    "PoseController",
     "PoseDMP",
     "PoseFeatures",
     "PosePrimitives",
     "PoseRollout",
+    "PoseState",
     "angle_between",
     "angular_acceleration",
     "angular_velocity",
@@ -40,4 +43,8 @@ def __getattr__(name: str) -> _Any:
         from kineme.orientation.pose_features import PoseFeatures
 
         return PoseFeatures
+    if name in {"PoseController", "PoseState"}:
+        from kineme.orientation import pose_controller
+
+        return getattr(pose_controller, name)
     raise AttributeError(f"module 'kineme.orientation' has no attribute {name!r}; it has {', '.join(__all__)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,9 @@ from kineme.primitives.persistence import Arrays, check_array, load_as, pack, un
 from kineme.primitives.primitives import Primitives
 from kineme.primitives.rollout import broadcast_length, per_movement
 from kineme.validation import Array
+
+if TYPE_CHECKING:
+    from kineme.orientation.pose_controller import PoseController
 
 _KIND = "pose primitives"  # in the file
 
@@ -149,17 +152,42 @@ class PosePrimitives:
         DegenerateMovementError
             The original formulation asked to turn about an axis that the demonstration does not turn about.
         """
-        tangent_start, tangent_goal, references = self._endpoints(start, goal)
+        tangent_start, tangent_goal, references, tangent_velocity = self.in_tangent(start, goal, velocity)
         movement = self.tangent.rollout(
             tangent_start,
             tangent_goal,
             duration,
-            velocity=self._tangent_velocity(velocity, tangent_start),
+            velocity=tangent_velocity,
             rate=rate,
             n_samples=n_samples,
             settle=settle,
         )
         return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
+
+    def controller(self, dt: float, **options: Any) -> PoseController:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt, **options
+            See `kineme.control.Controller`; start, goal and velocity as in `rollout`. Limits and `settle` hold for
+            positions and for the components of the rotation vector [rad].
+
+        Raises
+        ------
+        SpecificationError, TrajectoryError
+            More than one primitive; an option out of its range; a start or goal that is no pose.
+        """
+        from kineme.orientation.pose_controller import PoseController
+
+        return PoseController(self, dt, **options)
+
+    def in_tangent(
+        self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
+    ) -> tuple[Array, Array, Array, Array | None]:
+        """Start, goal, reference orientations and initial velocity of the movements that these wishes make."""
+        starts, goals, references = self._endpoints(start, goal)
+        return starts, goals, references, self._tangent_velocity(velocity, starts)
 
     def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
         """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
