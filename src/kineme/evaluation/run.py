@@ -126,6 +126,7 @@ def _begin(demos: Demonstrations) -> None:
 
     threadpool_limits(1)
     os.environ["KINEME_NUM_THREADS"] = "1"
+    os.environ.setdefault("KINEME_COMPILED", "always")  # each job is small, all together repay loading Numba
     _shared["demos"] = demos
 
 
