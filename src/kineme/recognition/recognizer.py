@@ -160,7 +160,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         recording : Trajectory or array_like of shape (T, d)
             Unlabeled; pass a `Trajectory`, the time stamps matter.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown.
+            Share of true movements that may be called unknown. Cutting adds errors of its own, and fewer than
+            ``1 / error_rate - 1`` demonstrations cannot tell so small a share.
         max_pieces : int, default 8
             Most pieces that one movement may consist of; cost grows with it.
 
@@ -174,6 +175,16 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         check_is_fitted(self)
         return list(spot(self, recording, error_rate, max_pieces))
+
+    def predict_partial(self, X: Any, early: Any = None) -> NDArray[Any]:
+        """The most likely class of each movement of which only the beginning has been seen, shape (n,).
+
+        Each beginning is compared with the beginnings of every stored movement at many values of progress; see `Early`.
+        """
+        from kineme.recognition.early import partial_shares
+
+        check_is_fitted(self)
+        return np.asarray(self.classes_[partial_shares(self, X, early)[:, :-1].argmax(axis=1)])
 
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:

@@ -57,5 +57,10 @@ def pieces_of(recording: Trajectory, rows: Rows) -> Demonstrations:
         [recording.positions[one] for one in whole],
         None if recording.label is None else [recording.label] * len(whole),
         [recording.times[one] for one in whole],
-        [f"{name}[{start:.10g}-{end:.10g} s]" for start, end in spans],
+        [f"{name}[{_seconds(start)}-{_seconds(end)} s]" for start, end in spans],
     )
+
+
+def _seconds(time: float) -> str:
+    """To a tenth of a millisecond, also where stamps count seconds since 1970."""
+    return np.format_float_positional(time, precision=4, trim="-")
