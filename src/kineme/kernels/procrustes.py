@@ -82,17 +82,18 @@ class Procrustes:
             return _within(A.rows.conj() @ B.rows.T, self.max_angle)  # the angle's sign does not matter here
         return _aligned_in_space(A.rows, B.rows, self.max_angle)
 
-    def rotations(self, a: Array, B: Array) -> Array:
-        """For one row a (d * S,), the rotation matrices (m, d, d) that bring each row of B closest to it."""
+    def rotations(self, A: Array, B: Array) -> Array:
+        """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row."""
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
             return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
         if d == 2:
-            product = as_complex(a[None]) @ as_complex(B).conj().T
-            angle = np.clip(np.angle(product[0]), -self.max_angle, self.max_angle)
+            product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
+            angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
-        return _turned_back(_best_rotations(_covariances(a[None], B)[0]), self.max_angle)
+        C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
+        return _turned_back(_best_rotations(C), self.max_angle)
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:

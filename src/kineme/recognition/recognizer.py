@@ -13,7 +13,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.classifiers import CLASSIFIERS, Classifier, choose
+from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
+from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.labels import check_labels
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
@@ -113,6 +114,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.similarity_ = AveragedSimilarity(self.procrustes_, widths, self.mean)
         self.classifier_: Classifier = choose(self.classifier, np.diff(first, append=len(labels)))
         self.classifier_.fit(self)
+        self.calibration_: Calibration | None = None  # of what was fitted before
         return self
 
     def log_similarity(self, X: Any) -> Array:
@@ -147,6 +149,52 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         scores = self.decision_function(X)
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
+        """What each movement is, or that it is unknown, and why.
+
+        Parameters
+        ----------
+        X : one movement or many
+            A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
+        error_rate : float, default 0.05
+            Share of true movements that may be called unknown. See `Calibration` for when it is guaranteed.
+
+        Returns
+        -------
+        Answer, or list of Answer for many movements
+        """
+        from kineme.recognition.answer import answers, is_one
+
+        found = answers(self, [X] if is_one(X) else X, error_rate)
+        return found[0] if is_one(X) else found
+
+    def p_values(self, X: Any, error_rate: float = 0.05) -> Array:
+        """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`."""
+        check_error_rate(error_rate)
+        return self.calibration().p_values(self._nearest(X), error_rate)
+
+    def predict_known(self, X: Any, error_rate: float = 0.05) -> NDArray[Any]:
+        """Labels as from `predict`, among classes with a p-value above `error_rate`; None, unknown, without any."""
+        from kineme.recognition.answer import known_labels
+
+        p_values = self.p_values(X, error_rate)
+        return known_labels(self.classes_, self.decision_function(X), p_values, error_rate)
+
+    def novelty(self, X: Any) -> Array:
+        """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
+        return np.asarray(self.calibration().scores(self._nearest(X)).min(axis=1))
+
+    def calibration(self) -> Calibration:
+        """Of the p-values; made when first asked for, since it compares the demonstrations with each other."""
+        check_is_fitted(self)
+        if self.calibration_ is None:
+            self.calibration_ = calibrate(self)
+        return self.calibration_
+
+    def looks(self) -> tuple[Representation, ...]:
+        """The representations, those chosen by default included."""
+        return DEFAULT_REPRESENTATIONS if self.representations is None else tuple(self.representations)
 
     def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Any]:
         """Find known movements in one long recording, with unknown between them.
@@ -192,10 +240,14 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return math.pi / 4 if n_dims in (2, 3) else 0.0
 
     def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
-        representations = DEFAULT_REPRESENTATIONS if self.representations is None else tuple(self.representations)
-        seen = view(demos, representations, Normalization(self.translation, self.scale), self.cutoff)
+        seen = view(demos, self.looks(), Normalization(self.translation, self.scale), self.cutoff)
         # Single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
         return tuple(self.procrustes_.prepare(block.astype(np.float32)) for block in seen)
+
+    def _nearest(self, X: Any) -> Array:
+        """Log similarity to the nearest demonstration of each class, shape (n, C)."""
+        nearest = Nearest()
+        return np.concatenate([nearest.scores(self, tile) for tile in self._tiles(self.look_at(X))])
 
     def _tiles(self, seen: tuple[Prepared, ...]) -> Iterator[tuple[Prepared, ...]]:
         n, step = len(seen[0].rows), max(1, _TILE_PAIRS // len(self.labels_))

@@ -32,6 +32,21 @@ LOG_MEANS: dict[str, Callable[[Array], Array]] = {
 }
 
 
+def _softmax(logs: Array) -> Array:
+    weights = np.exp(logs - logs.max(axis=0))
+    return np.asarray(weights / weights.sum(axis=0))
+
+
+#: Name -> share of each kernel in the average, d log K / d log k_r: none negative, their sum over the first axis 1.
+SHARES: dict[str, Callable[[Array], Array]] = {
+    "arithmetic": _softmax,
+    "geometric": lambda logs: np.full(logs.shape, 1.0 / len(logs)),
+    "harmonic": lambda logs: _softmax(-logs),
+    "quadratic": lambda logs: _softmax(2.0 * logs),
+    "min": lambda logs: (np.arange(len(logs))[:, None] == logs.argmin(axis=0)).astype(float),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class AveragedSimilarity:
     """An A-average of one RBF kernel per representation, each on its Procrustes distance.
