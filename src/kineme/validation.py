@@ -27,16 +27,30 @@ def describe(index: int, names: Sequence[str | None] | None) -> str:
     return f"trajectory {index}" + (f" ({name!r})" if name else "")
 
 
+def refuse_masked_and_complex(values: Any, who: str) -> None:
+    """Refuse what NumPy would turn into plain numbers silently: masked samples and imaginary parts would be lost."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise TrajectoryError(
+            f"{who}: expected an array of numbers, got one with {np.ma.count_masked(values)} masked; drop the samples"
+        )
+    if getattr(getattr(values, "dtype", None), "kind", "") == "c":
+        raise TrajectoryError(
+            f"{who}: expected real numbers, got {values.dtype}; pass real and imaginary part as columns"
+        )
+
+
 def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     """Check one movement's positions and return them as float64 of shape (T, d).
 
     A 1-D array is one degree of freedom. Finiteness is checked by `check_finite`, for all movements at once.
     """
+    refuse_masked_and_complex(positions, who)
     try:
         x = np.asarray(positions, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise TrajectoryError(f"{who}: expected positions to be an array of numbers, got {error}") from error
-    if x.ndim == 1:
+    flat = x.ndim == 1
+    if flat:
         x = x[:, None]
     if x.ndim != 2 or x.shape[1] == 0:
         raise TrajectoryError(
@@ -47,6 +61,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
         raise TrajectoryError(
             f"{who}: expected at least {MIN_SAMPLES} samples, got {len(x)}"
             + ("; samples run along the first axis: transpose the array" if x.shape[1] > len(x) else "")
+            + ("; pass one movement of several dimensions as [array]" if flat else "")
         )
     return x
 

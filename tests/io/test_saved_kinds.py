@@ -170,6 +170,16 @@ def test_labels_and_dimensions_must_agree_to_join():
         kineme.Primitives.join([b, kineme.DMP().learn([np.arange(20.0) ** 2])])
 
 
+def test_labels_must_be_of_one_type_to_join():
+    a, b = (
+        kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, [label]))
+        for label in ("a", 1)
+    )
+    with pytest.raises(kineme.TrajectoryError, match="labels of one type, got <U1, int64"):
+        kineme.Primitives.join([a, b])
+    assert len(kineme.Primitives.join(one for one in (a, a))) == 2
+
+
 @every_kind
 def test_a_batch_shows_itself_in_one_line(kind):
     shown = repr(KINDS[kind]())

@@ -38,6 +38,9 @@ BAD_ARRAYS = {
     "a number": ([X, 3.0], "trajectory 1 ('two'): expected positions of shape (T, d), samples by dimensions, got shape ()"),
     "no dimension": ([X, X[:, :0]], "got shape (8, 0)"),
     "words": ([X, ["left", "right", "up", "down"]], "trajectory 1 ('two'): expected positions to be an array of numbers, got could not convert"),
+    "masked": ([X, np.ma.masked_greater(X, 0.9)], "trajectory 1 ('two'): expected an array of numbers, got one with 2 masked; drop the samples"),
+    "complex": ([X, X + 1j], "trajectory 1 ('two'): expected real numbers, got complex128; pass real and imaginary part as columns"),
+    "rows of a movement": (X.tolist(), "expected at least 4 samples, got 2; pass one movement of several dimensions as [array]"),
     "ragged rows": ([X, [[1, 2], [3]]], "trajectory 1 ('two'): expected positions to be an array of numbers, got setting an array element"),
 }  # fmt: skip
 
@@ -86,6 +89,7 @@ BAD_COLLECTIONS = {
     "an empty mask": (lambda: Demonstrations.of([X])[[False]], "expected at least one movement, got an empty selection"),
     "a flat block": (lambda: Demonstrations.of(T), "expected an array of shape (n, T, d), movements by samples by dimensions, got shape (8,); pass one movement as [array]"),
     "one movement": (lambda: Demonstrations.of(X), "got shape (8, 2); pass one movement as [array]"),
+    "a masked block": (lambda: Demonstrations.of(np.ma.masked_greater(X[None], 0.9)), "the block: expected an array of numbers, got one with 2 masked"),
     "a 4-D block": (lambda: Demonstrations.of(X[None, None]), "got shape (1, 1, 8, 2)"),
     "a short block": (lambda: Demonstrations.of(np.zeros((5, 3, 2))), "every movement of the block: expected at least 4 samples, got 3"),
     "a block of words": (lambda: Demonstrations.of(np.full((2, 8, 2), "a")), "expected positions to be an array of numbers, got an array of type <U1"),

@@ -174,3 +174,10 @@ def test_what_is_no_step_is_refused(make_movement, steps):
         preprocess(_one(make_movement(0)[1]), steps)
     with pytest.raises(SpecificationError, match="a tuple of steps"):
         DMP(preprocessing=steps)
+
+
+def test_steps_take_movements_in_any_form():
+    x = np.linspace(0, 1, 30)[:, None] ** 2
+    np.testing.assert_array_equal(
+        preprocess([x], (Smooth(),)).positions, preprocess(Demonstrations.from_arrays([x]), (Smooth(),)).positions
+    )

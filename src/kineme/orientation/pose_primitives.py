@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,8 +61,9 @@ class PosePrimitives:
         return PosePrimitives(self.tangent[chosen], self.references[chosen])
 
     @classmethod
-    def join(cls, batches: Sequence[PosePrimitives]) -> PosePrimitives:
+    def join(cls, batches: Iterable[PosePrimitives]) -> PosePrimitives:
         """Several batches as one, in the order given; errors as in `Primitives.join`."""
+        batches = list(batches)
         wrong = [type(batch).__name__ for batch in batches if not isinstance(batch, cls)]
         if wrong:
             raise TrajectoryError(f"expected batches of PosePrimitives, got {wrong[0]}")

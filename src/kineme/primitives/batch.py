@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -58,7 +58,7 @@ class Batch:
         return int(getattr(self, next(iter(self.ROWS))).shape[1])
 
     @classmethod
-    def join(cls, batches: Sequence[Self]) -> Self:
+    def join(cls, batches: Iterable[Self]) -> Self:
         """Several batches as one, in the order given.
 
         Raises
@@ -68,6 +68,7 @@ class Batch:
         TrajectoryError
             No batch, something else, batches of different dimensions, labels on some batches only.
         """
+        batches = list(batches)
         if not batches or not all(isinstance(batch, cls) for batch in batches):
             got = next((type(batch).__name__ for batch in batches if not isinstance(batch, cls)), "none")
             raise TrajectoryError(f"expected at least one batch of {cls.__name__}, got {got}")
@@ -79,6 +80,8 @@ class Batch:
             raise TrajectoryError(
                 f"expected labels on every batch or on none, got them on {len(labels)} of {len(batches)}"
             )
+        if len({known.dtype.kind for known in labels}) > 1:
+            raise TrajectoryError(f"expected labels of one type, got {', '.join(str(known.dtype) for known in labels)}")
         named = any(batch.names is not None for batch in batches)
         return first._with(
             {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in cls.ROWS},

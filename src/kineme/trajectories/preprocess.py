@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import Any, Protocol
 
 from kineme.errors import SpecificationError
 from kineme.trajectories.collect import Movements
@@ -30,8 +30,9 @@ def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     return found
 
 
-def preprocess(demonstrations: Demonstrations, steps: Iterable[Step]) -> Demonstrations:
-    """Apply steps in order; the result's ``steps`` records them after those already applied."""
+def preprocess(movements: Any, steps: Iterable[Step]) -> Demonstrations:
+    """Apply steps in order to movements, in any form; the result's ``steps`` records them after those already applied."""
+    demonstrations = Demonstrations.of(movements)
     for step in check_steps(steps):
         demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))
     return demonstrations
