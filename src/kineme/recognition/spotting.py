@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import TrajectoryError
+from kineme.recognition.conformal import check_error_rate
 from kineme.segmentation.bouts import Rows
 from kineme.segmentation.motion import Motion, observe
 from kineme.segmentation.rest import Rest
@@ -16,7 +17,7 @@ from kineme.segmentation.segment import as_recording, moving
 from kineme.segmentation.segmentation import pieces_of
 from kineme.segmentation.speed_minima import SpeedMinima
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import Array, check_count, check_number
+from kineme.validation import Array, check_count
 
 if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
@@ -31,7 +32,7 @@ _PER_MOVEMENT = 0.5  # typical durations that a movement costs: it pays from hal
 class Spotted(NamedTuple):
     """One stretch of motion: from when to when [s], what it is (None: no known movement), and how sure.
 
-    `confidence` is the p-value of the label, or for None one minus the largest p-value of any.
+    `confidence` is 1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
     """
 
     start: float
@@ -42,9 +43,7 @@ class Spotted(NamedTuple):
 
 def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
     """Find the movements that a recognizer knows in a recording; see `Recognizer.spot`."""
-    check_number("error_rate", error_rate, above=0.0)
-    if error_rate >= 1:
-        raise SpecificationError(f"expected error_rate below 1, got {error_rate!r}; 0.05 is five in a hundred")
+    check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
     whole = as_recording(recording)
     if whole.n_dims != recognizer.n_dims_:
@@ -61,7 +60,10 @@ def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_p
         return []
     best, p, score = _recognized(recognizer, whole, rows, error_rate)
     chosen = _best_chain(first, last, score, len(atoms))
-    found = [(first[c], last[c], recognizer.classes_[best[c]], float(p[c, best[c]])) for c in chosen]
+    found = [
+        (first[c], last[c], recognizer.classes_[best[c]], 1.0 - float(np.delete(p[c], best[c]).max(initial=0.0)))
+        for c in chosen
+    ]
     unknown = _left_over(first, last, chosen, bout)
     p_of = {(a, b): float(row.max()) for a, b, row in zip(first.tolist(), last.tolist(), p, strict=True)}
     found += [(a, b, None, 1.0 - p_of.get((a, b), 0.0)) for a, b in unknown]
@@ -103,8 +105,8 @@ def _recognized(
     logs = np.maximum.reduceat(recognizer.log_similarity(candidates), recognizer.first_, axis=1)
     durations = whole.times[rows[:, 1] - 1] - whole.times[rows[:, 0]]
     far = _log_tempo(recognizer, durations)
+    p = recognizer.calibration().p_values(logs, error_rate)
     logs = logs - 0.5 * (far / np.log(_TEMPO)) ** 2
-    p = recognizer.p_values(candidates) if hasattr(recognizer, "p_values") else _p_values(recognizer, logs)
     plausible = far <= np.log(_MAX_TEMPO)
     p, logs = np.where(plausible, p, 0.0), np.where(plausible, logs, -np.inf)
     best = logs.argmax(axis=1)
@@ -113,7 +115,7 @@ def _recognized(
     timed = recognizer.demonstrations_.movements.times is not None
     typical = float(np.median(recognizer.demonstrations_.durations if timed else durations))
     score = closeness * durations - _PER_MOVEMENT * typical
-    return best, p, np.where(p[one, best] >= error_rate, score, 0.0)
+    return best, p, np.where(p[one, best] > error_rate, score, 0.0)
 
 
 def _log_tempo(recognizer: Recognizer, durations: Array) -> Array:
@@ -125,19 +127,6 @@ def _log_tempo(recognizer: Recognizer, durations: Array) -> Array:
     low, high = (which.reduceat(demonstrated, recognizer.first_) for which in (np.minimum, np.maximum))
     seen = np.log(durations)[:, None]
     return np.asarray(np.maximum(np.maximum(low - seen, seen - high), 0.0))
-
-
-def _p_values(recognizer: Recognizer, logs: Array) -> Array:
-    """Share of demonstrations that are less like their own class, shape (n, C); 0 beyond half way to an impostor.
-
-    Each demonstration is compared with the others of its class. Where no class has two, only the bound decides.
-    """
-    among = recognizer.similarity_.log_average(recognizer.views_, recognizer.views_)
-    other = recognizer.labels_[:, None] != recognizer.labels_
-    genuine = np.where(other | np.eye(len(other), dtype=bool), -np.inf, among).max(axis=1)
-    genuine = np.sort(genuine[np.isfinite(genuine)])
-    p = (1.0 + np.searchsorted(genuine, logs, side="right")) / (1.0 + len(genuine))
-    return np.where(logs > 0.5 * _IMPOSTOR, p, 0.0)
 
 
 def _best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
