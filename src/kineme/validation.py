@@ -27,16 +27,15 @@ def describe(index: int, names: Sequence[str | None] | None) -> str:
     return f"trajectory {index}" + (f" ({name!r})" if name else "")
 
 
-def refuse_masked_and_complex(values: Any, who: str) -> None:
+def refuse_lossy(values: Any, who: str) -> None:
     """Refuse what NumPy would turn into plain numbers silently: masked samples and imaginary parts would be lost."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        raise TrajectoryError(
-            f"{who}: expected an array of numbers, got one with {np.ma.count_masked(values)} masked; drop the samples"
-        )
+    if type(values) is np.ndarray and values.dtype.kind == "f":  # the usual case, called once per movement
+        return
+    n_masked = int(values.mask.sum()) if isinstance(values, np.ma.MaskedArray) else 0
+    if n_masked:
+        raise TrajectoryError(f"{who}: expected an array of numbers, got one with {n_masked} masked; drop the samples")
     if getattr(getattr(values, "dtype", None), "kind", "") == "c":
-        raise TrajectoryError(
-            f"{who}: expected real numbers, got {values.dtype}; pass real and imaginary part as columns"
-        )
+        raise TrajectoryError(f"{who}: expected real numbers, got {values.dtype}; pass both parts as columns")
 
 
 def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
@@ -44,7 +43,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
 
     A 1-D array is one degree of freedom. Finiteness is checked by `check_finite`, for all movements at once.
     """
-    refuse_masked_and_complex(positions, who)
+    refuse_lossy(positions, who)
     try:
         x = np.asarray(positions, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -99,7 +98,7 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:
     """Check that one movement's time stamps are (n_samples,) numbers."""
-    if getattr(getattr(times, "dtype", None), "kind", "") in ("M", "m"):
+    if getattr(times, "dtype", np.float64) != np.float64 and np.asarray(times).dtype.kind in "Mm":
         raise TrajectoryError(
             f"{who}: expected times in seconds, got {times.dtype}, which counts in a unit of its own; "  # type: ignore[union-attr]
             "pass (times - times[0]) / np.timedelta64(1, 's')"

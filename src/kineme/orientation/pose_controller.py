@@ -45,14 +45,14 @@ class PoseState(NamedTuple):
 class PoseController:
     """Moves one pose primitive step by step; see `PosePrimitives.controller`.
 
-        A `Controller` of position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
-        the rollout. A goal that turns in flight moves in that chart. A step costs some tenths of a millisecond, most of it in
-    the way from rotation vectors to quaternions and angular velocities.
+    A `Controller` of position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
+    the rollout. A goal that turns in flight moves in that chart. A step costs some tenths of a millisecond, most of it
+    on the way from rotation vectors to quaternions and angular velocities.
 
-        Attributes
-        ----------
-        state : PoseState
-            After the last step; at first the start.
+    Attributes
+    ----------
+    state : PoseState
+        After the last step; at first the start.
     """
 
     def __init__(

@@ -12,15 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import (
-    Array,
-    as_positions,
-    as_times,
-    check_finite,
-    check_times,
-    describe,
-    refuse_masked_and_complex,
-)
+from kineme.validation import Array, as_positions, as_times, check_finite, check_times, describe, refuse_lossy
 
 Names = tuple[str | None, ...] | None
 
@@ -152,7 +144,7 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
         raise TrajectoryError("expected at least one movement, got none")
     if block.dtype.kind not in "biuf":
         raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
-    refuse_masked_and_complex(block, "the block")
+    refuse_lossy(block, "the block")
     as_positions(block[0], "every movement of the block")
     n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)

@@ -31,7 +31,7 @@ def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
 
 
 def preprocess(movements: Any, steps: Iterable[Step]) -> Demonstrations:
-    """Apply steps in order to movements, in any form; the result's ``steps`` records them after those already applied."""
+    """Apply steps in order to movements in any form; the result's ``steps`` records them after earlier ones."""
     demonstrations = Demonstrations.of(movements)
     for step in check_steps(steps):
         demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))
