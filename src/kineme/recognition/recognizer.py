@@ -234,6 +234,25 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_is_fitted(self)
         return np.asarray(self.classes_[partial_shares(self, X, early)[:, :-1].argmax(axis=1)])
 
+    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Any = None) -> Any:
+        """Recognize a movement while it is under way: `Live`, whose ``update(t, x)`` takes each sample.
+
+        Parameters
+        ----------
+        confidence : float, default 0.9
+            Share of the evidence at which a label is decided.
+        patience : float, default 0.05
+            How long it must be held, as a share of the time so far.
+        early : Early, optional
+            How much size, duration and timing may vary.
+        """
+        from kineme.recognition.decision import Decision
+        from kineme.recognition.hypotheses import Early
+        from kineme.recognition.stream import Live
+
+        check_is_fitted(self)
+        return Live(self, Decision(confidence, patience), early or Early())
+
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:
             return float(self.max_angle)

@@ -1,0 +1,78 @@
+"""What a live recognizer says after each sample."""
+
+from __future__ import annotations
+
+from enum import Flag, auto
+from typing import Any, NamedTuple
+
+from kineme.validation import Array
+
+
+class LiveStatus(Flag):
+    """What happened in an update; members combine. Nothing here is an exception: the stream goes on."""
+
+    UNDECIDED = auto()
+    DECIDED = auto()
+    TOO_SHORT = auto()
+    NOT_FINITE = auto()
+    TIME_NOT_INCREASING = auto()
+    WRONG_SHAPE = auto()
+    AVERAGED = auto()
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """One sentence for each member that is set."""
+        return tuple(MESSAGES[member] for member in self)
+
+
+MESSAGES = {
+    LiveStatus.UNDECIDED: "no label has been sure enough for long enough",
+    LiveStatus.DECIDED: "a label is decided",
+    LiveStatus.TOO_SHORT: "fewer than four samples that can be used, or no motion yet",
+    LiveStatus.NOT_FINITE: "a sample with NaN or infinity was skipped",
+    LiveStatus.TIME_NOT_INCREASING: "a sample that is not later than the one before was skipped",
+    LiveStatus.WRONG_SHAPE: "expected a time and d positions, or k times and (k, d) positions; the call was skipped",
+    LiveStatus.AVERAGED: "the stream is longer than what is kept: earlier samples are averages of several",
+}
+
+
+class Guess(NamedTuple):
+    """A class and its share of the evidence; the shares of all classes and of "unknown" sum to 1."""
+
+    label: Any
+    confidence: float
+
+
+class LiveState(NamedTuple):
+    """A movement in progress. Where there is nothing to say yet, numbers are NaN and arrays empty or None.
+
+    Attributes
+    ----------
+    ranked : tuple of Guess
+        All classes, the most likely first.
+    unknown : float
+        Share of a movement of no known class.
+    label : label or None
+        The decided one; None is undecided.
+    progress : float
+        Share of the path of the most likely class that is done, 0 to 1. Does not fall while that class stays.
+    path : ndarray of shape (20, d) or None
+        The rest of the movement, predicted, at even times from now to the arrival.
+    goal : ndarray of shape (d,) or None
+        Its end.
+    arrival : float
+        Predicted time stamp of the end [s].
+    skipped : int
+        Samples that could not be used so far; of a call in a wrong shape, one.
+    status : LiveStatus
+    """
+
+    ranked: tuple[Guess, ...]
+    unknown: float
+    label: Any
+    progress: float
+    path: Array | None
+    goal: Array | None
+    arrival: float
+    skipped: int
+    status: LiveStatus
