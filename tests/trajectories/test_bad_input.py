@@ -39,7 +39,7 @@ BAD_ARRAYS = {
     "no dimension": ([X, X[:, :0]], "got shape (8, 0)"),
     "words": ([X, ["left", "right", "up", "down"]], "trajectory 1 ('two'): expected positions to be an array of numbers, got could not convert"),
     "masked": ([X, np.ma.masked_greater(X, 0.9)], "trajectory 1 ('two'): expected an array of numbers, got one with 2 masked; drop the samples"),
-    "complex": ([X, X + 1j], "trajectory 1 ('two'): expected real numbers, got complex128; pass real and imaginary part as columns"),
+    "complex": ([X, X + 1j], "trajectory 1 ('two'): expected real numbers, got complex128; pass both parts as columns"),
     "rows of a movement": (X.tolist(), "expected at least 4 samples, got 2; pass one movement of several dimensions as [array]"),
     "ragged rows": ([X, [[1, 2], [3]]], "trajectory 1 ('two'): expected positions to be an array of numbers, got setting an array element"),
 }  # fmt: skip
