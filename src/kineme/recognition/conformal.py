@@ -53,7 +53,8 @@ class Calibration:
        demonstrations of its class as class c has, so that unequal classes compare; and scaled by a mean from which
        it is left out.
     3. None: ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c. An
-       assumption, and the rate is no longer guaranteed.
+       assumption: the rate is no longer guaranteed. On handwriting shown once, with everything perturbed, 0 to 11 %
+       of members were called unknown, 4 % on average.
 
     The scale s_c is the mean left-out distance of the class, drawn towards that of all classes as if by four more,
     since the mean of two or three is little known. With one demonstration of every class no distance within a class is

@@ -1,0 +1,34 @@
+"""Kinds of movements to recognize: smooth shapes, each shown several times with small variations."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kineme import Demonstrations
+
+
+def _waves(rng, n, d, decay):
+    k = np.arange(1, 6)
+    return rng.normal(size=(n, d, 5)) / k**decay
+
+
+def draw_shapes(counts, d=2, seed=0, spread=0.1, n_samples=80):
+    """Demonstrations: counts[c] movements of kind c, around a random shape that it has alone."""
+    rng = np.random.default_rng(seed)
+    u = np.linspace(0, 1, n_samples)
+    sines = np.sin(np.pi * u * np.arange(1, 6)[:, None])
+    kinds = _waves(rng, len(counts), d, 0.5)
+    line = rng.normal(size=(len(counts), d, 1)) * u
+    which = np.repeat(np.arange(len(counts)), counts)
+    paths = line[which] + (kinds[which] + spread * _waves(rng, len(which), d, 0.5)) @ sines
+    labels = np.array([f"kind {c:02d}" for c in which])
+    return Demonstrations.from_arrays(paths.transpose(0, 2, 1), labels, names=[f"no {i}" for i in range(len(which))])
+
+
+def turn(angle, d, seed=0):
+    """A rotation matrix by that angle; in space, about a random axis."""
+    if d == 2:
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    axis = np.random.default_rng(seed).normal(size=3)
+    return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()

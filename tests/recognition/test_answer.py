@@ -1,0 +1,120 @@
+"""The full answer: label, p-values, neighbors, the transform and who spoke."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from movement_samples import draw_shapes, turn
+
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.recognition.similarity import LOG_MEANS
+
+any_seed = given(seed=st.integers(0, 10**6))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@any_seed
+def test_the_transform_is_found_again(d, seed):
+    rng = np.random.default_rng(seed)
+    demos = draw_shapes([2] * 5, d, seed)
+    R, scale, shift = turn(rng.uniform(-0.6, 0.6), d, seed), rng.uniform(0.3, 3), rng.normal(size=d) * 5
+    i = int(rng.integers(10))
+    moved = Trajectory(3.0 * demos[i].times + 7, scale * demos[i].positions @ R.T + shift)
+    answer = Recognizer().fit(demos).recognize(moved)
+    assert answer.nearest[0].index == i
+    assert answer.nearest[0].name == f"no {i}"
+    assert answer.nearest[0].similarity == pytest.approx(1, abs=1e-3)
+    np.testing.assert_allclose(answer.transform.rotation, R, atol=1e-6)
+    np.testing.assert_allclose(answer.transform.scale, scale, rtol=1e-6)
+    np.testing.assert_allclose(answer.transform.shift, shift, atol=1e-5)
+    np.testing.assert_allclose(answer.transform.apply(demos[i].positions), moved.positions, atol=1e-5)
+    assert answer.transform.duration_ratio == pytest.approx(3)
+
+
+def test_the_angle_has_a_sign_in_the_plane_and_none_in_space():
+    for d, angle, expected in [(2, 0.4, 0.4), (2, -0.4, -0.4), (3, -0.4, 0.4)]:
+        demos = draw_shapes([1] * 4, d)
+        moved = demos[2].positions @ turn(angle, d).T
+        assert Recognizer().fit(demos).recognize(moved).transform.angle == pytest.approx(expected, abs=1e-6)
+
+
+def test_sizes_per_dimension():
+    demos = draw_shapes([1] * 4)
+    recognizer = Recognizer(scale="per-dimension", max_angle=0).fit(demos)
+    transform = recognizer.recognize(demos[1].positions * [2.0, 0.5] + [1.0, 3.0]).transform
+    np.testing.assert_allclose(transform.scale, [2.0, 0.5], rtol=0.05)
+    assert transform.angle == 0
+
+
+def test_what_is_not_taken_out_is_not_in_the_transform():
+    demos = draw_shapes([1] * 4)
+    transform = Recognizer(scale="none", translation=False, max_angle=0).fit(demos).recognize(demos[1]).transform
+    np.testing.assert_array_equal(transform.matrix, np.eye(2))
+    np.testing.assert_array_equal(transform.shift, 0)
+
+
+@pytest.mark.parametrize("classifier", ["nearest", "prototype", "svm"])
+def test_many_at_once_are_each_alone(classifier):
+    demos = draw_shapes([4] * 5, seed=4)
+    recognizer = Recognizer(classifier=classifier).fit(demos)
+    fresh = draw_shapes([2] * 5, seed=4, spread=0.2)
+    answers = recognizer.recognize(fresh)
+    assert [one.label for one in answers] == recognizer.predict_known(fresh).tolist()
+    for movement, answer in zip(fresh, answers, strict=True):
+        alone = recognizer.recognize(movement)
+        assert (alone.label, alone.ranked) == (answer.label, answer.ranked)
+        np.testing.assert_allclose(list(alone.p_values.values()), list(answer.p_values.values()))
+        np.testing.assert_allclose(alone.transform.matrix, answer.transform.matrix, atol=1e-5)
+        assert alone.confidence == pytest.approx(answer.confidence)
+
+
+def test_one_movement_in_a_list_is_a_list():
+    demos = draw_shapes([2, 2])
+    recognizer = Recognizer().fit(demos)
+    assert len(recognizer.recognize([demos[0]])) == 1
+    assert recognizer.recognize(demos[0].positions).label == "kind 00"
+
+
+def test_a_stranger_is_unknown_and_the_answer_says_what_it_is_most_like():
+    demos = draw_shapes([4] * 6)
+    u = np.linspace(0, 1, 90)
+    answer = Recognizer().fit(demos).recognize(np.column_stack((np.sin(40 * u), np.cos(31 * u))))
+    assert answer.label is None
+    assert answer.confidence == 1 - max(answer.p_values.values())
+    assert {demos.labels[near.index] for near in answer.nearest} == {answer.ranked[0]}
+    assert "label=None" in repr(answer)
+
+
+@any_seed
+def test_confidence_is_what_the_others_leave(seed):
+    demos = draw_shapes([4] * 6, seed=seed)
+    answer = Recognizer().fit(demos).recognize(demos[9])
+    assert answer.label == "kind 02"
+    assert answer.confidence == 1 - max(p for label, p in answer.p_values.items() if label != "kind 02")
+    assert [demos.labels[near.index] for near in answer.nearest] == ["kind 02"] * 3
+    assert np.all(np.diff([near.similarity for near in answer.nearest]) <= 0)
+    assert set(answer.ranked) == set(answer.p_values) == set(np.unique(demos.labels))
+
+
+@pytest.mark.parametrize("mean", LOG_MEANS)
+def test_shares_of_the_representations_sum_to_one(mean):
+    demos = draw_shapes([2] * 4)
+    answer = Recognizer(mean=mean).fit(demos).recognize(draw_shapes([1] * 4, spread=0.3)[1])
+    assert sum(answer.responsibilities.values()) == pytest.approx(1)
+    assert len(answer.responsibilities) == 3
+
+
+def test_with_uneven_timing_arc_length_speaks():
+    demos = draw_shapes([1] * 6)
+    late = np.linspace(0, 1, 80) ** 2.2
+    spoke = Recognizer().fit(demos).recognize(Trajectory(late, demos[3].positions)).responsibilities
+    assert spoke["forcing over time"] < 0.01
+
+
+def test_labels_that_are_numbers_stay_numbers():
+    demos = draw_shapes([2, 2, 2])
+    answer = Recognizer().fit(demos, np.repeat([3, 5, 8], 2)).recognize(Demonstrations.of(demos[2:3]))[0]
+    assert answer.label == 5
+    assert isinstance(answer.label, int)
