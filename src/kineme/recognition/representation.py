@@ -66,6 +66,8 @@ class Representation:
         else:
             relative = (along - along[:, :, :1]).reshape(-1, self.n_points)
             described = (relative @ _forcing_operator(self)).reshape(along.shape) / size
+            if not normalization.translation:  # f does not know the place; the average would forgive a wrong one
+                described = described + along.mean(axis=2, keepdims=True) / size
         return described.reshape(len(along), -1)
 
 
