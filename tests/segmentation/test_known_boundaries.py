@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
+from kineme.segmentation.bouts import moving_bouts
 
 seeds = st.integers(0, 10_000)
 
@@ -100,3 +101,9 @@ def test_change_points_separate_movements_from_rests(make_recording, seed, n, no
     assert ((cuts[:, 0] < middles[:, None]) & (middles[:, None] < cuts[:, 1])).any(axis=1).all()
     told = kineme.segment(known.recording, "change-points", n_pieces=2 * n + 1, cover=True)
     assert len(told) == 2 * n + 1
+
+
+def test_a_run_above_the_lower_threshold_counts_if_it_exceeds_the_higher_one():
+    speed = np.array([0, 2, 0, 2, 5, 2, 0, 2, 2, 6.0])
+    assert moving_bouts(speed, 1.0, 4.0).tolist() == [[3, 6], [7, 10]]
+    assert moving_bouts(speed, 1.0, 1.0).tolist() == [[1, 2], [3, 6], [7, 10]]
