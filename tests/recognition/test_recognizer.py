@@ -57,12 +57,12 @@ def _relative(x, other, **parameters):
 
 def test_each_parameter_takes_out_what_it_says():
     x = draw_shapes([1], seed=1)[0].positions
-    small, away, turned, wide = 0.4 * x, x + 3.0, x @ turn(1.2, 2).T, x * [2.0, 1.0]
+    small, away, turned, wide = 0.4 * x, x + 3.0, x @ turn(2.5, 2).T, x * [2.0, 1.0]
     assert _relative(x, small) > -0.01 > _relative(x, small, scale="none")
     assert _relative(x, away) > -0.01
     assert _relative(x, away, translation=False) < -1
     assert _relative(x, turned, max_angle=math.pi) > -0.01
-    assert _relative(x, turned) < -0.5
+    assert _relative(x, turned) < -1
     assert _relative(x, wide) < _relative(x, wide, scale="per-dimension")
 
 
