@@ -21,6 +21,7 @@ _WIDTH_MOVEMENTS = 60  # that the widths are estimated from, at most
 _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 #: An unknown movement is as far as a typical impostor, and as unlikely in size, duration and timing as a true one.
 _LOG_UNKNOWN = -0.5 / _WIDTH**2 - 1.5
+_EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
 
 
@@ -30,23 +31,25 @@ class Early:
 
     Parameters
     ----------
-    n_progress : int, default 20
-        Beginnings stored of each movement.
-    size_spread, duration_spread : float, default 0.5
-        Standard deviation of the logarithm of the ratio of sizes, and of durations, of two movements of one kind: 0.5
-        makes a factor of e = 2.7 either way two standard deviations. Take 0.1 where the application knows the size,
-        math.inf where anything goes: then a short beginning of anything is a small copy of something straight.
-    timing_spread : float, default 0.1
+    n_progress : int, default 40
+        Beginnings stored of each movement. On a coarse grid a corner that has just been passed falls between two.
+    size_spread : float, default 0.7
+        Standard deviation of the logarithm of the ratio of sizes of two movements of one kind: 0.7 makes a factor of 4
+        either way two standard deviations. Take 0.1 where the application knows the size, math.inf where anything
+        goes: then a short beginning of anything is a small copy of something straight.
+    duration_spread : float, default 0.35
+        The same for durations: a factor of 2 either way is two standard deviations.
+    timing_spread : float, default 0.05
         Root mean square difference of the times at which the same share of the path is reached, as a share of the time
         so far. Its influence grows only as a logarithm, so that a hesitation cannot shout down the path.
     max_angle : float, optional
         Largest rotation [rad]; by default the recognizer's.
     """
 
-    n_progress: int = 20
-    size_spread: float = 0.5
-    duration_spread: float = 0.5
-    timing_spread: float = 0.1
+    n_progress: int = 40
+    size_spread: float = 0.7
+    duration_spread: float = 0.35
+    timing_spread: float = 0.05
     max_angle: float | None = None
 
     def __post_init__(self) -> None:
@@ -114,7 +117,7 @@ class Hypotheses(NamedTuple):
         G = len(self.progress)
         top = evidence.max(axis=1, keepdims=True)
         sums = np.add.reduceat(np.exp(evidence - top), self.first.astype(int) * G, axis=1)
-        counts = np.diff(self.first, append=len(self.durations))
+        counts = np.diff(self.first, append=len(self.durations)) * (G / _EXPLAINING)
         with np.errstate(divide="ignore"):
             known = np.log(sums / counts) + top
         return np.column_stack((known, np.full(len(evidence), _LOG_UNKNOWN)))

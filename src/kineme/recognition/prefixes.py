@@ -15,7 +15,7 @@ from kineme.trajectories.resample import relative_rows
 from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array
 
-N_PREFIX = 50  # samples along the arc length of a beginning
+N_PREFIX = 32  # samples along the arc length of a beginning
 
 
 class Prefixes(NamedTuple):

@@ -1,0 +1,128 @@
+"""Beginnings of movements."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.recognition.early import cut, earliness, partial_shares
+from kineme.recognition.hypotheses import Early
+from kineme.recognition.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.smooth import Smooth
+
+
+def _spirals(n_dims, per_class=4, n_classes=4, seed=0):
+    """Smooth random curves, a class each, with small differences within a class and a pace of their own."""
+    rng, u = np.random.default_rng(seed), np.linspace(0.0, 1.0, 120)
+    waves = np.sin(np.pi * np.arange(1, 5)[:, None] * u)
+    kinds = rng.normal(size=(n_classes, n_dims, 4))
+    arrays, labels, times = [], [], []
+    for k in range(n_classes):
+        for _ in range(per_class):
+            own = kinds[k] + 0.05 * rng.normal(size=(n_dims, 4))
+            arrays.append((own @ waves + 2.0 * u * kinds[k, :, :1]).T)
+            times.append(u ** rng.uniform(0.9, 1.1) * rng.uniform(0.8, 1.2))
+            labels.append(f"kind {k}")
+    return Demonstrations.from_arrays(arrays, labels, times)
+
+
+def _split(demos, per_class=4):
+    known = np.arange(len(demos)) % per_class < 2
+    return demos[known], demos[~known]
+
+
+@pytest.mark.parametrize("n_dims", [1, 2, 3, 4])
+def test_more_of_the_path_is_at_least_as_good_in_any_dimension(n_dims):
+    train, test = _split(_spirals(n_dims))
+    recognizer = kineme.Recognizer().fit(train)
+    scores = earliness(recognizer, test, fractions=(0.3, 0.6, 1.0))
+    assert scores[-1] == 1.0
+    assert scores[0] <= scores[1] + 0.2
+    if n_dims > 1:
+        assert scores[1] >= 0.85
+
+
+def test_half_of_the_path_of_real_movements():
+    demos = kineme.load_lasa()
+    demos = demos[[i for i, label in enumerate(demos.labels) if not label.startswith("Multi")]]
+    train = np.arange(len(demos)) % 7 < 3
+    recognizer = kineme.Recognizer().fit(demos[train])
+    half, most = earliness(recognizer, demos[~train], fractions=(0.5, 0.7))
+    assert half >= 0.93
+    assert most >= 0.97
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_beginnings_do_not_see_place_or_size(seed):
+    rng = np.random.default_rng(seed)
+    paths = np.cumsum(rng.normal(size=(3, 2, 200)), axis=2)
+    progress = np.array([0.3, 1.0])
+    plain, moved = beginnings(paths, progress), beginnings(5.0 * paths + 3.0, progress)
+    np.testing.assert_allclose(moved.positions, plain.positions, atol=1e-9)
+    np.testing.assert_allclose(moved.directions, plain.directions, atol=1e-9)
+    np.testing.assert_allclose(moved.sizes, 5.0 * plain.sizes)
+    np.testing.assert_allclose(np.linalg.norm(plain.positions, axis=1), 1.0)
+    np.testing.assert_allclose(np.linalg.norm(plain.directions, axis=1), 1.0)
+
+
+def test_a_straight_line_at_even_speed():
+    paths = np.stack([np.linspace(0.0, 2.0, 200), np.zeros(200)])[None]
+    seen = beginnings(paths, np.array([0.25, 0.5]))
+    np.testing.assert_allclose(seen.lengths, [0.5, 1.0])
+    np.testing.assert_allclose(seen.elapsed, [0.25, 0.5])
+    np.testing.assert_allclose(seen.timing * np.sqrt(N_PREFIX), np.tile(np.linspace(0, 1, N_PREFIX), (2, 1)), atol=1e-9)
+
+
+def test_the_smoother_is_the_smoothing_spline():
+    x = np.cumsum(np.random.default_rng(1).normal(size=(200, 2)), axis=0)
+    spline = Smooth(10.0).apply(Demonstrations.from_arrays([x])).positions
+    np.testing.assert_allclose(smoother(10.0) @ x, spline, atol=1e-8)
+    np.testing.assert_allclose(smooth_paths(Demonstrations.from_arrays([x]), 10.0)[0].T, spline - spline[0], atol=1e-8)
+
+
+def test_what_resembles_nothing_is_unknown():
+    train, test = _split(_spirals(2))
+    recognizer = kineme.Recognizer().fit(train)
+    t = np.linspace(0.0, 1.0, 200)
+    loops = np.stack([np.cos(25.0 * t), np.sin(25.0 * t)], axis=1)
+    assert partial_shares(recognizer, [loops])[0, -1] > 0.9
+    shares = partial_shares(recognizer, test)
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
+    assert np.median(shares[:, -1]) < 0.2
+
+
+def test_a_known_size_tells_a_large_movement_from_a_small_one():
+    train, _ = _split(_spirals(2, n_classes=2))
+    both = Demonstrations.from_arrays(
+        [one.positions * (3.0 if i % 2 else 1.0) for i, one in enumerate(train[:2]) for _ in (0,)] * 2,
+        ["small", "large"] * 2,
+    )
+    recognizer = kineme.Recognizer(scale="none").fit(both)
+    np.testing.assert_array_equal(recognizer.predict_partial(cut(both, 0.9)), both.labels)
+
+
+@pytest.mark.parametrize(
+    ("wishes", "message"),
+    [
+        ({"n_progress": 1}, "expected n_progress to be a whole number of at least 2, got 1"),
+        ({"size_spread": 0.0}, "expected size_spread to be a number above 0, got 0.0"),
+        ({"duration_spread": math.nan}, "expected duration_spread to be a number above 0, got nan"),
+    ],
+)
+def test_wishes_out_of_range_are_refused(wishes, message):
+    with pytest.raises(SpecificationError, match=message):
+        Early(**wishes)
+
+
+def test_wrong_inputs_are_refused():
+    train, test = _split(_spirals(2))
+    recognizer = kineme.Recognizer().fit(train)
+    with pytest.raises(TrajectoryError, match="expected movements of 2 dimensions as in fit, got 3"):
+        recognizer.predict_partial(np.zeros((1, 10, 3)))
+    with pytest.raises(SpecificationError, match=r"expected a fraction above 0 and at most 1, got 1\.5"):
+        cut(test, 1.5)
