@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.prefixes import Prefixes, beginnings, smooth_paths
@@ -80,7 +81,7 @@ class Hypotheses(NamedTuple):
 
     early: Early
     procrustes: Procrustes
-    first: Array
+    first: NDArray[np.intp]
     progress: Array
     paths: Array
     durations: Array
@@ -116,7 +117,7 @@ class Hypotheses(NamedTuple):
         """
         G = len(self.progress)
         top = evidence.max(axis=1, keepdims=True)
-        sums = np.add.reduceat(np.exp(evidence - top), self.first.astype(int) * G, axis=1)
+        sums = np.add.reduceat(np.exp(evidence - top), self.first * G, axis=1)
         counts = np.diff(self.first, append=len(self.durations)) * (G / _EXPLAINING)
         with np.errstate(divide="ignore"):
             known = np.log(sums / counts) + top
@@ -153,7 +154,7 @@ def prepare(procrustes: Procrustes, prefixes: Prefixes) -> tuple[Prepared, ...]:
     return tuple(procrustes.prepare(rows.astype(np.float32)) for rows in (prefixes.positions, prefixes.directions))
 
 
-def _widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels: Array) -> Array:
+def _widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels: NDArray[np.intp]) -> Array:
     """A share of the typical distance from a beginning to the nearest one of another class, at any progress."""
     m, G = len(labels), len(views[0].rows) // len(labels)
     chosen = np.unique(np.linspace(0, m - 1, _WIDTH_MOVEMENTS).astype(int))
