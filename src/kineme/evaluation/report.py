@@ -63,7 +63,7 @@ def rivals_ahead(protocol: str, results: Results) -> str:
         ours = results.mean(protocol, OURS, condition, measure)
         for rival in results.outcomes[protocol]:
             theirs = results.mean(protocol, rival, condition, measure)
-            if ours is not None and theirs is not None and theirs > ours + 5e-7:
+            if ours is not None and theirs is not None and round(theirs, 3) > round(ours, 3):
                 what = "" if measure == "accuracy" else f" in {_MEASURES[measure]}"
                 found.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
     return f"Ahead of kineme: {'; '.join(found)}." if found else "No rival is ahead of kineme anywhere in this table."
