@@ -105,3 +105,11 @@ def test_without_rotation_it_is_euclid(d, seed):
 def test_angles_out_of_range(d, angle, words):
     with pytest.raises(SpecificationError, match=words):
         Procrustes(d, angle)
+
+
+@any_seed
+def test_few_rows_are_compared_as_many_are(seed):
+    A, B = _rows(seed, 20, 2), _rows(seed + 1, 7, 2)
+    procrustes = Procrustes(2, 0.5)
+    many = _distances(procrustes, A, B)
+    np.testing.assert_allclose(np.vstack([_distances(procrustes, a[None], B) for a in A]), many, rtol=1e-10)

@@ -79,7 +79,7 @@ class Procrustes:
         if self.max_angle == 0 or self.n_dims == 1:
             return np.asarray(A.rows @ B.rows.T)
         if self.n_dims == 2:
-            return _within(A.rows.conj() @ B.rows.T, self.max_angle)  # the angle's sign does not matter here
+            return _within(_products(A.rows, B.rows), self.max_angle)  # the angle's sign does not matter here
         return _aligned_in_space(A.rows, B.rows, self.max_angle)
 
     def rotations(self, A: Array, B: Array) -> Array:
@@ -96,10 +96,23 @@ class Procrustes:
         return _turned_back(_best_rotations(C), self.max_angle)
 
 
+_MANY = 16  # rows from which on the complex product pays
+
+
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     """Rows x_1 ... x_S, y_1 ... y_S as complex rows x + i y."""
     half = rows.shape[1] // 2
     return rows[:, :half] + 1j * rows[:, half:]
+
+
+def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
+    """``conj(A) @ B.T``; for few rows as a real product, many times faster than a complex one."""
+    if len(A) >= _MANY:
+        return np.asarray(A.conj() @ B.T)
+    real = B.real.dtype
+    twice = np.concatenate((A, 1j * A)).astype(A.dtype)
+    parts = np.ascontiguousarray(twice).view(real) @ np.ascontiguousarray(B).view(real).T
+    return np.asarray(parts[: len(A)] + 1j * parts[len(A) :])
 
 
 def _within(product: NDArray[np.complex128], max_angle: float) -> Array:
