@@ -13,7 +13,7 @@ from kineme.validation import Array
 
 
 class Ours:
-    """`Recognizer`; familiarity is the score of the best class, the logarithm of the averaged kernel for few shots."""
+    """`Recognizer`; familiarity is the smallest nonconformity to any class, negated."""
 
     def __init__(self, max_angle: float | None) -> None:
         self.recognizer = Recognizer(max_angle=max_angle)
@@ -25,7 +25,7 @@ class Ours:
     def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and familiarity of each movement."""
         scores = self.recognizer.decision_function(demonstrations)
-        return self.recognizer.classes_[scores.argmax(axis=1)], scores.max(axis=1)
+        return self.recognizer.classes_[scores.argmax(axis=1)], -self.recognizer.novelty(demonstrations)
 
     @property
     def answer_partial(self) -> Callable[[Demonstrations], NDArray[Any]] | None:

@@ -49,7 +49,7 @@ class Procrustes:
     """
 
     n_dims: int
-    max_angle: float = math.pi / 4
+    max_angle: float = math.pi / 3
 
     def __post_init__(self) -> None:
         check_number("max_angle", self.max_angle, least=0.0)

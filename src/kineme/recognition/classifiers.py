@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
 _MANY = 8  # demonstrations of every class, from which on "auto" takes the SVM
+_LARGEST_GRAM = 4000  # demonstrations; beyond, "auto" keeps memory linear in them
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
 
 
@@ -84,6 +85,7 @@ CLASSIFIERS: dict[str, type[Any]] = {"nearest": Nearest, "prototype": Prototype,
 def choose(name: str, per_class: NDArray[Any]) -> Classifier:
     """The classifier of that name; "auto" by the number of demonstrations per class."""
     if name == "auto":
-        name = "svm" if len(per_class) > 1 and per_class.min() >= _MANY else "nearest"
+        few = len(per_class) == 1 or per_class.min() < _MANY or per_class.sum() > _LARGEST_GRAM
+        name = "nearest" if few else "svm"
     chosen: Classifier = CLASSIFIERS[name]()
     return chosen

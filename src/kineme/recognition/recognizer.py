@@ -34,7 +34,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     representations : tuple of Representation, optional
         By default positions over arc length, forcing term over arc length, forcing term over time.
     max_angle : float, optional
-        Largest rotation [rad] between movements of one kind; by default pi/4 in two and three dimensions, else 0. Each
+        Largest rotation [rad] between movements of one kind; by default pi/3 in two and three dimensions, else 0. Each
         invariance merges something: pi merges N and Z, more than a right angle V and caret.
     scale : {"path", "per-dimension", "none"}, default "path"
         What of the size is taken out, see `Normalization`. "path" merges a dot and a circle.
@@ -46,7 +46,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         The A-average over representations.
     classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
         "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
-        the SVM from eight demonstrations of every class on, else the nearest.
+        the SVM from eight demonstrations of every class on, up to 4000 in all, else the nearest.
 
     Attributes
     ----------
@@ -256,7 +256,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:
             return float(self.max_angle)
-        return math.pi / 4 if n_dims in (2, 3) else 0.0
+        return math.pi / 3 if n_dims in (2, 3) else 0.0
 
     def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
         seen = view(demos, self.looks(), Normalization(self.translation, self.scale), self.cutoff)
