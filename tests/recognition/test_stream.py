@@ -130,6 +130,13 @@ def test_what_cannot_be_used_is_skipped_counted_and_flagged(recognizer, movement
     assert live.finish().label == movement.label
 
 
+def test_a_repeated_time_stamp_is_skipped(recognizer, movement):
+    live = recognizer.stream()
+    live.update(movement.times[:50], movement.positions[:50])
+    state = live.update(movement.times[49], movement.positions[49] + 1.0)
+    assert (LiveStatus.TIME_NOT_INCREASING in state.status, state.skipped) == (True, 1)
+
+
 def test_nothing_is_claimed_before_there_is_motion(recognizer):
     live = recognizer.stream()
     for k in range(10):
