@@ -77,6 +77,10 @@ class Hypotheses(NamedTuple):
     views : tuple of Prepared
         Positions and directions.
     widths : ndarray of shape (2,)
+    log_lengths, log_durations : ndarray of shape (m * G,)
+        Of the stored beginnings.
+    timing_squares : ndarray of shape (m * G,)
+        Squared norms of the rows of `stored.timing`.
     """
 
     early: Early
@@ -88,6 +92,9 @@ class Hypotheses(NamedTuple):
     stored: Prefixes
     views: tuple[Prepared, ...]
     widths: Array
+    log_lengths: Array
+    log_durations: Array
+    timing_squares: Array
 
     def log_evidence(self, seen: Prefixes, durations: Array) -> Array:
         """Logarithm of the evidence for each hypothesis, shape (n, m * G).
@@ -100,13 +107,11 @@ class Hypotheses(NamedTuple):
         near = LOG_MEANS["arithmetic"](
             np.stack([-self.procrustes.squared_distances(a, b) / (2.0 * w * w) for a, b, w in squares])
         )
-        sizes = np.log(_positive(seen.lengths))[:, None] - np.log(_positive(self.stored.lengths))
-        stored_durations = np.repeat(self.durations, len(self.progress)) * self.stored.elapsed
-        longer = np.log(_positive(durations))[:, None] - np.log(_positive(stored_durations))
+        sizes = np.log(_positive(seen.lengths))[:, None] - self.log_lengths
+        longer = np.log(_positive(durations))[:, None] - self.log_durations
         near -= 0.5 * (sizes / self.early.size_spread) ** 2 + 0.5 * (longer / self.early.duration_spread) ** 2
-        late = ((seen.timing**2).sum(axis=1)[:, None] + (self.stored.timing**2).sum(axis=1)) - (
-            2.0 * seen.timing @ self.stored.timing.T
-        )
+        norms = (seen.timing**2).sum(axis=1)[:, None] + self.timing_squares
+        late = norms - 2.0 * (seen.timing @ self.stored.timing.T)
         return np.asarray(near - np.log1p(np.maximum(late, 0.0) / (2.0 * self.early.timing_spread**2)))
 
     def log_classes(self, evidence: Array) -> Array:
@@ -146,6 +151,9 @@ def hypotheses(recognizer: Recognizer, early: Early) -> Hypotheses:
         stored,
         views,
         _widths(procrustes, views, labels),
+        np.log(_positive(stored.lengths)),
+        np.log(_positive(np.repeat(recognizer.demonstrations_.durations, len(progress)) * stored.elapsed)),
+        (stored.timing**2).sum(axis=1),
     )
 
 
