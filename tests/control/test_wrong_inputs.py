@@ -77,7 +77,11 @@ def test_a_dt_of_nothing_or_more_than_the_duration_is_left_out(bio, value):
     assert_goes_on(bio, {"dt": value}, Status.DT_REJECTED)
 
 
-@pytest.mark.parametrize("value", [v for k, v in BAD_VECTORS.items() if k not in ("two rows", "nothing")], ids=repr)
+@pytest.mark.parametrize(
+    "value",
+    [v for k, v in BAD_VECTORS.items() if k not in ("two rows", "nothing")],
+    ids=lambda value: type(value).__name__,
+)
 def test_bad_obstacles_are_left_out(bio, value):
     assert_goes_on(bio, {"obstacles": value}, Status.OBSTACLES_REJECTED)
 
