@@ -7,6 +7,7 @@ import io
 import re
 import subprocess
 import tokenize
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,12 @@ def test_files_and_functions_are_short(path):
 def test_no_file_is_a_drawer_for_anything():
     drawers = {"util", "utils", "helper", "helpers", "common", "misc"}
     assert not [path for path in SOURCES if path.stem.strip("_") in drawers or path.parent.name in drawers]
+
+
+def test_test_files_have_names_of_their_own():
+    """Tests are no packages, so that they import their samples plainly; two of one name could not both be loaded."""
+    names = sorted(path.name for path in (ROOT / "tests").rglob("*.py") if path.name != "conftest.py")
+    assert [one for one, other in pairwise(names) if one == other] == []
 
 
 def _tracked():

@@ -113,7 +113,7 @@ def test_a_demonstration_has_no_say_in_its_own_scale():
     """Two of each class: were it in, no score could exceed (2 + 4) / 2 of its mean."""
     calibration = calibrate(Recognizer().fit(draw_shapes([2] * 12, seed=5)))
     left = recognizer_distances(Recognizer().fit(draw_shapes([2] * 12, seed=5)))
-    np.testing.assert_allclose(calibration.pooled[0], left / left.mean(), rtol=1e-6)
+    np.testing.assert_allclose(calibration.pooled[0], left / left.mean(), rtol=3e-5)  # rows are single precision
 
 
 def recognizer_distances(recognizer):

@@ -72,7 +72,7 @@ def test_a_mirror_image_is_not_the_movement():
 
 
 def test_what_the_invariances_merge():
-    """A dot and a circle but for their size; N and Z but for half a right angle and more."""
+    """A dot and a circle but for their size; N and Z, a right angle apart, but for the angle allowed."""
     u = np.linspace(0, 2 * math.pi, 80)
     circle = np.column_stack((np.cos(u), np.sin(u)))
     assert _relative(circle, 0.01 * circle) > -0.01 > _relative(circle, 0.01 * circle, scale="none")
@@ -80,7 +80,8 @@ def test_what_the_invariances_merge():
     N = np.column_stack([np.interp(np.linspace(0, 3, 100), range(4), corners[:, k]) for k in (0, 1)])
     Z = N @ turn(-math.pi / 2, 2).T
     assert _relative(N, Z, max_angle=math.pi) > -0.01
-    assert _relative(N, Z) < -1
+    assert _relative(N, Z, max_angle=math.pi / 4) < -1
+    assert _relative(N, Z) < -0.5  # 60 degrees by default: 30 are left
 
 
 def test_nearest_is_one_nearest_neighbor_on_the_similarity():
