@@ -95,8 +95,9 @@ def test_nearest_is_one_nearest_neighbor_on_the_similarity():
 def test_svm_is_scikit_learns_on_the_precomputed_similarity():
     demos, fresh = draw_shapes([8] * 4, seed=2, spread=0.6), draw_shapes([9] * 4, seed=2, spread=0.9)
     recognizer = Recognizer(classifier="svm").fit(demos)
-    machine = SVC(kernel="precomputed", C=1000.0).fit(np.exp(recognizer.log_similarity(demos)), demos.labels)
-    expected = machine.decision_function(np.exp(recognizer.log_similarity(fresh)))
+    wider = recognizer.similarity_.widened(2.0)
+    own, seen = (np.exp(wider.log_average(recognizer.look_at(one), recognizer.views_)) for one in (demos, fresh))
+    expected = SVC(kernel="precomputed", C=1000.0).fit(own, demos.labels).decision_function(seen)
     np.testing.assert_allclose(recognizer.decision_function(fresh), expected, atol=1e-5)
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _MANY = 8  # demonstrations of every class, from which on "auto" takes the SVM
 _LARGEST_GRAM = 4000  # demonstrations; beyond, "auto" keeps memory linear in them
+_WIDER = 2.0  # times the width: an impostor counts exp(-1)
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
 
 
@@ -61,19 +62,24 @@ class Prototype:
 
 
 class SupportVectors:
-    """scikit-learn's SVM on the averaged kernel, one class against the rest."""
+    """scikit-learn's SVM on the averaged kernel, one class against the rest.
+
+    The kernels are twice as wide as for the nearest: there, only the closest movement shall speak; an SVM weighs many,
+    and between demonstrations that do not see each other it has nothing to weigh.
+    """
 
     def fit(self, recognizer: Recognizer) -> None:
         """Fit on the Gram matrix of the stored demonstrations."""
         from sklearn.svm import SVC
 
-        gram = np.exp(recognizer.similarity_.log_average(recognizer.views_, recognizer.views_))
+        self.similarity_ = recognizer.similarity_.widened(_WIDER)
+        gram = np.exp(self.similarity_.log_average(recognizer.views_, recognizer.views_))
         self.model_ = SVC(kernel="precomputed", C=_PENALTY, decision_function_shape="ovr")
         self.model_.fit(gram, recognizer.labels_)
 
     def scores(self, recognizer: Recognizer, seen: tuple[Prepared, ...]) -> Array:
         """The SVM's decision values; of two classes, the negative and the positive one."""
-        gram = np.exp(recognizer.similarity_.log_average(seen, recognizer.views_))
+        gram = np.exp(self.similarity_.log_average(seen, recognizer.views_))
         values = np.asarray(self.model_.decision_function(gram))
         return np.column_stack((-values, values)) if values.ndim == 1 else values
 

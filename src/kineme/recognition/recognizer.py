@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.recognition.choice import CANDIDATES, chosen_weights, given_weights, suffices
 from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.labels import check_labels
@@ -32,7 +33,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     representations : tuple of Representation, optional
-        By default positions over arc length, forcing term over arc length, forcing term over time.
+        By default positions over arc length, forcing term over arc length, forcing term over time; where `weights`
+        are chosen, also positions over time and both over a blend of time and arc length.
     max_angle : float, optional
         Largest rotation [rad] between movements of one kind; by default pi/3 in two and three dimensions, else 0. Each
         invariance merges something: pi merges N and Z, more than a right angle V and caret.
@@ -44,6 +46,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
+    weights : {"auto", "equal"} or sequence of R numbers, default "auto"
+        Of the representations in the arithmetic mean. "auto" chooses them on the training movements from eight of every
+        class on, see `chosen_weights`; with fewer, or with another mean, they are equal.
     classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
         "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
         the SVM from eight demonstrations of every class on, up to 4000 in all, else the nearest.
@@ -54,6 +59,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Labels, sorted.
     demonstrations_ : Demonstrations
         The training movements, ordered by class.
+    representations_ : tuple of R Representation
+        Those that speak.
+    weights_ : ndarray of shape (R,)
+        How loudly; they sum to 1.
     widths_ : ndarray of shape (R,)
         Kernel width of each representation.
     n_dims_ : int
@@ -76,6 +85,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         cutoff: float | None = 10.0,
         mean: str = "arithmetic",
         classifier: str = "auto",
+        weights: str | Sequence[float] = "auto",
     ) -> None:
         self.representations = representations
         self.max_angle = max_angle
@@ -84,6 +94,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.cutoff = cutoff
         self.mean = mean
         self.classifier = classifier
+        self.weights = weights
 
     def fit(self, X: Any, y: Any = None) -> Self:
         """Store the demonstrations as the recognizer sees them.
@@ -108,11 +119,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.demonstrations_ = demos[order]
         self.labels_ = labels[order]
         self.first_ = first  # of each class, in the order of the demonstrations
-        self.views_ = self._view(self.demonstrations_)
-        widths = impostor_widths(self.procrustes_, self.views_, self.labels_)
-        self.widths_ = widths
-        self.similarity_ = AveragedSimilarity(self.procrustes_, widths, self.mean)
-        self.classifier_: Classifier = choose(self.classifier, np.diff(first, append=len(labels)))
+        per_class = np.diff(first, append=len(labels))
+        self._choose_representations(per_class)
+        self.classifier_: Classifier = choose(self.classifier, per_class)
         self.classifier_.fit(self)
         self.calibration_: Calibration | None = None  # of what was fitted before
         return self
@@ -193,8 +202,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return self.calibration_
 
     def looks(self) -> tuple[Representation, ...]:
-        """The representations, those chosen by default included."""
-        return DEFAULT_REPRESENTATIONS if self.representations is None else tuple(self.representations)
+        """The representations that speak."""
+        check_is_fitted(self)
+        return self.representations_
 
     def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Any]:
         """Find known movements in one long recording, with unknown between them.
@@ -252,6 +262,40 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         check_is_fitted(self)
         return Live(self, Decision(confidence, patience), early or Early())
+
+    def _choose_representations(self, per_class: NDArray[Any]) -> None:
+        """Look at the demonstrations, set the widths and the weights, and keep the representations with weight."""
+        choosing = self._chooses(per_class)
+        given = CANDIDATES if choosing else DEFAULT_REPRESENTATIONS
+        looks = given if self.representations is None else tuple(self.representations)
+        self.representations_ = looks
+        views = self._view(self.demonstrations_)
+        widths = impostor_widths(self.procrustes_, views, self.labels_)
+        weights = np.full(len(looks), 1.0 / len(looks))
+        if choosing:
+            n_usual = len(looks) if self.representations else len(DEFAULT_REPRESENTATIONS)
+            equal = AveragedSimilarity(self.procrustes_, widths)
+            weights = chosen_weights(equal, views, self.labels_, n_usual)
+        elif not isinstance(self.weights, str):
+            weights = given_weights(self.weights, len(looks))
+        kept = np.flatnonzero(weights)
+        self.representations_ = tuple(looks[r] for r in kept)
+        self.views_ = tuple(views[r] for r in kept)
+        self.widths_, self.weights_ = widths[kept], weights[kept]
+        self.similarity_ = AveragedSimilarity(self.procrustes_, self.widths_, self.mean, self.weights_)
+
+    def _chooses(self, per_class: NDArray[Any]) -> bool:
+        """Whether the weights are chosen on these movements."""
+        if isinstance(self.weights, str):
+            check_choice("weights", self.weights, ["auto", "equal"])
+        elif self.mean != "arithmetic":
+            raise SpecificationError(f"expected weights with mean='arithmetic', got them with mean={self.mean!r}")
+        return (
+            isinstance(self.weights, str)
+            and self.weights == "auto"
+            and self.mean == "arithmetic"
+            and suffices(per_class)
+        )
 
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:

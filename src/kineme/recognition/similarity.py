@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -51,10 +51,10 @@ SHARES: dict[str, Callable[[Array], Array]] = {
 class AveragedSimilarity:
     """An A-average of one RBF kernel per representation, each on its Procrustes distance.
 
-    ``k_r(a, b) = exp(-d_r(a, b)^2 / (2 sigma_r^2))`` and ``K = mean_r k_r``. A narrow, bounded kernel lets each
-    representation say only "this one is close", so one that is misled cannot shout the others down, as it does in a sum
-    of distances. Logarithms keep the order of movements that are far in every representation, where each
-    k_r has long underflowed.
+    ``k_r(a, b) = exp(-d_r(a, b)^2 / (2 sigma_r^2))`` and ``K = mean_r k_r``, or ``sum_r w_r k_r``. A narrow,
+    bounded kernel lets each representation say only "this one is close", so one that is misled cannot shout the others
+    down, as it does in a sum of distances. Logarithms keep the order of movements that are far in every representation,
+    where each k_r has long underflowed.
 
     The arithmetic mean is positive semi-definite where each k_r is: with ``max_angle = 0``. A Procrustes distance is
     not Euclidean, and no claim is made for it.
@@ -63,11 +63,19 @@ class AveragedSimilarity:
     procrustes: Procrustes
     widths: Array  # (R,)
     mean: str = "arithmetic"
+    weights: Array | None = None  # (R,), positive, summing to 1; equal if None
 
     def logs(self, A: tuple[Prepared, ...], B: tuple[Prepared, ...]) -> Array:
-        """Logarithms of each representation's kernel, shape (R, n, m)."""
+        """Logarithms of each representation's kernel times R times its weight, shape (R, n, m)."""
         pairs = zip(A, B, self.widths, strict=True)
-        return np.stack([-self.procrustes.squared_distances(a, b) / (2.0 * width**2) for a, b, width in pairs])
+        logs = np.stack([-self.procrustes.squared_distances(a, b) / (2.0 * width**2) for a, b, width in pairs])
+        if self.weights is not None and (self.weights != self.weights[0]).any():
+            logs += np.log(len(logs) * self.weights)[:, None, None]
+        return logs
+
+    def widened(self, factor: float) -> AveragedSimilarity:
+        """The same average of kernels `factor` times as wide."""
+        return replace(self, widths=factor * self.widths)
 
     def log_average(self, A: tuple[Prepared, ...], B: tuple[Prepared, ...]) -> Array:
         """Logarithms of the averaged kernel, shape (n, m)."""

@@ -1,0 +1,118 @@
+"""Representations and weights chosen on the training movements."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from movement_samples import draw_shapes
+from sklearn.base import clone
+
+from kineme import Recognizer
+from kineme.errors import SpecificationError
+from kineme.recognition.choice import CANDIDATES, aligned_weights
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
+
+
+def _timed(n, seed):
+    """One noisy path, done early or late: classes that differ in timing only."""
+    random = np.random.default_rng(seed)
+    u = np.linspace(0, 1, 80)
+    movements, labels = [], []
+    for i in range(n):
+        bend = 1 + 0.3 * random.normal()
+        phase = u ** (2.0 if i % 2 else 0.5)
+        movements.append(np.column_stack((phase, bend * np.sin(3 * phase))) + 0.002 * random.normal(size=(80, 2)))
+        labels.append("late" if i % 2 else "early")
+    return movements, labels
+
+
+def test_what_differs_in_timing_only_is_left_to_time():
+    recognizer = Recognizer(classifier="nearest").fit(*_timed(24, seed=0))
+    over_time = [one.arc_share == 0 for one in recognizer.representations_]
+    assert recognizer.weights_[over_time].sum() > 0.5
+    fresh, truth = _timed(60, seed=1)
+    assert recognizer.score(fresh, truth) == 1.0
+    assert recognizer.score(fresh, truth) >= clone(recognizer).set_params(weights="equal").fit(
+        *_timed(24, seed=0)
+    ).score(fresh, truth)
+
+
+def test_the_weights_are_those_of_largest_centered_alignment():
+    """Against a search over all weights on a grid of twentieths."""
+    demos = draw_shapes([9] * 3, seed=4, spread=1.2)
+    recognizer = Recognizer(DEFAULT_REPRESENTATIONS, weights="equal").fit(demos)
+    weights = aligned_weights(recognizer.similarity_, recognizer.views_, recognizer.labels_)
+    kernels = np.exp(recognizer.similarity_.logs(recognizer.views_, recognizer.views_))
+    same = (recognizer.labels_[:, None] == recognizer.labels_[None]).astype(float)
+
+    def centered(gram):
+        off = ~np.eye(len(gram), dtype=bool)
+        H = np.eye(len(gram)) - 1.0 / len(gram)
+        own = np.where(off, gram, 0.0).sum(axis=1) / (len(gram) - 1)
+        return (H @ np.where(off, gram, np.diag(own)) @ H)[off]
+
+    def alignment(w):
+        joint, target = centered(np.tensordot(w, kernels, 1)), centered(same)
+        return joint @ target / np.linalg.norm(joint) / np.linalg.norm(target)
+
+    grid = [np.array(w) / 20 for w in itertools.product(range(21), repeat=3) if sum(w) == 20]
+    assert alignment(weights) >= max(map(alignment, grid)) - 1e-4
+
+
+@pytest.mark.parametrize("counts", [[1, 1, 1], [7, 9], [30]])
+def test_few_or_one_class_keep_equal_weights_and_three_representations(counts):
+    recognizer = Recognizer().fit(draw_shapes(counts))
+    assert recognizer.representations_ == DEFAULT_REPRESENTATIONS
+    np.testing.assert_array_equal(recognizer.weights_, np.full(3, 1 / 3))
+
+
+def test_many_choose_among_six_and_keep_what_speaks():
+    recognizer = Recognizer().fit(draw_shapes([8] * 4, spread=0.8))
+    assert set(recognizer.representations_) <= set(CANDIDATES)
+    assert (recognizer.weights_ > 0).all()
+    assert recognizer.weights_.sum() == pytest.approx(1.0)
+    assert len(recognizer.views_) == len(recognizer.widths_) == len(recognizer.representations_)
+    answer = recognizer.recognize(recognizer.demonstrations_[0])
+    assert set(answer.responsibilities) == {one.name for one in recognizer.looks()}
+    assert sum(answer.responsibilities.values()) == pytest.approx(1.0)
+
+
+def test_given_weights_are_those_of_the_weighted_mean():
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    equal = Recognizer().fit(demos)
+    given = Recognizer(weights=(2.0, 1.0, 1.0)).fit(demos)
+    each = np.exp(equal.similarity_.logs(equal.look_at(fresh), equal.views_))
+    expected = np.log(np.tensordot([0.5, 0.25, 0.25], each, 1))
+    np.testing.assert_allclose(given.log_similarity(fresh), expected, atol=1e-5)
+    one = Recognizer(weights=(0.0, 3.0, 0.0)).fit(demos)
+    alone = Recognizer((DEFAULT_REPRESENTATIONS[1],)).fit(demos)
+    np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-12)
+
+
+def test_kernels_that_know_nothing_stay_equal():
+    class Blind:
+        def logs(self, A, B):
+            return np.zeros((2, len(A[0]), len(B[0])))
+
+    class Rows(list):
+        def take(self, chosen):
+            return Rows(chosen)
+
+    rows = Rows(range(20))
+    np.testing.assert_array_equal(aligned_weights(Blind(), (rows, rows), np.arange(20) % 2), [0.5, 0.5])
+
+
+@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0, 0.0, 0.0), (1.0, -1.0, 1.0), (1.0, np.nan, 1.0)])
+def test_weights_that_cannot_be_are_refused(weights):
+    with pytest.raises(SpecificationError, match="3 numbers from 0, not all 0"):
+        Recognizer(weights=weights).fit(draw_shapes([1, 1]))
+
+
+def test_weights_need_the_arithmetic_mean():
+    with pytest.raises(SpecificationError, match="mean='arithmetic', got them with mean='min'"):
+        Recognizer(mean="min", weights=(1, 1, 1)).fit(draw_shapes([1, 1]))
+    with pytest.raises(SpecificationError, match=r"weights.*'loud'"):
+        Recognizer(weights="loud").fit(draw_shapes([1, 1]))
+    assert len(Recognizer(mean="min").fit(draw_shapes([8, 8])).representations_) == 3
