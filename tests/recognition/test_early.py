@@ -126,3 +126,12 @@ def test_wrong_inputs_are_refused():
         recognizer.predict_partial(np.zeros((1, 10, 3)))
     with pytest.raises(SpecificationError, match=r"expected a fraction above 0 and at most 1, got 1\.5"):
         cut(test, 1.5)
+
+
+def test_hypotheses_are_kept_until_others_are_asked_for_or_fitted():
+    recognizer = kineme.Recognizer().fit(_spirals(2))
+    first = recognizer.stream()._hypotheses
+    assert recognizer.stream()._hypotheses is first
+    assert recognizer.stream(early=Early(n_progress=10))._hypotheses is not first
+    assert recognizer.stream()._hypotheses is not first
+    assert recognizer.fit(_spirals(2, n_classes=3)).stream()._hypotheses.stored is not first.stored

@@ -129,8 +129,18 @@ class Hypotheses(NamedTuple):
         return np.column_stack((known, np.full(len(evidence), _LOG_UNKNOWN)))
 
 
+def known_hypotheses(recognizer: Recognizer, early: Early) -> Hypotheses:
+    """The hypotheses of a fitted recognizer, kept from the last time that the same ones were asked for."""
+    known: dict[Early, Hypotheses] = recognizer.hypotheses_
+    if early not in known:
+        made = hypotheses(recognizer, early)
+        known.clear()  # one at a time: memory stays linear in the stored movements
+        known[early] = made
+    return known[early]
+
+
 def hypotheses(recognizer: Recognizer, early: Early) -> Hypotheses:
-    """Prepare the beginnings of a recognizer's stored movements, once."""
+    """Prepare the beginnings of a recognizer's stored movements."""
     if recognizer.scale == "none" and early.size_spread == Early.size_spread:
         early = Early(early.n_progress, _KNOWN_SIZE, early.duration_spread, early.timing_spread, early.max_angle)
     procrustes = recognizer.procrustes_

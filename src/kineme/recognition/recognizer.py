@@ -123,7 +123,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self._choose_representations(per_class)
         self.classifier_: Classifier = choose(self.classifier, per_class)
         self.classifier_.fit(self)
-        self.calibration_: Calibration | None = None  # of what was fitted before
+        self.calibration_: Calibration | None = None  # these two are made when first asked for
+        self.hypotheses_: dict[Any, Any] = {}
         return self
 
     def log_similarity(self, X: Any) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from kineme.recognition.bounded_path import BoundedPath
 from kineme.recognition.decision import Decision
 from kineme.recognition.forecast import forecast
-from kineme.recognition.hypotheses import Early, hypotheses
+from kineme.recognition.hypotheses import Early, known_hypotheses
 from kineme.recognition.live_state import Guess, LiveState, LiveStatus
 from kineme.recognition.prefixes import beginnings, smoother
 from kineme.recognition.views import N_POINTS
@@ -34,7 +34,7 @@ class Live:
 
     def __init__(self, recognizer: Recognizer, decision: Decision, early: Early) -> None:
         self._recognizer = recognizer
-        self._hypotheses = hypotheses(recognizer, early)
+        self._hypotheses = known_hypotheses(recognizer, early)
         self._decision = decision
         self._path = BoundedPath(CAPACITY, recognizer.n_dims_)
         self._classes = recognizer.classes_.tolist()
