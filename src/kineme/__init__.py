@@ -22,6 +22,7 @@ if _TYPE_CHECKING:
     )
     from kineme.features.dmp_features import DMPFeatures
     from kineme.features.rhythmic_features import RhythmicFeatures
+    from kineme.library.library import ActionLibrary
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
     from kineme.recognition.recognizer import Recognizer
@@ -53,6 +54,7 @@ _HOME = {
     "DMPFeatures": "kineme.features.dmp_features",
     "RhythmicFeatures": "kineme.features.rhythmic_features",
     "Recognizer": "kineme.recognition.recognizer",
+    "ActionLibrary": "kineme.library.library",
     "kernels": "kineme",
     "styles": "kineme",
     "orientation": "kineme",
@@ -67,7 +69,7 @@ _HOME = {
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
     "DMP", "Primitives", "control", "RhythmicDMP", "RhythmicPrimitives", "orientation", "styles",
-    "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer",
+    "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer", "ActionLibrary",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
 ]  # fmt: skip

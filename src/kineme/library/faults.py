@@ -1,0 +1,58 @@
+"""SQLite's errors in the words of a library: what was expected, what came, what to do next."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from kineme.errors import DataError
+
+_DAMAGED = (
+    "expected {path} to be readable, got damaged bytes ({error}); kineme library verify names what is damaged: take "
+    "the file from a backup or an export"
+)
+
+#: Primary result code of SQLite -> what to tell; see sqlite.org/rescode.html for the codes.
+_WORDS = {
+    sqlite3.SQLITE_BUSY: (
+        "expected to write to {path}, got no turn: another process has been writing for more than {wait:g} s; "
+        "try again when it has finished"
+    ),
+    sqlite3.SQLITE_FULL: (
+        "expected room to write to {path}, got a full disk; nothing of this step was stored, and what was committed "
+        "before is safe: free some space and run it again"
+    ),
+    sqlite3.SQLITE_IOERR: (
+        "expected to read or write {path}, got an input/output error ({error}); nothing of this step was stored, and "
+        "what was committed before is safe: check the disk and its free space, and run it again"
+    ),
+    sqlite3.SQLITE_READONLY: (
+        "expected to write to {path}, got a read-only file or folder ({error}); open it with read_only=True or change "
+        "the permissions"
+    ),
+    sqlite3.SQLITE_CANTOPEN: (
+        "expected to open {path}, got {error}; check that the folder exists and that you may read and write in it, or "
+        "open it with read_only=True"
+    ),
+    sqlite3.SQLITE_CORRUPT: _DAMAGED,
+    sqlite3.SQLITE_NOTADB: "expected {path} to be a library, got a file that is no database ({error})",
+}
+_WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]
+_WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
+
+
+@contextmanager
+def in_plain_words(path: Path, wait: float) -> Iterator[None]:
+    """Turn errors of the database into `DataError`; a mistake of this library stays what it is."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        words = _WORDS.get(code & 0xFF) if code is not None else None
+        if words is None and "decode" in str(error):  # text that is no text any more
+            words = _DAMAGED
+        if words is None:
+            raise
+        raise DataError(words.format(path=path, wait=wait, error=error)) from error

@@ -1,0 +1,208 @@
+"""The action library as users hold it: a thin skin over the functions of this folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.library import read, symbols
+from kineme.library.specification import Specification
+from kineme.library.store import Store
+
+if TYPE_CHECKING:
+    from kineme.library.history import Version
+    from kineme.library.learn import LearnReport
+    from kineme.library.source import Source
+    from kineme.library.symbols import Symbol
+    from kineme.primitives.dmp import DMP
+    from kineme.primitives.primitives import Primitives
+    from kineme.recognition.recognizer import Recognizer
+    from kineme.trajectories.demonstrations import Demonstrations
+
+Ids = NDArray[np.int64]
+
+
+class ActionLibrary:
+    """Movements, their primitives and features, and the symbols they stand for, in one folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Holds the database ``library.sqlite``.
+    create : bool, default False
+        Make the library if there is none.
+    read_only : bool, default False
+        Never write, not even beside the database; works in a read-only folder.
+    recognizer : Recognizer, optional
+        How movements are seen, for a library that is made; by default ``Recognizer()``.
+    dmp : DMP, optional
+        Of the primitives, for a library that is made; by default bio-inspired, 40 basis functions, fitted to the path.
+    wait : float, default 10.0
+        Seconds to wait while another process writes, before an error.
+
+    Raises
+    ------
+    DataError
+        No library there, another program's file, damaged bytes, a later schema version, no permission.
+
+    Notes
+    -----
+    One process writes at a time, any number read. Every change is a version; `at` shows the library as it was.
+    Recordings are kept in single precision relative to their start: an error of at most 6e-8 of the distance from it.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        *,
+        create: bool = False,
+        read_only: bool = False,
+        recognizer: Recognizer | None = None,
+        dmp: DMP | None = None,
+        wait: float = 10.0,
+    ) -> None:
+        specification = Specification.of(recognizer, dmp) if create else None
+        self.store = Store(folder, specification, read_only=read_only, wait=wait)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the database; the last process to do so leaves a single file."""
+        self.store.close()
+
+    def __len__(self) -> int:
+        return read.count(self.store)
+
+    def __repr__(self) -> str:
+        dims = "" if self.n_dims is None else f"{self.n_dims} dims, "
+        return (
+            f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{len(self.symbols())} symbols, "
+            f"version {self.version})"
+        )
+
+    @property
+    def folder(self) -> Path:
+        """Where the library is."""
+        return self.store.folder
+
+    @property
+    def version(self) -> int:
+        """Number of the last change, from 0."""
+        return self.store.version
+
+    @property
+    def n_dims(self) -> int | None:
+        """Dimensions that all movements share; None before the first."""
+        return self.store.n_dims
+
+    @property
+    def specification(self) -> Specification:
+        """What features and primitives mean."""
+        return self.store.specification
+
+    def learn(
+        self,
+        movements: Any,
+        labels: Sequence[Any] | None = None,
+        source: Source | Sequence[Source | None] | None = None,
+        *,
+        places: Sequence[Any] | None = None,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> LearnReport:
+        """Store movements that are not there yet.
+
+        Parameters
+        ----------
+        movements : movements
+            Whatever `Demonstrations.of` accepts.
+        labels : sequence of n str or None, optional
+            Names of symbols, made where there are none; by default the labels of the movements. None is unlabeled.
+        source : Source, or sequence of n Source or None, optional
+            The files they come from.
+        places : sequence of n str, optional
+            Where in its file each movement is; by default its number there.
+        progress : callable, optional
+            Called with the movements done and their number after every batch.
+
+        Returns
+        -------
+        LearnReport
+
+        Raises
+        ------
+        TrajectoryError
+            Movements that cannot be used; nothing is stored.
+        DataError
+            The disk is full, another process writes, ...; whole batches that were stored stay, and learning the same
+            again goes on where it ended.
+
+        Notes
+        -----
+        A movement is known by its samples, or by its place in a file of the same content read with the same options. A
+        known movement joins the symbol of its label only if it shows none.
+        """
+        from kineme.library.learn import learn
+
+        return learn(self.store, movements, labels, source, places, progress)
+
+    def ids(self, symbol: str | None = None) -> Ids:
+        """Ids of all movements, or of those of a symbol, ascending."""
+        return read.all_ids(self.store) if symbol is None else self[symbol].members
+
+    def unlabeled(self) -> Ids:
+        """Ids of the movements that show no symbol, ascending."""
+        return read.unlabeled_ids(self.store)
+
+    def movements(self, symbol: str | None = None, ids: Any = None) -> Demonstrations:
+        """Recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
+
+        Labels are the names of symbols if every one of the movements shows one, else None.
+        """
+        chosen = self._choose(symbol, ids)
+        return read.movements(self.store, chosen, read.names_of(self.store, chosen))
+
+    def features(self, ids: Any = None) -> NDArray[np.float32]:
+        """Rows of all representations of `specification`, one after the other, shape (k, sum of d * S)."""
+        return read.features(self.store, self._choose(None, ids))
+
+    def primitives(self, symbol: str | None = None, ids: Any = None) -> Primitives:
+        """Primitives: all, those of a symbol, or those of `ids`, in their order."""
+        chosen = self._choose(symbol, ids)
+        return read.primitives(self.store, chosen, read.names_of(self.store, chosen))
+
+    def _choose(self, symbol: str | None, ids: Any) -> Ids:
+        return self.ids(symbol) if ids is None else read.as_ids(self.store, ids)
+
+    def symbols(self) -> tuple[Symbol, ...]:
+        """All symbols, by name."""
+        return symbols.symbols(self.store)
+
+    def __getitem__(self, who: str) -> Symbol:
+        """The symbol of that name or, where no symbol has that name, of that id."""
+        return symbols.symbol(self.store, who)
+
+    def __contains__(self, who: object) -> bool:
+        return any(who in (symbol.name, symbol.id) for symbol in self.symbols())
+
+    def history(self) -> tuple[Version, ...]:
+        """Every change, the first one first."""
+        from kineme.library.history import history
+
+        return history(self.store)
+
+    def at(self, version: int) -> ActionLibrary:
+        """The library as it was at a version, for reading."""
+        past = object.__new__(ActionLibrary)
+        past.store = Store(self.folder, read_only=True, as_of=version, wait=self.store.wait)
+        return past

@@ -1,0 +1,169 @@
+"""Reading movements, features and primitives back, a few thousand rows at a time, each checked against its checksum."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.library.rows import ALIVE, Row, among, listed, select
+from kineme.library.schema import COLUMNS
+from kineme.library.store import Store
+from kineme.primitives.primitives import Primitives
+from kineme.trajectories.collect import Movements
+from kineme.trajectories.demonstrations import Demonstrations
+
+Ids = NDArray[np.int64]
+
+_ROWS = 4096  # fetched at a time
+
+
+def all_ids(store: Store) -> Ids:
+    """Ids of all movements, ascending."""
+    return _column(store, f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id")
+
+
+def unlabeled_ids(store: Store) -> Ids:
+    """Ids of the movements that show no symbol, ascending."""
+    members = f"SELECT movement FROM member WHERE {ALIVE}"
+    return _column(store, f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id")
+
+
+def count(store: Store) -> int:
+    """Number of movements."""
+    return int(_column(store, f"SELECT count(*) FROM movement WHERE {ALIVE}")[0])
+
+
+def _column(store: Store, query: str) -> Ids:
+    with store.reading() as connection:
+        return np.array([key for (key,) in connection.execute(query, {"v": store.as_of})], dtype=np.int64)
+
+
+def as_ids(store: Store, ids: Any) -> Ids:
+    """Ids that a user passes, as an array; all must be in the library.
+
+    Raises
+    ------
+    SpecificationError
+        Not whole numbers, none at all, or no such movement at this version.
+    """
+    wanted = np.atleast_1d(np.asarray(ids))
+    if wanted.dtype.kind not in "iu" or wanted.ndim != 1 or not len(wanted):
+        raise SpecificationError(f"expected ids of movements, whole numbers, at least one, got {ids!r}")
+    with store.reading() as connection:
+        query = f"SELECT id FROM movement WHERE {ALIVE} AND {among('id')}"
+        rows = connection.execute(query, {"v": store.as_of, "keys": listed(wanted)})
+        missing = np.setdiff1d(wanted, [key for (key,) in rows])
+    if len(missing):
+        raise SpecificationError(
+            f"expected ids of movements in the library, got {missing[0]}, which is not there "
+            f"({len(missing)} of {len(wanted)} are not)"
+        )
+    return wanted.astype(np.int64)
+
+
+def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
+    """Rows of the table `movement`, as dictionaries, in the order of `ids`."""
+    found: dict[int, Row] = {}
+    for rows in _chunks(store, "movement", "id", ids):
+        found.update((row[0], row) for row in rows)
+    return [dict(zip(COLUMNS["movement"], found[key], strict=True)) for key in ids.tolist()]
+
+
+def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstrations:
+    """The recordings, in the order of `ids`."""
+    about = records(store, ids)
+    lengths = np.array([one["n_samples"] for one in about])
+    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    t0, durations = (np.array([one[name] for one in about]) for name in ("t0", "duration"))
+    place = _places(ids)
+    positions = np.empty((offsets[-1], store.n_dims or 0))
+    u = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
+    times = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * u
+    even = True
+    for rows in _chunks(store, "raw", "movement", ids):
+        for key, start, relative, stamps in rows:
+            for i in place[key]:
+                part = slice(offsets[i], offsets[i + 1])
+                positions[part] = np.frombuffer(relative, np.float32).reshape(lengths[i], -1) + np.frombuffer(start)
+                if stamps is not None:
+                    even = False
+                    kind = np.float32 if len(stamps) == 4 * lengths[i] else np.float64
+                    times[part] = t0[i] + np.frombuffer(stamps, kind)
+    block = Movements(
+        positions,
+        offsets,
+        durations,
+        None if even and not t0.any() else times,
+        np.array(labels) if all(label is not None for label in labels) else None,
+        tuple(one["name"] or f"movement {one['id']}" for one in about),
+    )
+    return Demonstrations.of_movements(block)
+
+
+def features(store: Store, ids: Ids) -> NDArray[np.float32]:
+    """Rows of all representations, one after the other, shape (k, sum of d * S)."""
+    width = sum(store.specification.widths(store.n_dims or 0))
+    place, found = _places(ids), np.empty((len(ids), width), dtype=np.float32)
+    for rows in _chunks(store, "feature", "movement", ids):
+        at, which = _scatter([key for key, _ in rows], place)
+        block = np.frombuffer(b"".join(row for _, row in rows), np.float32).reshape(-1, width)
+        found[at] = block[which]
+    return found
+
+
+def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitives:
+    """The primitives, in the order of `ids`."""
+    dmp, n, d = store.specification.dmp, len(ids), store.n_dims or 0
+    about, place = records(store, ids), _places(ids)
+    boundary, weights = np.empty((n, 4, d)), np.empty((n, d, dmp.n_basis))
+    for rows in _chunks(store, "primitive", "movement", ids):
+        at, which = _scatter([row[0] for row in rows], place)
+        boundary[at] = np.frombuffer(b"".join(row[1] for row in rows)).reshape(-1, 4, d)[which]
+        weights[at] = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d, dmp.n_basis)[which]
+    return Primitives(
+        dmp,
+        scaled_weights=weights,
+        starts=boundary[:, 0],
+        goals=boundary[:, 1],
+        velocities=boundary[:, 2],
+        durations=np.array([one["duration"] for one in about]),
+        extents=boundary[:, 3],
+        labels=np.array(labels) if all(label is not None for label in labels) else None,
+        names=tuple(one["name"] or f"movement {one['id']}" for one in about),
+    )
+
+
+def names_of(store: Store, ids: Ids) -> list[str | None]:
+    """The name of each movement's symbol; None where it shows none."""
+    query = f"""SELECT movement, name FROM member AS m JOIN symbol_state AS s ON s.symbol = m.symbol
+        WHERE {among("m.movement")} AND m.added <= :v AND (m.removed IS NULL OR m.removed > :v)
+        AND s.added <= :v AND (s.removed IS NULL OR s.removed > :v)"""
+    with store.reading() as connection:
+        found: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(ids)}))
+    return [found.get(key) for key in ids.tolist()]
+
+
+def _chunks(store: Store, table: str, column: str, ids: Ids) -> Iterator[list[Row]]:
+    """Rows of a table with those keys, in ascending order, some at a time."""
+    wanted = np.unique(ids)
+    for k in range(0, len(wanted), _ROWS):
+        with store.reading() as connection:
+            yield select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
+
+
+def _places(ids: Ids) -> dict[int, list[int]]:
+    """Id -> where in `ids` it stands."""
+    found: dict[int, list[int]] = {}
+    for i, key in enumerate(ids.tolist()):
+        found.setdefault(key, []).append(i)
+    return found
+
+
+def _scatter(keys: list[int], place: dict[int, list[int]]) -> tuple[list[int], list[int]]:
+    """Rows of the result, and for each of them the row of the chunk that belongs there."""
+    pairs = [(i, k) for k, key in enumerate(keys) for i in place[key]]
+    return [i for i, _ in pairs], [k for _, k in pairs]

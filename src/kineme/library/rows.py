@@ -1,0 +1,97 @@
+"""Rows of the tables, each sealed with a checksum, so that a flipped bit is told from a number."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from kineme.errors import DataError
+from kineme.library.schema import COLUMNS
+
+Row = tuple[Any, ...]
+
+#: A row at version :v.
+ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
+
+
+def seal(row: Row) -> int:
+    """CRC-32 over all columns of a row, its key first."""
+    crc = 0
+    plain = []
+    for value in row:
+        if isinstance(value, bytes):
+            crc = zlib.crc32(value, crc)
+            plain.append(len(value))
+        else:
+            plain.append(value)
+    return zlib.crc32(repr(plain).encode(), crc)
+
+
+def insert(connection: sqlite3.Connection, table: str, rows: Iterable[Row]) -> None:
+    """Add rows, in the order of `COLUMNS`, each with its seal."""
+    marks = ", ".join("?" * (len(COLUMNS[table]) + 1))
+    connection.executemany(f"INSERT INTO {table} VALUES ({marks})", ((*row, seal(row)) for row in rows))
+
+
+def select(
+    connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
+) -> list[Row]:
+    """Rows of a table ordered by key, seals checked and left out.
+
+    Raises
+    ------
+    DataError
+        A row is not what was stored; the message names it.
+    """
+    columns = COLUMNS[table]
+    query = f"SELECT {', '.join(columns)}, crc FROM {table} WHERE {where} ORDER BY {columns[0]}"
+    rows = connection.execute(query, parameters or {}).fetchall()
+    for row in rows:
+        if seal(row[:-1]) != row[-1]:
+            raise damaged(table, row)
+    return [row[:-1] for row in rows]
+
+
+def damaged(table: str, row: Row) -> DataError:
+    """The error for a row whose seal does not fit."""
+    return DataError(
+        f"expected {row_name(table, row[0])} as it was stored, got damaged bytes; "
+        "kineme library verify names all that is damaged: take the file from a backup or an export"
+    )
+
+
+def row_name(table: str, key: Any) -> str:
+    """How messages refer to a row."""
+    of_movement = {"raw": "the samples", "primitive": "the primitive", "feature": "the features"}
+    return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
+
+
+def among(column: str, name: str = "keys") -> str:
+    """A condition that `column` is in the list that `listed` passes as parameter `name`."""
+    return f"{column} IN (SELECT value FROM json_each(:{name}))"
+
+
+def listed(values: Iterable[Any]) -> str:
+    """Numbers or texts as the parameter that `among` reads."""
+    return json.dumps([value if isinstance(value, str) else int(value) for value in values])
+
+
+def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], version: int) -> None:
+    """Mark rows, whose last column is ``removed``, as removed from `version` on."""
+    gone = [(*row[:-1], version) for row in rows]
+    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ? AND removed IS NULL"
+    connection.executemany(statement, ((version, seal(row), row[0]) for row in gone))
+
+
+def next_key(connection: sqlite3.Connection, table: str) -> int:
+    """The key that the next row of a table gets: keys are never used again."""
+    largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]
+    return (largest or 0) + 1
+
+
+def as_text(value: Any) -> str:
+    """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
+    return str(value).encode("utf-8", "backslashreplace").decode("utf-8")

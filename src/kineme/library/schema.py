@@ -1,0 +1,73 @@
+"""The tables of a library, and how an older library becomes a newer one.
+
+Every committed transaction is a version. Rows are added and, at most once, removed: ``added`` and ``removed`` are
+version numbers, so the state at version v is ``added <= v AND (removed IS NULL OR removed > v)``. Nothing is deleted.
+"""
+
+from __future__ import annotations
+
+APPLICATION_ID = 0x6B696E65  # "kine", in the header of the file
+SCHEMA_VERSION = 1
+PAGE_SIZE = 32768  # a row of features fills a seventh of it or less, so little of a page stays empty
+
+#: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "meta": ("key", "value"),
+    "version": ("id", "at", "action", "detail"),
+    "source": ("id", "path", "sha256", "size", "read_at", "kind", "options", "added"),
+    "movement": (
+        "id", "source", "place", "digest", "name", "label", "n_samples", "t0", "duration", "added", "removed",
+    ),
+    "raw": ("movement", "start", "positions", "times"),
+    "primitive": ("movement", "boundary", "weights"),
+    "feature": ("movement", "rows"),
+    "symbol": ("key", "id", "created"),
+    "symbol_state": (
+        "id", "symbol", "name", "description", "prototype", "threshold", "parents", "added", "removed",
+    ),
+    "member": ("id", "movement", "symbol", "how", "added", "removed"),
+}  # fmt: skip
+
+#: What makes an empty file a library. Columns carry the type and the meaning of `COLUMNS`.
+CREATE = (
+    "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
+    """CREATE TABLE version (
+        id INTEGER PRIMARY KEY, at TEXT NOT NULL, action TEXT NOT NULL, detail TEXT NOT NULL, crc INTEGER NOT NULL)""",
+    """CREATE TABLE source (
+        id INTEGER PRIMARY KEY, path TEXT NOT NULL, sha256 TEXT NOT NULL, size INTEGER NOT NULL, read_at TEXT NOT NULL,
+        kind TEXT NOT NULL, options TEXT NOT NULL, added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
+    """CREATE TABLE movement (
+        id INTEGER PRIMARY KEY, source INTEGER REFERENCES source, place TEXT, digest BLOB NOT NULL, name TEXT,
+        label TEXT, n_samples INTEGER NOT NULL, t0 REAL NOT NULL, duration REAL NOT NULL,
+        added INTEGER NOT NULL REFERENCES version, removed INTEGER REFERENCES version, crc INTEGER NOT NULL)""",
+    """CREATE TABLE raw (
+        movement INTEGER PRIMARY KEY REFERENCES movement, start BLOB NOT NULL, positions BLOB NOT NULL, times BLOB,
+        crc INTEGER NOT NULL)""",
+    """CREATE TABLE primitive (
+        movement INTEGER PRIMARY KEY REFERENCES movement, boundary BLOB NOT NULL, weights BLOB NOT NULL,
+        crc INTEGER NOT NULL)""",
+    """CREATE TABLE feature (
+        movement INTEGER PRIMARY KEY REFERENCES movement, rows BLOB NOT NULL, crc INTEGER NOT NULL)""",
+    """CREATE TABLE symbol (
+        key INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, created INTEGER NOT NULL REFERENCES version,
+        crc INTEGER NOT NULL)""",
+    """CREATE TABLE symbol_state (
+        id INTEGER PRIMARY KEY, symbol INTEGER NOT NULL REFERENCES symbol, name TEXT NOT NULL,
+        description TEXT NOT NULL, prototype INTEGER REFERENCES movement, threshold REAL, parents TEXT NOT NULL,
+        added INTEGER NOT NULL REFERENCES version, removed INTEGER REFERENCES version, crc INTEGER NOT NULL)""",
+    """CREATE TABLE member (
+        id INTEGER PRIMARY KEY, movement INTEGER NOT NULL REFERENCES movement, symbol INTEGER NOT NULL
+        REFERENCES symbol, how TEXT NOT NULL CHECK (how IN ('label', 'anchored', 'recognized')),
+        added INTEGER NOT NULL REFERENCES version, removed INTEGER REFERENCES version, crc INTEGER NOT NULL)""",
+    # Among rows that are alive: a recording is stored once, a name means one symbol, a movement shows one symbol.
+    "CREATE UNIQUE INDEX movement_digest ON movement (digest) WHERE removed IS NULL",
+    "CREATE UNIQUE INDEX movement_place ON movement (source, place) WHERE removed IS NULL AND source IS NOT NULL",
+    "CREATE UNIQUE INDEX symbol_name ON symbol_state (name) WHERE removed IS NULL",
+    "CREATE UNIQUE INDEX symbol_now ON symbol_state (symbol) WHERE removed IS NULL",
+    "CREATE UNIQUE INDEX member_now ON member (movement) WHERE removed IS NULL",
+    "CREATE INDEX member_symbol ON member (symbol)",
+    "CREATE INDEX source_sha256 ON source (sha256)",
+)
+
+#: Schema version -> the statements that lead from it to the next one.
+MIGRATIONS: dict[int, tuple[str, ...]] = {}

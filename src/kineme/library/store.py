@@ -1,0 +1,172 @@
+"""The open database of a library: reading at one version, writing one version at a time."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import RLock
+from typing import Any
+
+from kineme.errors import DataError, SpecificationError
+from kineme.library.connection import FILE, check_kind, connect, create, migrate, transaction
+from kineme.library.faults import in_plain_words
+from kineme.library.rows import Row, insert, select
+from kineme.library.schema import SCHEMA_VERSION
+from kineme.library.specification import Specification
+
+NOW = (1 << 62) - 1  # later than every version: what is there now
+
+
+@dataclass(frozen=True)
+class Change:
+    """One transaction under way."""
+
+    connection: sqlite3.Connection
+    version: int
+
+    def insert(self, table: str, rows: list[Row]) -> None:
+        """Add rows to a table."""
+        insert(self.connection, table, rows)
+
+
+class Store:
+    """A library's database, opened.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Holds ``library.sqlite``; caches that can be built again may lie beside it.
+    specification : Specification, optional
+        Of a library that is to be created if there is none.
+    read_only : bool
+    as_of : int, optional
+        Show the library as it was at this version; implies `read_only`.
+    wait : float
+        Seconds to wait for another writer's turn to end.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        specification: Specification | None = None,
+        *,
+        read_only: bool = False,
+        as_of: int | None = None,
+        wait: float = 10.0,
+    ) -> None:
+        self.folder = Path(folder)
+        self.path = self.folder / FILE
+        self.read_only = read_only or as_of is not None
+        self.wait = wait
+        self._turn = RLock()
+        self._writer: sqlite3.Connection | None = None
+        if not self.path.exists():
+            self._create(specification)
+        with in_plain_words(self.path, wait):
+            self._reader = connect(self.path, "ro" if self.read_only else "rw", wait)
+            try:
+                self._check()
+                meta: dict[str, str] = dict(select(self._reader, "meta"))
+                self.id = meta["id"]
+                self.specification = Specification.from_json(meta)
+                self.as_of = self._checked_version(as_of)
+            except BaseException:
+                self._reader.close()
+                raise
+
+    def _create(self, specification: Specification | None) -> None:
+        if specification is None or self.read_only:
+            raise DataError(
+                f"expected a library in {self.folder}, found no {FILE} there; pass create=True to make one, "
+                "or correct the path"
+            )
+        create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
+
+    def _check(self) -> None:
+        """Refuse what is no library; bring an older one up to date."""
+        self._file = self.path.stat().st_ino
+        if check_kind(self._reader, self.path) == SCHEMA_VERSION:
+            return
+        if self.read_only:
+            raise DataError(
+                f"expected {self.path} to have schema version {SCHEMA_VERSION}, got an earlier one; "
+                "open it once without read_only to bring it up to date"
+            )
+        migrate(self._reader, self.path)
+
+    def _checked_version(self, as_of: int | None) -> int:
+        last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
+        if as_of is not None and not 0 <= as_of <= last:
+            raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
+        return NOW if as_of is None else int(as_of)
+
+    @property
+    def version(self) -> int:
+        """Number of the last committed transaction, or of the one shown."""
+        if self.as_of != NOW:
+            return self.as_of
+        with self.reading() as connection:
+            return int(connection.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
+
+    @property
+    def n_dims(self) -> int | None:
+        """Dimensions that all movements share; None before the first one."""
+        with self.reading() as connection:
+            found = select(connection, "meta", "key = 'n_dims'")
+        return int(found[0][1]) if found else None
+
+    @contextmanager
+    def reading(self) -> Iterator[sqlite3.Connection]:
+        """The connection to read from. It sees committed versions only, also while this process writes."""
+        with in_plain_words(self.path, self.wait):
+            yield self._reader
+
+    @contextmanager
+    def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
+        """One transaction, which becomes one version; put what is worth telling into `detail` before it ends.
+
+        Raises
+        ------
+        DataError
+            Opened for reading only, the file vanished, the disk is full, another process writes for too long.
+        """
+        detail = {} if detail is None else detail
+        if self.read_only:
+            raise DataError(
+                f"expected to write to {self.path}, but it is open for reading only; open it again to write"
+            )
+        with self._turn, in_plain_words(self.path, self.wait):
+            self._check_that_it_is_there()
+            if self._writer is None:
+                self._writer = connect(self.path, "rw", self.wait)
+            with transaction(self._writer):
+                version = int(self._writer.execute("SELECT coalesce(max(id), 0) + 1 FROM version").fetchone()[0])
+                yield Change(self._writer, version)
+                at = datetime.now(UTC).isoformat(timespec="milliseconds")
+                text = json.dumps(detail, ensure_ascii=False)
+                insert(self._writer, "version", [(version, at, action, text)])
+
+    def _check_that_it_is_there(self) -> None:
+        """A deleted file can still be written to, and would take the writes with it."""
+        try:
+            there = self.path.stat().st_ino == self._file
+        except OSError:
+            there = False
+        if not there:
+            raise DataError(
+                f"expected {self.path} where it was opened, but it was moved, deleted or replaced; nothing was "
+                "written: put it back, or open the library again"
+            )
+
+    def close(self) -> None:
+        """Close both connections; the last one to close leaves a single file."""
+        with self._turn:
+            for connection in (self._writer, self._reader):
+                if connection is not None:
+                    connection.close()
