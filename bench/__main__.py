@@ -8,7 +8,17 @@ import os
 
 from bench.rows import save, table
 
-SUBJECTS = ("learn_even", "learn_ragged", "gram", "startup", "reconstruction", "rhythm", "control", "recognize")
+SUBJECTS = (
+    "learn_even",
+    "learn_ragged",
+    "gram",
+    "startup",
+    "reconstruction",
+    "rhythm",
+    "control",
+    "recognize",
+    "binning",
+)
 
 
 def main() -> int:
