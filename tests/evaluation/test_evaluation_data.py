@@ -32,7 +32,8 @@ def test_what_is_no_recording_is_left_out_with_the_reason(folder, make_movement)
     (folder / "wave" / "binary.csv").write_bytes(b"\xff\xfe\x00\x81")
     (folder / "wave" / "short.csv").write_text("time,x\n0,1\n1,2\n")
     (folder / "wave" / ".hidden.csv").write_text("")
-    (folder / "top.csv").write_text("time,x\n0,1\n")
+    t, x = make_movement(2)
+    write_movement(folder / "top.csv", {"times": t, "positions": x})
     t, x = make_movement(0, 3)
     write_movement(folder / "wave" / "space.csv", {"times": t, "positions": x})
     (folder / "once").mkdir()
@@ -43,9 +44,9 @@ def test_what_is_no_recording_is_left_out_with_the_reason(folder, make_movement)
         "wave/notes.md", "wave/broken.csv", "wave/binary.csv", "wave/short.csv", "top.csv", "wave/space.csv",
         "once/a.csv",
     }  # fmt: skip
-    assert "line 3 of wave/broken.csv" in left_out["wave/broken.csv"]
+    assert left_out["wave/broken.csv"] == "line 3: expected 2 columns, got 1"
     assert "at least 4 samples, got 2" in left_out["wave/short.csv"]
-    assert left_out["top.csv"] == "not directly in a folder named as its label"
+    assert left_out["top.csv"] == "no label: not in a folder of its own"
     assert left_out["wave/space.csv"] == "3 dimensions where most have 2"
     assert left_out["once/a.csv"] == "the only movement labeled 'once'"
 
@@ -63,10 +64,10 @@ def test_one_class_is_not_enough(folder):
 
 
 def test_an_empty_folder_says_so_and_the_first_reason_is_shown(tmp_path):
-    with pytest.raises(kineme.DataError, match="found no recordings"):
+    with pytest.raises(kineme.DataError, match=r"expected recordings in .* found none"):
         load_data(str(tmp_path))
     (tmp_path / "a.csv").write_text("")
-    with pytest.raises(kineme.DataError, match=r"1 left out, the first a\.csv: not directly in a folder"):
+    with pytest.raises(kineme.DataError, match=r"1 could not be read, the first a\.csv: expected samples"):
         load_data(str(tmp_path))
 
 

@@ -11,9 +11,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
-import numpy as np
-
 from kineme.errors import DataError, SpecificationError
+from kineme.io.matlab import Demos, read_demos
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice
 
@@ -63,10 +62,10 @@ def load_lasa(shapes: Iterable[str] | None = None) -> Demonstrations:
     labels: list[str] = []
     for shape in LASA_26 if shapes is None else shapes:
         check_choice("shape", shape, sorted(_resources()))
-        for t, x in _read(_resources()[shape]):
-            times.append(t)
-            arrays.append(x)
-            labels.append(shape)
+        demos = _read(_resources()[shape])
+        times += demos.times
+        arrays += demos.positions
+        labels += [shape] * len(demos.times)
     names = [f"{label} {i % 7 + 1}" for i, label in enumerate(labels)]
     return Demonstrations.from_arrays(arrays, labels, times, names)
 
@@ -84,12 +83,10 @@ def _resources() -> dict[str, Path]:
     return found
 
 
-def _read(path: Path) -> list[tuple[Array, Array]]:
-    """Times (T,) and positions (T, 2) of each demonstration in one file."""
-    from scipy.io import loadmat
-
+def _read(path: Path) -> Demos:
+    """All demonstrations of one file."""
     try:
-        demos = loadmat(path, squeeze_me=True, struct_as_record=False)["demos"]
-        return [(np.asarray(one.t, dtype=float), np.asarray(one.pos, dtype=float).T) for one in demos]
-    except Exception as error:  # SciPy's reader raises many kinds on a damaged file
-        raise DataError(f"expected {path.name} to be a MATLAB file with 'demos', got {error!r}{_ADVICE}") from error
+        return read_demos(path.read_bytes())
+    except OSError as error:  # that of the reader, a `DataError`, included
+        reason = error.__cause__ or error
+        raise DataError(f"expected {path.name} to be a MATLAB file with 'demos', got {reason!r}{_ADVICE}") from error

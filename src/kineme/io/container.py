@@ -65,7 +65,11 @@ def read_container(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDA
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Read all arrays of an npz archive; arrays of Python objects are refused, not unpickled."""
-    data = path.read_bytes()
+    return decode_arrays(path.read_bytes(), path)
+
+
+def decode_arrays(data: bytes, path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays in the bytes of an npz archive; the path is for the message."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}

@@ -1,118 +1,95 @@
-"""Reading one recorded movement from a file: CSV and relatives, NPZ, JSON."""
+"""Reading recorded movements from a folder or a file, whatever the format; see `kineme.io.formats`."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from kineme.errors import DataError, KinemeError
+from kineme.errors import DataError
+from kineme.io.folders import files_under
+from kineme.io.join_files import Recordings, join_files
+from kineme.io.layout import Column, Layout, several
+from kineme.io.read_file import format_of, read_bytes, read_file
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import Array
 
-#: Column names that hold time, in lower case and without a unit in brackets.
-TIME_NAMES = ("t", "time", "times", "timestamp", "stamp", "sec", "secs", "seconds", "time_s", "time_sec", "t_s")
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+Progress = Callable[[Sequence[Path]], Iterable[Path]]
 
 
-def read_recording(path: str | Path) -> Trajectory:
-    """Read one movement.
+def read_recordings(  # noqa: PLR0913 - one parameter per question that a table of samples may leave open
+    path: str | Path,
+    *,
+    time: Column | None = None,
+    columns: Column | Sequence[Column] | None = None,
+    movement: Column | Sequence[Column] | None = None,
+    label: Column | None = None,
+    units: str | float | None = None,
+    skip: str = "movement",
+    progress: Progress | None = None,
+) -> Recordings:
+    """Read all movements of a folder or a file.
 
-    - ``.csv``, ``.tsv``, ``.txt``: a sample per line, separated by comma, semicolon, tab or blanks. With a header, the
-      column named as in `TIME_NAMES` holds the time [s]; without a header, the first column does. Lines that
-      begin with ``#`` are skipped.
-    - ``.npz``: arrays ``times`` (T,) and ``positions`` (T, d).
-    - ``.json``: an object with lists ``times`` and ``positions``.
+    In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
+    in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
+    read.
+
+    Parameters
+    ----------
+    path : str or Path
+        A folder, or a file of a format in `kineme.io.formats.FORMATS`.
+    time, label : str or int, optional
+        Columns of a table, by head or counted from 0. By default they are found by their heads.
+    columns, movement : str or int or sequence of them, optional
+        Columns of the coordinates, and of what tells movements apart.
+    units : {"s", "ms", "us", "ns"} or float, optional
+        Unit of the time stamps, or its length in seconds. By default told by the head or by the stamps' size. As a
+        number it is also the step between samples of files without time stamps.
+    skip : {"movement", "sample"}, default "movement"
+        Whether a missing or repeated sample costs its whole movement or is left out alone. Both are reported.
+    progress : callable, optional
+        Wraps the list of files, to show how far the reading is.
 
     Raises
     ------
     DataError
-        The file is not what its name says; the message names the line.
+        Nothing there, or nothing in it that can be read; the message gives the first problem.
+    SpecificationError
+        An unknown unit or choice.
+    """
+    layout = Layout(time, several(columns), several(movement), label, units, skip)
+    path = Path(path)
+    if path.is_dir():
+        files, problems = files_under(path)
+        watched = files if progress is None else progress(files)
+        return join_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
+    if not path.exists():
+        raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
+    return join_files([read_file(path, Path(path.name), layout)], str(path))
+
+
+def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
+    """Read what a file of that name would hold, for data that come from elsewhere."""
+    return join_files([read_bytes(data, Path(name), layout)], name)
+
+
+def read_recording(path: str | Path) -> Trajectory:
+    """Read a file that holds one movement, in any format of `kineme.io.formats.FORMATS`.
+
+    Raises
+    ------
+    DataError
+        The file is not what its name says, or holds several movements; the message names the line.
     FileNotFoundError
         There is no such file.
     TrajectoryError
         The numbers are no movement, see `Trajectory`.
     """
     path = Path(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise DataError(f"expected {path} to end in one of {', '.join(READERS)}, got {path.suffix or 'no ending'!r}")
-    try:
-        times, positions = reader(path)
-    except (OSError, KinemeError):
-        raise
-    except (ValueError, KeyError, TypeError, EOFError) as error:
-        raise DataError(f"expected {path} to hold times and positions, got {_reason(error)}") from error
-    return Trajectory(times, positions, name=path.name)
-
-
-def _reason(error: Exception) -> str:
-    return f"no entry {error}" if isinstance(error, KeyError) else str(error)
-
-
-def _read_table(path: Path) -> tuple[Array, Array]:
-    text = path.read_text(encoding="utf-8-sig", errors="strict")
-    lines = [(k + 1, line.strip()) for k, line in enumerate(text.splitlines())]
-    lines = [(k, line) for k, line in lines if line and not line.startswith("#")]
-    if not lines:
-        raise DataError(f"expected samples in {path}, got an empty file")
-    separator = next((mark for mark in (",", ";", "\t") if mark in lines[0][1]), None)
-    heads = _split(lines[0][1], separator)
-    named = not all(_NUMBER.fullmatch(cell) for cell in heads)
-    rows = [_numbers(path, number, _split(line, separator), len(heads)) for number, line in lines[named:]]
-    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(heads))
-    time = _time_column(path, heads) if named else 0
-    if table.shape[1] < 2:
-        raise DataError(f"expected a column of times and at least one of positions in {path}, got one column")
-    return table[:, time], np.delete(table, time, axis=1)
-
-
-def _split(line: str, separator: str | None) -> list[str]:
-    return [cell.strip().strip('"') for cell in line.split(separator)]
-
-
-def _numbers(path: Path, line: int, cells: list[str], expected: int) -> list[float]:
-    if len(cells) != expected:
-        raise DataError(f"expected {expected} columns in line {line} of {path}, got {len(cells)}")
-    bad = next((cell for cell in cells if not _NUMBER.fullmatch(cell)), None)
-    if bad is not None:
-        raise DataError(f"expected numbers in line {line} of {path}, got {bad!r}")
-    return [float(cell) for cell in cells]
-
-
-def _time_column(path: Path, heads: list[str]) -> int:
-    plain = [re.sub(r"[\[(].*?[\])]", "", head).strip().lower() for head in heads]
-    found = [k for k, head in enumerate(plain) if head in TIME_NAMES]
-    if len(found) != 1:
-        raise DataError(
-            f"expected one column of times in {path}, named as one of {', '.join(TIME_NAMES)}, got the columns {heads}"
-        )
-    return found[0]
-
-
-def _read_npz(path: Path) -> tuple[Array, Array]:
-    from kineme.io.container import read_arrays
-
-    arrays = read_arrays(path)
-    return arrays["times"], arrays["positions"]
-
-
-def _read_json(path: Path) -> tuple[Any, Any]:
-    data = json.loads(path.read_text(encoding="utf-8"))
-    if not isinstance(data, dict):
-        raise DataError(f"expected {path} to hold an object with times and positions, got a {type(data).__name__}")
-    return data["times"], data["positions"]
-
-
-#: File ending -> reader.
-READERS: dict[str, Callable[[Path], tuple[Any, Any]]] = {
-    ".csv": _read_table,
-    ".tsv": _read_table,
-    ".txt": _read_table,
-    ".npz": _read_npz,
-    ".json": _read_json,
-}
+    format_of(path)
+    path.stat()
+    read = read_file(path, Path(path.name), Layout())
+    for problem in read.problems:
+        raise problem.error(str(problem._replace(file=str(path))))
+    one = join_files([read], str(path)).demonstrations
+    if len(one) > 1:
+        raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
+    return Trajectory(one[0].times, one[0].positions, name=path.name)

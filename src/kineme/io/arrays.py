@@ -1,0 +1,141 @@
+"""Arrays by name, from NPZ and JSON: which of them are times and positions, of one movement or of many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.found import Block, Detected, Found
+from kineme.io.layout import Layout
+from kineme.io.time_units import in_seconds, unit_by_size
+from kineme.trajectories.axes import axis_names
+from kineme.validation import Array
+
+POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
+
+
+def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Found:
+    """The movements that arrays hold.
+
+    - ``positions`` (T, d) or (T,), ``times`` (T,): one movement.
+    - ``positions`` (n, T, d), ``times`` (T,) or (n, T): many of equal length.
+    - ``positions`` (total, d), ``times`` (total,), ``offsets`` (n + 1,): many, one after the other, as `Demonstrations`
+      holds them.
+    - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length.
+
+    ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
+    and ``z`` that are all (T,) are the coordinates of one movement. Where there are no times, movements of
+    ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one second.
+
+    Raises
+    ------
+    DataError
+        No positions, or arrays that do not fit together.
+    """
+    arrays = _axes_joined(arrays)
+    key = _named(arrays, POSITIONS)
+    if key is not None:
+        xs, ts, how = _of_one(arrays, np.asarray(arrays[key], dtype=np.float64), layout)
+    else:
+        xs, ts, how = _numbered(arrays)
+    return join(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
+
+
+def join(
+    xs: Sequence[Array],
+    ts: Sequence[Array] | None,
+    named: tuple[Sequence[str | None], str],
+    layout: Layout,
+    detected: tuple[str, str],
+) -> Found:
+    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Found`."""
+    labels, time = named
+    if not xs or len({x.shape[1] for x in xs}) != 1:
+        raise DataError(f"expected movements of the same dimensions, got {sorted({x.shape[1] for x in xs}) or 'none'}")
+    if ts is not None and [len(t) for t in ts] != [len(x) for x in xs]:
+        odd = next(i for i, (t, x) in enumerate(zip(ts, xs, strict=True)) if len(t) != len(x))
+        raise DataError(f"expected one time stamp per sample, got {len(ts[odd])} for {len(xs[odd])} in movement {odd}")
+    offsets = np.concatenate(([0], np.cumsum([len(x) for x in xs]))).astype(np.intp)
+    units, known = layout.units, "given"
+    stamps = None
+    if ts is not None:
+        stamps = np.concatenate(ts)
+        if units is None:
+            units, known = unit_by_size(stamps)
+        stamps = in_seconds(stamps, units)
+    elif isinstance(units, float | int):
+        stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
+    else:
+        units, known = "s", "no times: one second each"
+    columns = tuple(axis_names(xs[0].shape[1]))
+    places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
+    block = Block(np.concatenate(xs), stamps, offsets, list(labels), places)
+    return Found(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Coordinates ``x`` (T,), ``y`` (T,), ``z`` (T,) as positions (T, d)."""
+    axes = [name for name in "xyz" if name in arrays]
+    if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
+        return arrays
+    others = {name: value for name, value in arrays.items() if name not in axes}
+    return {**others, "positions": np.column_stack([np.asarray(arrays[name], dtype=np.float64) for name in axes])}
+
+
+def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
+    return next((name for name in names if name in arrays), None)
+
+
+def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
+    key = _named(arrays, TIMES)
+    t = None if key is None else np.asarray(arrays[key], dtype=np.float64)
+    if x.ndim == 3:
+        if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
+            raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
+        return list(x), None if t is None else list(np.broadcast_to(t, x.shape[:2])), "(n, T, d)"
+    x = x[:, None] if x.ndim == 1 else x
+    if x.ndim != 2:
+        raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
+    if t is None and not isinstance(layout.units, float | int):
+        raise DataError(f"expected times beside the positions, got {list(arrays)}; say their step with units=")
+    if t is not None and t.shape != x.shape[:1]:
+        raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
+    if "offsets" not in arrays:
+        return [x], None if t is None else [t], "single"
+    inner = np.asarray(arrays["offsets"])
+    if inner.ndim != 1 or inner.dtype.kind not in "iu" or len(inner) < 2 or (np.diff(inner) < 0).any():
+        raise DataError("expected offsets as whole numbers that do not decrease, (n + 1,)")
+    if inner[0] != 0 or inner[-1] != len(x):
+        raise DataError(f"expected offsets from 0 to {len(x)}, got {inner[0]} to {inner[-1]}")
+    return np.split(x, inner[1:-1]), None if t is None else np.split(t, inner[1:-1]), "offsets"
+
+
+def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
+    prefix = next((one for one in POSITIONS if f"{one}_0" in arrays), None)
+    if prefix is None:
+        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {list(arrays)}")
+    count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
+    xs = [np.asarray(arrays[f"{prefix}_{k}"], dtype=np.float64) for k in range(count)]
+    xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    if odd := [x.shape for x in xs if x.ndim != 2]:
+        raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
+    clock = next((one for one in TIMES if f"{one}_0" in arrays), None)
+    if clock is None:
+        return xs, None, "numbered"
+    try:
+        return xs, [np.asarray(arrays[f"{clock}_{k}"], dtype=np.float64).ravel() for k in range(count)], "numbered"
+    except KeyError as error:
+        raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
+
+
+def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
+    key = _named(arrays, LABELS)
+    if key is None:
+        return [None] * n
+    labels = np.atleast_1d(np.asarray(arrays[key]))
+    if labels.shape != (n,):
+        raise DataError(f"expected one label for each of the {n} movements, got labels of shape {labels.shape}")
+    return [one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in labels.tolist()]

@@ -1,0 +1,154 @@
+"""Which column of a table is time, which coordinates, which tells movements apart, which names the action."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.io.layout import Column, Layout
+from kineme.io.time_units import PER_SECOND, words_of
+
+#: Words of heads. A head is of a kind if all its words are in the kind's lists and at least one in the first of them.
+TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "elapsed", "epoch"})
+MOVEMENT_WORDS = frozenset(
+    {
+        "movement", "demonstration", "demo", "trial", "trajectory", "traj", "sequence", "episode", "recording",
+        "segment", "repetition", "rep", "subject", "participant",
+    }
+)  # fmt: skip
+LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
+_BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
+_BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
+_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # say nothing that time does not
+_DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
+
+
+class Roles(NamedTuple):
+    """Column numbers: what each is for, and those that are left aside."""
+
+    time: int | None
+    positions: tuple[int, ...]
+    movement: tuple[int, ...]
+    label: int | None
+    ignored: tuple[int, ...]
+
+
+def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
+    """Find the columns' roles.
+
+    Parameters
+    ----------
+    heads : sequence of str
+        One per column.
+    kinds : sequence of {"number", "text"}
+        What the columns hold.
+    layout : Layout
+        What the caller says; it wins.
+    named : bool, default True
+        Whether the file has heads. Without, the first column of numbers is time and the others are coordinates.
+
+    Raises
+    ------
+    DataError
+        No or several columns of times, no coordinates, or a column that is not there; the message lists what is.
+    """
+    label = _label(heads, layout, named)
+    movement = _movement(heads, layout, named, label)
+    taken = {*movement, label}
+    time = _time(heads, kinds, layout, named, taken)
+    taken.add(time)
+    if layout.columns is not None:
+        positions = tuple(_number(heads, one) for one in layout.columns)
+    else:
+        free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
+        positions = tuple(k for k in free if not (named and _says_nothing_new(heads, k)))
+    if not positions:
+        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    ignored = tuple(k for k in range(len(heads)) if k not in taken and k not in positions)
+    return Roles(time, positions, movement, label, ignored)
+
+
+def _number(heads: Sequence[str], column: Column) -> int:
+    """A column by head or number; digits in a string count when no head reads so."""
+    if isinstance(column, str) and column in heads:
+        return list(heads).index(column)
+    if isinstance(column, str):
+        plain = [_plain(head) for head in heads]
+        if plain.count(_plain(column)) == 1:
+            return plain.index(_plain(column))
+    if isinstance(column, int) or column.isdecimal():
+        k = int(column)
+        if -len(heads) <= k < len(heads):
+            return k % len(heads)
+    raise DataError(f"expected a column {column!r}, got {_listed(heads)}")
+
+
+def _plain(head: str) -> str:
+    return re.sub(r"[\[(].*?[\])]", "", head).strip().lower()
+
+
+def _listed(heads: Sequence[str]) -> str:
+    return "one column" if len(heads) == 1 else f"the columns {list(heads)}"
+
+
+def _time(
+    heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool, taken: set[int | None]
+) -> int | None:
+    if layout.time is not None:
+        return _number(heads, layout.time)
+    free = [k for k in range(len(heads)) if k not in taken]
+    found = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] == "number"][:1]
+    if len(found) == 1:
+        return found[0]
+    if isinstance(layout.units, float | int) and not found:
+        return None
+    if not named:
+        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    raise DataError(
+        f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
+        "say which with time=, or the step between samples with units= where there is none"
+    )
+
+
+def is_time(head: str) -> bool:
+    """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
+    words = words_of(head)
+    if words[:-1] == [] and words != ["s"] and set(words) & set(PER_SECOND):
+        return True
+    return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
+
+
+def _named_as(head: str, kind: frozenset[str]) -> bool:
+    words = set(words_of(head))
+    return words <= kind | _BESIDE_NAMES and bool(words & kind)
+
+
+def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
+    if layout.label is not None:
+        return _number(heads, layout.label)
+    found = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
+    if len(found) > 1:
+        raise DataError(f"expected one column of labels, got {[heads[k] for k in found]}; say which with label=")
+    return found[0] if found else None
+
+
+def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
+    if layout.movement is not None:
+        return tuple(_number(heads, one) for one in layout.movement)
+    if not named:
+        return ()
+    kind = MOVEMENT_WORDS
+    return tuple(
+        k for k, head in enumerate(heads) if k != label and (_named_as(head, kind) or words_of(head) == ["id"])
+    )
+
+
+def _says_nothing_new(heads: Sequence[str], k: int) -> bool:
+    """A counter of samples, or the velocity or acceleration of another column."""
+    words = words_of(heads[k])
+    if not words or (words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+        return True
+    derived = _DERIVATIVE.fullmatch(_plain(heads[k]))
+    return derived is not None and (derived[1] or derived[2]) in {_plain(head) for head in heads}

@@ -1,0 +1,90 @@
+"""How a table of samples is written: separator, decimal mark, heads, and what its columns hold."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from kineme.errors import DataError
+from kineme.io.columns import is_time
+
+COMMENTS = ("#", "%", "//")
+PEEK = 50  # lines to look at before deciding
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+
+
+class Dialect(NamedTuple):
+    """How a table is written: its separator (None: blanks), decimal comma, heads, and where the numbers begin."""
+
+    separator: str | None
+    decimal_comma: bool
+    heads: tuple[str, ...]
+    named: bool
+    first: int  # line of the first sample, counted from 0
+    kinds: tuple[str, ...]  # "number" or "text" per column
+
+
+def is_skipped(line: str) -> bool:
+    """Whether a line holds no sample."""
+    stripped = line.strip()
+    return not stripped or stripped.startswith(COMMENTS)
+
+
+def split(line: str, separator: str | None) -> list[str]:
+    """The cells of a line."""
+    if '"' in line:
+        marks: dict[str, Any] = {"delimiter": separator or " ", "skipinitialspace": True}
+        return [cell.strip() for cell in next(csv.reader([line.strip() if separator is None else line], **marks))]
+    return [cell.strip() for cell in line.rstrip("\r\n").split(separator)]
+
+
+def detect_dialect(lines: Sequence[str]) -> Dialect:
+    """How a table is written, from its first lines."""
+    kept = [k for k, line in enumerate(lines) if not is_skipped(line)][:PEEK]
+    if not kept:
+        raise DataError("expected samples, got an empty file")
+    separator = _separator([lines[k] for k in kept[:2]])
+    cells = [split(lines[k], separator) for k in kept]
+    comma = separator != "," and any(_COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
+    named = not _is_sample(cells, comma)
+    heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
+    body = cells[named:]
+    kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
+    if heads:
+        return Dialect(separator, comma, tuple(heads), True, first, kinds)
+    return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def _separator(lines: Sequence[str]) -> str | None:
+    for mark in (";", "\t", ","):
+        if all(mark in line for line in lines):
+            return mark
+    return None
+
+
+def is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell reads as a number."""
+    return bool(_NUMBER.fullmatch(cell) or (comma and _COMMA_NUMBER.fullmatch(cell)))
+
+
+def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
+    """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
+    counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
+    return counts[0] > 0 and counts[0] >= counts[-1]
+
+
+def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:
+    """The heads in the last comment above the samples, if it has as many words as columns, and one is for time."""
+    comments = [line.strip().lstrip("#%/") for line in lines if line.strip()]
+    if not comments:
+        return []
+    heads = split(comments[-1].strip(), separator)
+    return heads if len(heads) == n_columns and any(map(is_time, heads)) else []
+
+
+def _kind(cells: Sequence[str], comma: bool) -> str:
+    filled = [cell for cell in cells if cell]
+    return "number" if 2 * sum(is_number(cell, comma) for cell in filled) >= len(filled) else "text"

@@ -1,0 +1,68 @@
+"""The one table of formats: file ending to reader."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.io.arrays import arrays_movements, join
+from kineme.io.container import decode_arrays
+from kineme.io.found import Found
+from kineme.io.layout import Layout
+from kineme.io.matlab import read_demos
+from kineme.io.parquet import read_parquet_table
+from kineme.io.table_movements import table_movements
+from kineme.io.text_table import read_text_table
+
+
+class Format(NamedTuple):
+    """How the bytes of a file become movements, and whether the file's name is their label."""
+
+    read: Callable[[bytes, Layout], Found]
+    label_is_stem: bool = False
+
+
+def _read_text(data: bytes, layout: Layout) -> Found:
+    return table_movements(*read_text_table(data, layout), layout, "CSV")
+
+
+def _read_parquet(data: bytes, layout: Layout) -> Found:
+    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+
+
+def _read_npz(data: bytes, layout: Layout) -> Found:
+    return arrays_movements(decode_arrays(data, Path("it")), layout, "NPZ")
+
+
+def _read_json(data: bytes, layout: Layout) -> Found:
+    entries = json.loads(data)
+    if not isinstance(entries, dict):
+        raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
+    return arrays_movements(entries, layout, "JSON")
+
+
+def _read_matlab(data: bytes, layout: Layout) -> Found:
+    demos = read_demos(data)
+    return join(demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos"))
+
+
+def _read_bag(data: bytes, layout: Layout) -> Found:
+    raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
+
+
+#: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
+FORMATS: dict[str, Format] = {
+    ".csv": Format(_read_text),
+    ".tsv": Format(_read_text),
+    ".txt": Format(_read_text),
+    ".npz": Format(_read_npz),
+    ".json": Format(_read_json),
+    ".parquet": Format(_read_parquet),
+    ".mat": Format(_read_matlab, label_is_stem=True),
+    ".bag": Format(_read_bag),
+    ".db3": Format(_read_bag),
+    ".mcap": Format(_read_bag),
+}

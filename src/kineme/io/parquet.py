@@ -1,0 +1,65 @@
+"""Parquet: columns with types; what they mean is decided as for text."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.io.columns import Roles, choose_roles
+from kineme.io.layout import Layout
+from kineme.io.table import Table
+
+
+def _no_lines(row: int) -> None:
+    return None
+
+
+def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """Read the columns that are needed. Dates and durations count in nanoseconds; what is missing is NaN.
+
+    Raises
+    ------
+    DataError
+        Not a Parquet file, damaged, or the package that reads it is not installed; the message names the extra.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
+    try:
+        file = parquet.ParquetFile(io.BytesIO(data))
+        heads = tuple(file.schema_arrow.names)
+        kinds = tuple(_kind(pa, kind) for kind in file.schema_arrow.types)
+        roles = choose_roles(heads, kinds, layout)
+        needed = [k for k in range(len(heads)) if k not in roles.ignored]
+        table = file.read(columns=[heads[k] for k in needed])
+        texts = {*roles.movement, roles.label}
+        read = {k: _column(table.column(i), k in texts, heads[k]) for i, k in enumerate(needed)}
+    except (pa.ArrowException, OSError) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
+    columns = [read.get(k) for k in range(len(heads))]
+    return Table(heads, columns, table.num_rows, _no_lines), roles
+
+
+def _kind(pa: Any, kind: Any) -> str:
+    of = pa.types
+    return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
+
+
+def _column(column: Any, is_text: bool, head: str) -> Any:
+    if is_text:
+        return np.array(["" if one is None else str(one) for one in column.to_pylist()], dtype=object)
+    values = column.to_numpy()
+    if values.dtype.kind in "Mm":
+        counts = values.astype(f"{values.dtype.kind}8[ns]")
+        return np.where(np.isnat(counts), np.nan, counts.astype(np.int64))
+    try:
+        return values.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"expected numbers in the column {head!r}, got {column.type}") from error

@@ -1,0 +1,90 @@
+"""One file, whole: its bytes are read once, hashed, and turned into checked movements; what fails is a problem."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from kineme.errors import DataError, KinemeError
+from kineme.io.check_block import check_block
+from kineme.io.folders import as_text
+from kineme.io.formats import FORMATS, Format
+from kineme.io.found import Block, Detected, Problem
+from kineme.io.layout import Layout
+
+
+class FileRead(NamedTuple):
+    """What a file gave: movements and how they were understood, or neither; and what was wrong."""
+
+    path: str  # relative to what is read, as text
+    sha256: str
+    size: int
+    mtime: float
+    detected: Detected | None
+    block: Block | None
+    problems: list[Problem]
+
+
+def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
+    """Read a file; it need not exist any more.
+
+    Parameters
+    ----------
+    path : Path
+    relative : Path
+        How it is called in the result. Its innermost folder is the label of movements that carry none themselves,
+        unless the format has it that the file's own name is.
+    layout : Layout
+    """
+    name = as_text(relative)
+    try:
+        format_of(relative)
+        known = os.stat(path)
+        if not stat.S_ISREG(known.st_mode):  # reading a pipe would wait forever
+            raise DataError("expected a file, got a pipe or a device")
+        data = path.read_bytes()
+    except OSError as error:
+        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
+    return read_bytes(data, relative, layout, known.st_mtime)
+
+
+def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
+    """Read what a file of that name holds."""
+    name = as_text(relative)
+    sha256 = hashlib.sha256(data).hexdigest()
+    form = format_of(relative)
+    try:
+        detected, block = form.read(data, layout)
+        block, problems = check_block(block, name, layout.skip)
+    except (KinemeError, ValueError, KeyError, TypeError, EOFError, OSError, OverflowError, MemoryError) as error:
+        return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
+    label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
+    block = replace(block, labels=[label if one is None else one for one in block.labels])
+    return FileRead(name, sha256, len(data), mtime, detected, block, problems)
+
+
+def format_of(path: Path) -> Format:
+    """The row of `FORMATS` for a file's ending.
+
+    Raises
+    ------
+    DataError
+        No format has that ending; the message lists those that there are.
+    """
+    form = FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise DataError(f"expected a file ending in one of {', '.join(FORMATS)}, got {path.suffix or 'no ending'!r}")
+    return form
+
+
+def _plainly(error: BaseException) -> str:
+    if isinstance(error, KinemeError):
+        return str(error)
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
+    return f"expected times and positions, got {reason}"

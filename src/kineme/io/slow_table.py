@@ -1,0 +1,71 @@
+"""The same table where a line is not as the others: the good stretches at full speed, the bad lines one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from kineme.io.dialect import Dialect, split
+
+_STRETCH = 1000  # lines that are tried together
+
+#: What programs write where there is no number.
+MISSING = frozenset(("", "na", "n/a", "null", "none", "nan", "-", "--", "?"))
+
+
+def read_slowly(
+    samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
+) -> tuple[Any, dict[int, str]]:
+    """All samples, NaN where a number is missing, and row -> what is wrong there."""
+    stretches, faults, n_rows = [], {}, 0
+    samples = iter(samples)
+    while lines := [line for _, line in islice(samples, _STRETCH)]:
+        rows, wrong = _read_stretch(lines, dialect, dtype)
+        faults.update({n_rows + row: reason for row, reason in wrong.items()})
+        stretches.append(rows)
+        n_rows += len(rows)
+    return np.concatenate(stretches), faults
+
+
+def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> tuple[Any, dict[int, str]]:
+    texts = [dtype[name].kind == "O" for name in dtype.names or ()]
+    if not (dialect.decimal_comma and any(texts)):
+        plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
+        try:
+            read = np.loadtxt(plain, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
+            return read, {}
+        except ValueError:
+            pass
+    rows = np.empty(len(lines), dtype)
+    faults = {}
+    for k, line in enumerate(lines):
+        rows[k], wrong = _read_line(line, dialect, texts)
+        if wrong:
+            faults[k] = wrong
+    return rows, faults
+
+
+def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
+    cells, wrong = split(line, dialect.separator), ""
+    if len(cells) != len(texts):
+        wrong = f"expected {len(texts)} columns, got {len(cells)}"
+        cells = (cells + [""] * len(texts))[: len(texts)]
+    row: list[Any] = []
+    for cell, text, head in zip(cells, texts, dialect.heads, strict=True):
+        row.append(cell if text else _number(cell, dialect.decimal_comma))
+        if row[-1] is None:
+            row[-1] = np.nan
+            wrong = wrong or f"expected a number in {head!r}, got {repr(cell) if cell else 'nothing'}"
+    return tuple(row), wrong
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    if cell.lower() in MISSING or "_" in cell:
+        return None
+    try:
+        return float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return None

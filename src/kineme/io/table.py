@@ -1,0 +1,30 @@
+"""A table of samples in memory, whatever file it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of numbers and of texts.
+
+    Attributes
+    ----------
+    heads : tuple of str
+    columns : sequence of ndarray of shape (rows,)
+        float64 where numbers are expected, NaN where none is; objects elsewhere.
+    n_rows : int
+    line_of : callable
+        Row -> its line in the file, counted from 1, or None.
+    faults : dict
+        Row -> what is wrong there.
+    """
+
+    heads: tuple[str, ...]
+    columns: Sequence[Any]
+    n_rows: int
+    line_of: Callable[[int], int | None]
+    faults: dict[int, str] = field(default_factory=dict)

@@ -1,0 +1,78 @@
+"""From a table to movements: wide, one movement; or long, many of them told apart by columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.io.columns import Roles
+from kineme.io.found import Block, Detected, Found
+from kineme.io.layout import Layout
+from kineme.io.table import Table
+from kineme.io.time_units import in_seconds, unit_by_size, unit_in_head
+
+
+def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Found:
+    """The movements of a table.
+
+    With columns that tell movements apart, rows of equal texts in them, and of equal label, are one movement, wherever
+    they stand. With a column of labels alone, a new movement begins where the label changes. Else the table is one.
+    """
+    positions = np.column_stack([table.columns[k] for k in roles.positions])
+    times, units, units_from = _times(table, roles, layout)
+    codes, keys, labels = _split(table, roles)
+    n = len(keys)
+    rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
+    if rows is not None:
+        positions, times, codes = positions[rows], times[rows], codes[rows]
+    offsets = np.searchsorted(codes, np.arange(n + 1))
+    if roles.time is None:
+        times = (np.arange(len(times)) - np.repeat(offsets[:-1], np.diff(offsets))) * float(units)
+    heads = table.heads
+    detected = Detected(
+        kind,
+        "long" if roles.movement or roles.label is not None else "wide",
+        tuple(heads[k] for k in roles.positions),
+        None if roles.time is None else heads[roles.time],
+        units,
+        units_from,
+        tuple(heads[k] for k in roles.movement),
+        () if roles.label is None else (heads[roles.label],),
+        tuple(heads[k] for k in roles.ignored),
+    )
+    places = [""] * n if n == 1 and not roles.movement else keys
+    return Found(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
+
+
+def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
+    """Times [s], their unit in the file, and how it is known."""
+    if roles.time is None:
+        return np.zeros(table.n_rows), layout.units or 1.0, "given"
+    stamps, head = table.columns[roles.time], table.heads[roles.time]
+    if layout.units is not None:
+        return in_seconds(stamps, layout.units), layout.units, "given"
+    named = unit_in_head(head)
+    units, known = (named, "head") if named else unit_by_size(stamps)
+    return in_seconds(stamps, units), units, known
+
+
+def _split(table: Table, roles: Roles) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
+    """Per row the number of its movement; per movement its place and its label."""
+    n_rows, label = table.n_rows, roles.label
+    if label is None and not roles.movement:
+        return np.zeros(n_rows, np.intp), [""], [None]
+    labels = [None] * n_rows if label is None else table.columns[label].tolist()
+    if not roles.movement:
+        codes = np.cumsum([k > 0 and labels[k] != labels[k - 1] for k in range(n_rows)], dtype=np.intp)
+        firsts = np.flatnonzero(np.diff(codes, prepend=-1))
+        return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
+    columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
+    seen: dict[Any, int] = {}
+    keys = zip(labels, *columns, strict=True) if label is not None else zip(*columns, strict=True)
+    codes = np.fromiter((seen.setdefault(key, len(seen)) for key in keys), np.intp, n_rows)
+    parts = [key[label is not None :] for key in seen]
+    names: list[str | None] = [key[0] or None if label is not None else None for key in seen]
+    return codes, ["/".join(map(str, part)) for part in parts], names
