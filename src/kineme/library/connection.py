@@ -10,12 +10,14 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from urllib.parse import quote
 
 from kineme.errors import DataError
 from kineme.library.faults import in_plain_words
+from kineme.library.placing import placed
+from kineme.library.rows import insert
 from kineme.library.schema import APPLICATION_ID, CREATE, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 
 FILE = "library.sqlite"
@@ -49,28 +51,18 @@ def _cannot_keep_a_log(path: Path) -> bool:
 
 def create(path: Path, meta: dict[str, str]) -> None:
     """Make an empty library: all of it or, if anything fails, nothing."""
-    from kineme.library.rows import insert
-
-    with in_plain_words(path, 0.0):
+    with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may make it at the same time
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            with closing(sqlite3.connect(beside, isolation_level=None)) as connection:
-                connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
-                connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-                connection.execute("PRAGMA journal_mode = WAL")
-                connection.execute("BEGIN")
-                for statement in CREATE:
-                    connection.execute(statement)
-                insert(connection, "meta", meta.items())
-                connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-                connection.execute("COMMIT")
-            os.link(beside, path)  # unlike a rename, it leaves alone what another process has put there
-        except FileExistsError:
-            pass
-        finally:
-            for rest in (beside, *(beside.with_name(beside.name + end) for end in ("-wal", "-shm", "-journal"))):
-                rest.unlink(missing_ok=True)
+        with placed(path) as beside, closing(sqlite3.connect(beside, isolation_level=None)) as connection:
+            connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
+            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("BEGIN")
+            for statement in CREATE:
+                connection.execute(statement)
+            insert(connection, "meta", meta.items())
+            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            connection.execute("COMMIT")
 
 
 def check_kind(connection: sqlite3.Connection, path: Path) -> int:

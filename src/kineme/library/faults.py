@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from kineme.errors import DataError
+from kineme.errors import DataError, KinemeError
 
 _DAMAGED = (
     "expected {path} to be readable, got damaged bytes ({error}); kineme library verify names what is damaged: take "
@@ -48,6 +48,12 @@ def in_plain_words(path: Path, wait: float) -> Iterator[None]:
     """Turn errors of the database into `DataError`; a mistake of this library stays what it is."""
     try:
         yield
+    except KinemeError:
+        raise
+    except FileExistsError:  # who waits for it knows better what it means
+        raise
+    except OSError as error:
+        raise DataError(f"expected to read or write {path}, got an error of the system ({error})") from error
     except sqlite3.Error as error:
         code = getattr(error, "sqlite_errorcode", None)
         words = _WORDS.get(code & 0xFF) if code is not None else None

@@ -10,15 +10,13 @@ from kineme.library.rows import among, as_text, listed
 from kineme.library.source import Source
 from kineme.trajectories.demonstrations import Demonstrations
 
-_PARAMETERS = 500  # SQLite takes 999 everywhere
-
 
 @dataclass
 class Batch:
     """Movements to be stored, and what is said about them."""
 
     demos: Demonstrations
-    digests: list[bytes]
+    digests: list[int]
     labels: list[str | None]
     sources: list[Source | None]
     places: list[str | None]
@@ -30,7 +28,7 @@ class Batch:
 class Known:
     """What the library has of a batch."""
 
-    by_digest: dict[bytes, int]
+    by_digest: dict[int, int]
     sources: dict[tuple[str, str], int]  # (sha256, options) -> source
     by_place: dict[tuple[int, str], int]  # (source, place) -> movement
 
@@ -64,10 +62,6 @@ def look_up(connection: sqlite3.Connection, batch: Batch) -> Known:
     return Known(_by_digest(connection, batch.digests), sources, by_place)
 
 
-def _by_digest(connection: sqlite3.Connection, digests: list[bytes]) -> dict[bytes, int]:
-    query = "SELECT digest, id FROM movement WHERE removed IS NULL AND digest IN ({})"
-    found: dict[bytes, int] = {}
-    for k in range(0, len(digests), _PARAMETERS):
-        some = digests[k : k + _PARAMETERS]
-        found.update(connection.execute(query.format(", ".join("?" * len(some))), some))
-    return found
+def _by_digest(connection: sqlite3.Connection, digests: list[int]) -> dict[int, int]:
+    query = f"SELECT digest, id FROM movement WHERE removed IS NULL AND {among('digest')}"
+    return dict(connection.execute(query, {"keys": listed(digests)}))

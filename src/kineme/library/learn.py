@@ -22,8 +22,8 @@ from kineme.trajectories.demonstrations import Demonstrations
 
 Progress = Callable[[int, int], object]
 
-_BATCH_MOVEMENTS = 4096
-_BATCH_SAMPLES = 1_000_000
+_BATCH_MOVEMENTS = 8192
+_BATCH_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)

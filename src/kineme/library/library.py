@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library import read, symbols
+from kineme.library import changes, read, symbols
+from kineme.library.connection import FILE
 from kineme.library.specification import Specification
 from kineme.library.store import Store
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from kineme.library.learn import LearnReport
     from kineme.library.source import Source
     from kineme.library.symbols import Symbol
+    from kineme.library.verify import Problem
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
     from kineme.recognition.recognizer import Recognizer
@@ -67,7 +69,7 @@ class ActionLibrary:
         wait: float = 10.0,
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
-        self.store = Store(folder, specification, read_only=read_only, wait=wait)
+        self.store = Store(Path(folder) / FILE, specification, read_only=read_only, wait=wait)
 
     def __enter__(self) -> Self:
         return self
@@ -204,5 +206,62 @@ class ActionLibrary:
     def at(self, version: int) -> ActionLibrary:
         """The library as it was at a version, for reading."""
         past = object.__new__(ActionLibrary)
-        past.store = Store(self.folder, read_only=True, as_of=version, wait=self.store.wait)
+        past.store = Store(self.store.path, read_only=True, as_of=version, wait=self.store.wait)
         return past
+
+    def verify(self) -> list[Problem]:
+        """All that is damaged, each problem with the table, the row or movement, and a text; empty if all is well."""
+        from kineme.library.verify import verify
+
+        return verify(self.store)
+
+    def export(self, path: str | Path) -> Path:
+        """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
+        from kineme.library.exchange import export
+
+        return export(self.store, path)
+
+    @classmethod
+    def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
+        """Make a library in `folder` of a file that `export` wrote, after checking every byte of it, and open it."""
+        from kineme.library.exchange import import_
+
+        import_(path, folder)
+        return cls(folder, **options)
+
+    def rename(self, old: str, new: str) -> None:
+        """Give a symbol another name; its id stays."""
+        changes.rename(self.store, old, new)
+
+    def describe(self, who: str, text: str | None = None, **values: Any) -> None:
+        """Say what a symbol is, and set its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
+        changes.describe(self.store, who, **({} if text is None else {"description": text}), **values)
+
+    def delete(self, what: Any) -> None:
+        """Take a symbol away, given by name or id, whose movements stay; or movements, given by their ids.
+
+        Earlier versions keep what is deleted, and `at` shows it.
+        """
+        if isinstance(what, str):
+            changes.delete_symbol(self.store, what)
+        else:
+            changes.delete_movements(self.store, what)
+
+    def merge(self, names: Sequence[str], into: str) -> None:
+        """Make one symbol of several: an existing one, or a new one of that name. Their ids become its parents."""
+        changes.merge(self.store, names, into)
+
+    def split(self, name: str, ids: Any, new: str) -> None:
+        """Make a new symbol of some members of another one, which becomes its parent."""
+        changes.split(self.store, name, ids, new)
+
+    def assign(self, ids: Any, symbol: str, how: str = "anchored") -> None:
+        """Let movements show a symbol, made if there is none, instead of the one that they showed.
+
+        `how` is "label" (a person said so), "anchored" (by a cluster) or "recognized".
+        """
+        changes.assign(self.store, ids, symbol, how)
+
+    def release(self, ids: Any) -> None:
+        """Let movements show no symbol any more."""
+        changes.release(self.store, ids)

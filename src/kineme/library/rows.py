@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from kineme.errors import DataError
-from kineme.library.schema import COLUMNS
+from kineme.library.schema import BLOBS, COLUMNS
 
 Row = tuple[Any, ...]
 
@@ -17,23 +17,24 @@ Row = tuple[Any, ...]
 ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
 
 
-def seal(row: Row) -> int:
+def seal(table: str, row: Row) -> int:
     """CRC-32 over all columns of a row, its key first."""
-    crc = 0
-    plain = []
-    for value in row:
-        if isinstance(value, bytes):
-            crc = zlib.crc32(value, crc)
-            plain.append(len(value))
-        else:
-            plain.append(value)
-    return zlib.crc32(repr(plain).encode(), crc)
+    if table in BLOBS:
+        return _seal_blobs(row)
+    return zlib.crc32(repr(row).encode())
+
+
+def _seal_blobs(row: Row) -> int:
+    crc: int = row[0] & 0xFFFFFFFF
+    for blob in row[1:]:
+        crc = zlib.crc32(blob or b"", crc)
+    return crc
 
 
 def insert(connection: sqlite3.Connection, table: str, rows: Iterable[Row]) -> None:
     """Add rows, in the order of `COLUMNS`, each with its seal."""
     marks = ", ".join("?" * (len(COLUMNS[table]) + 1))
-    connection.executemany(f"INSERT INTO {table} VALUES ({marks})", ((*row, seal(row)) for row in rows))
+    connection.executemany(f"INSERT INTO {table} VALUES ({marks})", [(*row, seal(table, row)) for row in rows])
 
 
 def select(
@@ -50,7 +51,7 @@ def select(
     query = f"SELECT {', '.join(columns)}, crc FROM {table} WHERE {where} ORDER BY {columns[0]}"
     rows = connection.execute(query, parameters or {}).fetchall()
     for row in rows:
-        if seal(row[:-1]) != row[-1]:
+        if seal(table, row[:-1]) != row[-1]:
             raise damaged(table, row)
     return [row[:-1] for row in rows]
 
@@ -83,7 +84,7 @@ def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], vers
     """Mark rows, whose last column is ``removed``, as removed from `version` on."""
     gone = [(*row[:-1], version) for row in rows]
     statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ? AND removed IS NULL"
-    connection.executemany(statement, ((version, seal(row), row[0]) for row in gone))
+    connection.executemany(statement, ((version, seal(table, row), row[0]) for row in gone))
 
 
 def next_key(connection: sqlite3.Connection, table: str) -> int:

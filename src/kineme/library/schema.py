@@ -28,6 +28,9 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "member": ("id", "movement", "symbol", "how", "added", "removed"),
 }  # fmt: skip
 
+#: Tables of a key and bytes, one row per movement.
+BLOBS = ("raw", "primitive", "feature")
+
 #: What makes an empty file a library. Columns carry the type and the meaning of `COLUMNS`.
 CREATE = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
@@ -37,7 +40,7 @@ CREATE = (
         id INTEGER PRIMARY KEY, path TEXT NOT NULL, sha256 TEXT NOT NULL, size INTEGER NOT NULL, read_at TEXT NOT NULL,
         kind TEXT NOT NULL, options TEXT NOT NULL, added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
     """CREATE TABLE movement (
-        id INTEGER PRIMARY KEY, source INTEGER REFERENCES source, place TEXT, digest BLOB NOT NULL, name TEXT,
+        id INTEGER PRIMARY KEY, source INTEGER REFERENCES source, place TEXT, digest INTEGER NOT NULL, name TEXT,
         label TEXT, n_samples INTEGER NOT NULL, t0 REAL NOT NULL, duration REAL NOT NULL,
         added INTEGER NOT NULL REFERENCES version, removed INTEGER REFERENCES version, crc INTEGER NOT NULL)""",
     """CREATE TABLE raw (

@@ -14,7 +14,7 @@ from threading import RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.connection import FILE, check_kind, connect, create, migrate, transaction
+from kineme.library.connection import check_kind, connect, create, migrate, transaction
 from kineme.library.faults import in_plain_words
 from kineme.library.rows import Row, insert, select
 from kineme.library.schema import SCHEMA_VERSION
@@ -40,8 +40,8 @@ class Store:
 
     Parameters
     ----------
-    folder : str or Path
-        Holds ``library.sqlite``; caches that can be built again may lie beside it.
+    path : Path
+        Of the database. Caches that can be built again may lie beside it.
     specification : Specification, optional
         Of a library that is to be created if there is none.
     read_only : bool
@@ -53,15 +53,14 @@ class Store:
 
     def __init__(
         self,
-        folder: str | Path,
+        path: Path,
         specification: Specification | None = None,
         *,
         read_only: bool = False,
         as_of: int | None = None,
         wait: float = 10.0,
     ) -> None:
-        self.folder = Path(folder)
-        self.path = self.folder / FILE
+        self.path = path
         self.read_only = read_only or as_of is not None
         self.wait = wait
         self._turn = RLock()
@@ -83,8 +82,8 @@ class Store:
     def _create(self, specification: Specification | None) -> None:
         if specification is None or self.read_only:
             raise DataError(
-                f"expected a library in {self.folder}, found no {FILE} there; pass create=True to make one, "
-                "or correct the path"
+                f"expected a library in {self.path.parent}, found no {self.path.name} there; "
+                "pass create=True to make one, or correct the path"
             )
         create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
 
@@ -105,6 +104,11 @@ class Store:
         if as_of is not None and not 0 <= as_of <= last:
             raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
         return NOW if as_of is None else int(as_of)
+
+    @property
+    def folder(self) -> Path:
+        """Where the library is."""
+        return self.path.parent
 
     @property
     def version(self) -> int:

@@ -1,0 +1,56 @@
+"""A new file that is there as a whole or not at all, and never in the place of another one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_COMPANIONS = ("", "-wal", "-shm", "-journal")  # files that a database may have beside it
+
+
+@contextmanager
+def placed(target: Path) -> Iterator[Path]:
+    """A path beside `target` to write to; if all goes well the file is brought to the disk and gets its name.
+
+    Raises
+    ------
+    FileExistsError
+        There is a file of that name, or another process was faster; it stays as it is.
+    """
+    if target.exists():
+        raise FileExistsError(target)
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        yield beside
+        with beside.open("rb+") as file:
+            os.fsync(file.fileno())
+        _name(beside, target)
+        _sync_folder(target.parent)
+    finally:
+        for end in _COMPANIONS:
+            beside.with_name(beside.name + end).unlink(missing_ok=True)
+
+
+def _name(beside: Path, target: Path) -> None:
+    try:
+        os.link(beside, target)  # unlike a rename, it refuses to replace
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links
+        if target.exists():
+            raise FileExistsError(target) from None
+        beside.rename(target)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring the new name to the disk, where folders can be opened."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
