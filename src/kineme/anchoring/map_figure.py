@@ -1,0 +1,98 @@
+"""A map of the symbols: near on paper where they are near in the conceptual space, each drawn in its place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from kineme.anchoring.align import paths_of
+from kineme.anchoring.drawing import flat, mark_start, plot_paths
+from kineme.anchoring.space import ConceptualSpace
+from kineme.errors import SpecificationError
+from kineme.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.primitives.primitives import Primitives
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+_DRAWING = 0.055  # of the map's width: the largest size of a drawing
+
+
+def classical_scaling(distances: Array) -> tuple[Array, float]:
+    """Places (s, 2) in the plane whose distances are close to those given, and the share of their squares kept.
+
+    Classical multidimensional scaling: the two leading eigenvectors of ``-J D^2 J / 2``, J taking out the mean.
+
+    Source: W. S. Torgerson, "Multidimensional scaling: I. Theory and method", Psychometrika 17, 1952.
+    """
+    squares = distances**2
+    centered = squares - squares.mean(axis=0)
+    B = -0.5 * (centered - centered.mean(axis=1, keepdims=True))
+    values, vectors = np.linalg.eigh(0.5 * (B + B.T))
+    positive = np.maximum(values[::-1], 0.0)
+    places = np.zeros((len(distances), 2))
+    k = min(2, len(distances))
+    leading = vectors[:, ::-1][:, :k]
+    sign = np.sign(leading[np.abs(leading).argmax(axis=0), np.arange(k)])  # an eigenvector has no sign of its own
+    places[:, :k] = leading * np.where(sign == 0, 1.0, sign) * np.sqrt(positive[:k])
+    total = float(positive.sum())
+    return places, float(positive[:2].sum() / total) if total > 0 else 1.0
+
+
+def draw_map(space: ConceptualSpace, prototypes: Any) -> Figure:
+    """Symbols by classical scaling of their distances, each as a little drawing of its prototype.
+
+    Parameters
+    ----------
+    space : ConceptualSpace
+    prototypes : Primitives or movements
+        One for each symbol, in the order of the space.
+
+    Raises
+    ------
+    SpecificationError
+        Another number of prototypes than of symbols.
+    """
+    demos = prototypes if isinstance(prototypes, Primitives) else Demonstrations.of(prototypes)
+    if len(demos) != len(space.symbols):
+        raise SpecificationError(f"expected {len(space.symbols)} prototypes, one per symbol, got {len(demos)}")
+    places, kept = classical_scaling(space.distances)
+    width = float(np.ptp(places, axis=0).max()) or 1.0
+    places = apart(places / width, 2.3 * _DRAWING)
+    figure = new_figure(6.9, 6.0)
+    axes = figure.subplots()
+    for name, place, path in zip(space.symbols, places, paths_of(demos), strict=True):
+        drawn = _fitted(flat(path[None], path)[0]) + place[:, None]
+        plot_paths(axes, drawn[None], BLUE, linewidth=1.3)
+        mark_start(axes, drawn[None], ORANGE, 3.0)
+        axes.text(place[0], place[1] - 1.1 * _DRAWING, str(name), ha="center", va="top", fontsize=6, color=GRAY)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(
+        xticks=[], yticks=[], title=f"{len(places)} symbols; the plane holds {100 * kept:.0f} % of their distances"
+    )
+    axes.margins(0.08)
+    return figure
+
+
+def _fitted(drawn: Array) -> Array:
+    """A path (2, T) about the origin, as large as a drawing on the map may be."""
+    size = np.ptp(drawn, axis=1, keepdims=True)
+    centered = drawn - drawn.min(axis=1, keepdims=True) - 0.5 * size
+    return np.asarray(2.0 * _DRAWING * centered / (float(size.max()) or 1.0))
+
+
+def apart(places: Array, least: float, rounds: int = 200) -> Array:
+    """Places (s, 2) pushed away from each other until none are closer than `least`, or the rounds are over."""
+    places = places.copy()
+    # Symbols in the very same place have no direction to part in: a tiny, ever the same one is given to them.
+    places += 1e-6 * np.random.default_rng(0).normal(size=places.shape)
+    for _ in range(rounds):
+        away = places[:, None] - places[None]
+        d = np.linalg.norm(away, axis=2)
+        np.fill_diagonal(d, np.inf)
+        push = np.maximum(least - d, 0.0)
+        if not push.any():
+            break
+        places += 0.25 * np.einsum("ij,ijk->ik", push / d, away)
+    return places

@@ -1,0 +1,133 @@
+"""The conceptual space of symbols: how far apart they are, which are near, which lie between.
+
+Source: P. Gärdenfors, "Conceptual Spaces: The Geometry of Thought", MIT Press 2000: quality dimensions with a metric,
+betweenness as ``d(a, c) + d(c, b) = d(a, b)``, likeness that falls with distance (chapter 1), concepts as regions
+around prototypes (chapter 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.anchoring.seen import Seen, see
+from kineme.anchoring.similarities import averaged
+from kineme.errors import SpecificationError
+from kineme.recognition.recognizer import Recognizer
+from kineme.validation import Array, check_count, check_number
+
+
+class Near(NamedTuple):
+    """A symbol and how far it is, in kernel widths."""
+
+    symbol: Any
+    distance: float
+
+
+class Between(NamedTuple):
+    """A symbol that lies between two others."""
+
+    symbol: Any
+    excess: float  # (d(a, c) + d(c, b)) / d(a, b) - 1: the detour, 0 on the straight way
+    share: float  # of the way from a to b, where c's foot on it is, 0 to 1
+
+
+@dataclass(frozen=True, eq=False)
+class ConceptualSpace:
+    """Symbols at distances; made by `conceptual_space`.
+
+    Attributes
+    ----------
+    symbols : tuple
+    distances : ndarray of shape (s, s)
+    """
+
+    symbols: tuple[Any, ...]
+    distances: Array
+
+    def nearest(self, symbol: Any, k: int = 3) -> tuple[Near, ...]:
+        """The `k` symbols nearest to one, nearest first; all of them where there are fewer."""
+        check_count("k", k, 1)
+        i = self.place(symbol)
+        order = [j for j in np.argsort(self.distances[i], kind="stable").tolist() if j != i][:k]
+        return tuple(Near(self.symbols[j], float(self.distances[i, j])) for j in order)
+
+    def between(self, a: Any, b: Any, eps: float = 0.25) -> tuple[Between, ...]:
+        """Symbols c with ``d(a, c) + d(c, b) <= (1 + eps) d(a, b)``, the smallest detour first.
+
+        In a space of many dimensions nothing lies exactly between, hence eps. A symbol is between when it is also
+        nearer to each of the two than they are to each other.
+        """
+        check_number("eps", eps, least=0.0)
+        i, j = self.place(a), self.place(b)
+        if i == j:
+            raise SpecificationError(f"expected two different symbols, got {a!r} twice")
+        d, ab = self.distances, self.distances[i, j]
+        found = []
+        for c in range(len(self.symbols)):
+            ac, cb = d[i, c], d[c, j]
+            if c in (i, j) or ac + cb > (1 + eps) * ab or max(ac, cb) >= ab:
+                continue
+            share = 0.5 + 0.5 * (ac**2 - cb**2) / ab**2  # law of cosines
+            found.append(Between(self.symbols[c], float((ac + cb) / ab - 1.0), float(np.clip(share, 0.0, 1.0))))
+        return tuple(sorted(found, key=lambda one: one.excess))
+
+    def place(self, symbol: Any) -> int:
+        """Index of a symbol."""
+        if symbol not in self.symbols:
+            raise SpecificationError(f"expected one of the symbols {list(self.symbols)}, got {symbol!r}")
+        return self.symbols.index(symbol)
+
+
+def conceptual_space(
+    symbols: Sequence[Hashable], prototypes: Any, like: Recognizer | None = None, widths: ArrayLike | None = None
+) -> ConceptualSpace:
+    """Distances between symbols, by their prototypes.
+
+    ``d(a, b) = sqrt(-2 log K(a, b)) = sqrt(mean_r d_r(a, b)^2 / sigma_r^2)`` with the *geometric* average of the
+    representations' kernels: each representation is a domain whose salience is ``1 / sigma_r``, likeness falls with
+    distance as a Gaussian (Gärdenfors, chapter 1), and where no rotation is taken out d is a weighted Euclidean
+    metric. The best rotation within a bounded angle may break the triangle inequality. The recognizer's arithmetic mean
+    says who is who, but beyond the nearest all are equally far; a space needs distances that go on growing.
+
+    Parameters
+    ----------
+    symbols : sequence of s symbols, all different
+    prototypes : Seen, or s movements
+        One for each symbol: its medoid, say.
+    like : Recognizer, optional
+        Whose representations and invariances to take.
+    widths : array_like of shape (R,), optional
+        By default the median distance of the prototypes in each representation, so that all of them matter alike.
+
+    Raises
+    ------
+    SpecificationError
+        Not one prototype for each symbol, or a symbol twice.
+    """
+    seen = replace(see(prototypes, like), mean="geometric")
+    names = tuple(symbols)
+    if len(names) != len(seen) or len(set(names)) != len(names):
+        raise SpecificationError(
+            f"expected one prototype for each of different symbols, got {len(seen)} prototypes for "
+            f"{len(names)} symbols, {len(set(names))} of them different"
+        )
+    similarity = averaged(seen, _typical(seen) if widths is None else widths)
+    d = np.sqrt(np.maximum(-2.0 * similarity.log_average(seen.views, seen.views), 0.0))
+    d = 0.5 * (d + d.T)
+    np.fill_diagonal(d, 0.0)
+    return ConceptualSpace(names, d)
+
+
+def _typical(seen: Seen) -> NDArray[np.float64]:
+    """Median distance of two movements in each representation."""
+    pairs = ~np.eye(len(seen), dtype=bool)
+    medians = []
+    for one in seen.views:
+        apart = seen.procrustes.squared_distances(one, one)[pairs]
+        medians.append(np.sqrt(np.median(apart)) if len(apart) and np.median(apart) > 0 else 1.0)
+    return np.array(medians)
