@@ -40,7 +40,7 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
         reason = f"expected at least {MIN_SAMPLES} samples, got {lengths[i]}"
         line = block.line_of(block.row(int(block.offsets[i]))) if lengths[i] and len(lengths) > 1 else None
         problems.append(Problem(file, line, _who(block, i) + reason, TrajectoryError))
-    return _take(block, lengths >= MIN_SAMPLES), problems
+    return _take(block, lengths >= MIN_SAMPLES), sorted(problems, key=lambda problem: problem.line or 0)
 
 
 def _unusable(block: Block, skip: str) -> Flags:

@@ -34,11 +34,12 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
     texts = [dtype[name].kind == "O" for name in dtype.names or ()]
     if not (dialect.decimal_comma and any(texts)):
         plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
-        try:
-            read = np.loadtxt(plain, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
+        if (read := _try(plain, dialect, dtype)) is not None:
             return read, {}
-        except ValueError:
-            pass
+        if not any(texts) and dialect.separator:  # the usual fault is an empty cell
+            filled = [_filled(line, dialect.separator) for line in plain]
+            if (read := _try(filled, dialect, dtype)) is not None:
+                return read, _empty_cells(read, dialect)
     rows = np.empty(len(lines), dtype)
     faults = {}
     for k, line in enumerate(lines):
@@ -46,6 +47,31 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
         if wrong:
             faults[k] = wrong
     return rows, faults
+
+
+def _try(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+    try:
+        return np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
+    except ValueError:
+        return None
+
+
+def _filled(line: str, separator: str) -> str:
+    """A line with nan in its empty cells."""
+    line, empty = line.rstrip("\r\n"), separator + separator
+    if empty in line:  # twice, as of three separators in a row the first replacement sees two
+        line = line.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
+    line = f"nan{line}" if line.startswith(separator) else line
+    return f"{line}nan" if line.endswith(separator) else line
+
+
+def _empty_cells(rows: Any, dialect: Dialect) -> dict[int, str]:
+    """Row -> which number is missing."""
+    missing = np.isnan(np.column_stack([rows[name] for name in rows.dtype.names]))
+    return {
+        int(k): f"expected a number in {dialect.heads[int(np.argmax(missing[k]))]!r}, got nothing"
+        for k in np.flatnonzero(missing.any(axis=1))
+    }
 
 
 def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:

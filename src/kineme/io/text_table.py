@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from functools import cache
 from itertools import chain, islice
 from typing import Any
 
@@ -39,8 +40,12 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     if rows is None:
         rows, faults = read_slowly(_samples(data, encoding, dialect), dialect, dtype)
 
+    @cache
+    def lines() -> Any:
+        return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
+
     def line_of(row: int) -> int | None:
-        return next(islice((line for line, _ in _samples(data, encoding, dialect)), row, None), None)
+        return int(lines()[row])
 
     columns = [rows[name] for name in dtype.names or ()]
     return Table(dialect.heads, columns, len(rows), line_of, faults), roles
