@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kineme.anchoring.align import paths_of
-from kineme.anchoring.drawing import flat, mark_start, plot_paths
+from kineme.anchoring.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.space import ConceptualSpace
 from kineme.errors import SpecificationError
 from kineme.figures import BLUE, GRAY, ORANGE, new_figure
@@ -16,7 +16,7 @@ from kineme.primitives.primitives import Primitives
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
-_DRAWING = 0.055  # of the map's width: the largest size of a drawing
+_DRAWING = 0.042  # of the map's width: half the largest size of a drawing
 
 
 def classical_scaling(distances: Array) -> tuple[Array, float]:
@@ -59,19 +59,16 @@ def draw_map(space: ConceptualSpace, prototypes: Any) -> Figure:
         raise SpecificationError(f"expected {len(space.symbols)} prototypes, one per symbol, got {len(demos)}")
     places, kept = classical_scaling(space.distances)
     width = float(np.ptp(places, axis=0).max()) or 1.0
-    places = apart(places / width, 2.3 * _DRAWING)
+    places = apart(places / width, 3.0 * _DRAWING)
     figure = new_figure(6.9, 6.0)
     axes = figure.subplots()
     for name, place, path in zip(space.symbols, places, paths_of(demos), strict=True):
         drawn = _fitted(flat(path[None], path)[0]) + place[:, None]
         plot_paths(axes, drawn[None], BLUE, linewidth=1.3)
         mark_start(axes, drawn[None], ORANGE, 3.0)
-        axes.text(place[0], place[1] - 1.1 * _DRAWING, str(name), ha="center", va="top", fontsize=6, color=GRAY)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(
-        xticks=[], yticks=[], title=f"{len(places)} symbols; the plane holds {100 * kept:.0f} % of their distances"
-    )
-    axes.margins(0.08)
+        axes.text(place[0], drawn[1].min() - 0.15 * _DRAWING, str(name), ha="center", va="top", fontsize=6, color=GRAY)
+    bare(axes, 2)
+    axes.set_title(f"{len(places)} symbols; the plane holds {100 * kept:.0f} % of their squared distances")
     return figure
 
 

@@ -48,7 +48,7 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None
         )
     columns = min(n, max(3, int(np.ceil(np.sqrt(1.4 * n)))))
     rows = -(-n // columns)
-    figure = new_figure(_CELL * columns, (_CELL + 0.12) * rows + 0.3)
+    figure = new_figure(_CELL * columns, (_CELL + 0.12) * rows + 0.4)
     cells = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
     for k, proposal in enumerate(proposals.proposals):
         check_members(proposal, len(demos))
@@ -59,10 +59,9 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None
         cells[n - 1].set_title(f"left over: {len(alone)}", fontsize=7, color=GRAY, pad=2)
     for empty in cells[n:]:
         empty.set_axis_off()
-    figure.suptitle(
-        f"{len(proposals)} kinds of {len(demos)} movements (number: size, stability; bold: most typical; dot: start)",
-        fontsize=8,
-    )
+    head = f"{len(proposals)} kinds of {len(demos)} movements"
+    key = "number: size, stability; bold: most typical; dot: start"
+    figure.suptitle(f"{head} ({key})" if columns > 4 else f"{head}\n{key}", fontsize=8 if columns > 4 else 7)
     return figure
 
 

@@ -1,0 +1,139 @@
+"""New movements beside known symbols: they join one, stay unknown, or raise a new proposal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.anchoring.clustering import without_small
+from kineme.anchoring.proposals import Proposals, describe_clusters
+from kineme.anchoring.propose import own_order
+from kineme.anchoring.resampling import Clusters, stabilities
+from kineme.anchoring.seen import Seen
+from kineme.anchoring.similarities import compare
+from kineme.anchoring.tree import average_linkage, cut_at
+from kineme.recognition.answer import known_labels
+from kineme.recognition.conformal import distances as in_widths
+from kineme.recognition.recognizer import Recognizer
+from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_count
+
+_REPEATS = 20
+_REACH = 0.6  # of the distance to an impostor, where no symbol shows how far its members are from each other
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where new movements belong.
+
+    Attributes
+    ----------
+    labels : ndarray of n labels or None
+        The symbol that each movement joins; None is unknown.
+    p_values : ndarray of shape (n,)
+        The largest conformal p-value of each movement for any symbol.
+    proposals : Proposals
+        Kinds among the unknown; members are places among the new movements, and so are the `clusters`, -1 for
+        movements that joined a symbol or stay unknown.
+    """
+
+    labels: NDArray[np.object_]
+    p_values: Array
+    proposals: Proposals
+
+    @property
+    def unknown(self) -> NDArray[np.intp]:
+        """Places of the movements that neither join a symbol nor raise a proposal."""
+        nowhere = np.array([label is None for label in self.labels], dtype=bool)
+        return np.flatnonzero(nowhere & (self.proposals.clusters < 0))
+
+    def __repr__(self) -> str:
+        n_joined = sum(label is not None for label in self.labels)
+        return (
+            f"Placement({n_joined} of {len(self.labels)} join a symbol, {len(self.proposals)} new kinds proposed, "
+            f"{len(self.unknown)} unknown)"
+        )
+
+
+def place(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Placement:
+    """Let movements join the symbols that they are recognized as, and gather the unknown into new kinds.
+
+    Parameters
+    ----------
+    movements : movements as `Demonstrations.of` accepts them
+    symbols : fitted Recognizer, or labeled Demonstrations
+        What is known. Widths and the scale of likeness are its own.
+    error_rate : float, default 0.05
+        Share of a symbol's true movements that may stay out of it, see `Recognizer.recognize`.
+    min_members : int, default 3
+        Unknown movements that must agree to be proposed. They agree when on average they are more alike than half way
+        from the members of one symbol, which are 1, to those of the nearest other, 0.
+
+    Returns
+    -------
+    Placement
+    """
+    check_count("min_members", min_members, 2)
+    known = symbols if isinstance(symbols, Recognizer) else Recognizer().fit(symbols)
+    demos = Demonstrations.of(movements)
+    p = known.p_values(demos, error_rate)
+    labels = known_labels(known.classes_, known.decision_function(demos), p, error_rate)
+    unknown = np.flatnonzero([label is None for label in labels])
+    proposals = _among_unknown(known, demos, unknown, min_members)
+    return Placement(labels, p.max(axis=1), proposals)
+
+
+def _among_unknown(known: Recognizer, demos: Demonstrations, unknown: NDArray[np.intp], min_members: int) -> Proposals:
+    clusters = np.full(len(demos), -1, dtype=np.intp)
+    K = np.eye(len(unknown))
+    if len(unknown) < min_members:
+        return _at(unknown, describe_clusters(K, clusters[: len(unknown)], np.empty(0), known.widths_), len(demos))
+    seen = Seen(known.procrustes_, known.look_at(demos[unknown]), known.mean)
+    K = compare(known.similarity_, seen, seen)
+    np.fill_diagonal(K, 1.0)
+    order, height = own_order(K), 1.0 - agreement(known)
+
+    def cut(distances: Array) -> Clusters:
+        return cut_at(average_linkage(distances), height)
+
+    distances = 1.0 - 0.5 * (K + K.T)[np.ix_(order, order)]
+    found = without_small(cut(distances), min_members)
+    ordered = np.empty(len(unknown), dtype=np.intp)
+    ordered[order] = found
+    proposals = describe_clusters(K, ordered, stabilities(distances, found, cut, _REPEATS), known.widths_)
+    return _at(unknown, proposals, len(demos))
+
+
+def agreement(known: Recognizer) -> float:
+    """Mean similarity from which on movements are of one kind, as the symbols of a recognizer have it.
+
+    Half way from the typical mean similarity within a symbol to that with the nearest other symbol; where each symbol
+    was shown once, that at 0.6 of the distance to the nearest other, as the recognizer's calibration takes.
+    """
+    stored = Seen(known.procrustes_, known.views_, known.mean)
+    some = np.unique(np.linspace(0, len(stored) - 1, 500).astype(int))
+    K = compare(known.similarity_, stored.take(some), stored.take(some))
+    own, member = known.labels_[some], np.unique(known.labels_[some], return_inverse=True)[1]
+    np.fill_diagonal(K, 0.0)
+    H = (member[:, None] == np.arange(member.max() + 1)).astype(float)
+    sums, counts = H.T @ K @ H, H.sum(axis=0)
+    means = sums / np.maximum(np.outer(counts, counts) - np.diag(counts), 1.0)
+    others = np.where(np.eye(len(counts), dtype=bool), -1.0, means).max(axis=1)
+    apart = float(np.median(others)) if len(counts) > 1 else 0.0
+    several = counts > 1
+    if several.any():
+        return 0.5 * (float(np.median(np.diag(means)[several])) + apart)
+    nearest = np.where(own[:, None] == own, 0.0, K).max(axis=1)
+    reach = _REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
+    return float(np.exp(-0.5 * np.median(reach) ** 2))
+
+
+def _at(places: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
+    """The same proposals, of movements at these places among n."""
+    clusters = np.full(n, -1, dtype=np.intp)
+    clusters[places] = proposals.clusters
+    moved = (replace(one, members=places[one.members], medoid=int(places[one.medoid])) for one in proposals.proposals)
+    return Proposals(tuple(moved), clusters, proposals.widths)
