@@ -1,0 +1,218 @@
+"""``kineme library``: look into an action library, and keep it in order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.output import count, printable, say
+
+
+@click.group()
+def library() -> None:
+    """Look into an action library, and keep it in order."""
+
+
+def _open(folder: Path, *, read_only: bool = True) -> Any:
+    from kineme.library.library import ActionLibrary
+
+    return ActionLibrary(folder, read_only=read_only)
+
+
+@library.command("list")
+@library_option
+@click.option("--at", "version", type=click.IntRange(0), help="As it was at this version.")
+@json_option
+def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
+    """List the symbols of a library."""
+    with _open(folder) as opened:
+        shown = opened if version is None else opened.at(version)
+        symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
+        data = {
+            "movements": len(shown),
+            "unlabeled": unlabeled,
+            "dimensions": shown.n_dims,
+            "version": shown.version,
+            "symbols": [_brief(symbol) for symbol in symbols],
+        }
+
+    def text() -> str:
+        from kineme.table import Table, to_text
+
+        rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
+        title = (
+            f"{count(data['movements'], 'movement')}, {count(len(symbols), 'symbol')}, {unlabeled} without a symbol; "
+            f"version {data['version']}"
+        )
+        return to_text(Table(title, ("symbol", "movements", "id", "description"), rows)) if rows else title
+
+    say(as_json, data, text)
+
+
+@library.command()
+@click.argument("symbol", type=SymbolName())
+@library_option
+@json_option
+def show(symbol: str, folder: Path, as_json: bool) -> None:
+    """Show one symbol: its movements, where they come from, and how they vary."""
+    from kineme.library.sheet import sheet
+
+    with _open(folder) as opened:
+        data = sheet(opened, symbol)
+    say(as_json, data, lambda: _sheet_text(data))
+
+
+@library.command()
+@click.argument("symbol", type=SymbolName())
+@click.argument("name")
+@library_option
+@json_option
+def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
+    """Give a symbol another NAME; its id stays."""
+    with _open(folder, read_only=False) as opened:
+        opened.rename(symbol, name)
+        data = {**_brief(opened[name]), "was": symbol, "version": opened.version}
+    say(as_json, data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})")
+
+
+@library.command()
+@click.argument("symbol", type=SymbolName())
+@click.argument("text")
+@library_option
+@json_option
+def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
+    """Write down what a symbol means."""
+    with _open(folder, read_only=False) as opened:
+        opened.describe(symbol, text)
+        data = {**_brief(opened[symbol]), "version": opened.version}
+    say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
+
+
+@library.command()
+@click.argument("symbols", type=SymbolName(), nargs=-1, required=True)
+@click.option("--into", required=True, help="Name of the symbol that holds them all afterwards.")
+@library_option
+@json_option
+def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
+    """Make one symbol of several."""
+    with _open(folder, read_only=False) as opened:
+        opened.merge(symbols, into)
+        data = {**_brief(opened[into]), "version": opened.version}
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+
+
+@library.command()
+@click.argument("symbol", type=SymbolName(), required=False)
+@click.option("--movement", "movements", type=int, multiple=True, help="Delete this movement; may be repeated.")
+@click.option("--yes", "-y", is_flag=True, help="Do not ask.")
+@library_option
+@json_option
+def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Path, as_json: bool) -> None:
+    """Delete a symbol, whose movements stay as unlabeled ones, or single movements.
+
+    Nothing is lost: earlier versions still show them, see kineme library history.
+    """
+    if (symbol is None) == (not movements):
+        raise click.UsageError("expected a SYMBOL, or --movement ID, and not both")
+    what = printable(symbol) if symbol is not None else count(len(movements), "movement")
+    if not yes:
+        click.confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
+    with _open(folder, read_only=False) as opened:
+        opened.delete(symbol if symbol is not None else list(movements))
+        data = {"deleted": symbol if symbol is not None else list(movements), "version": opened.version}
+    say(as_json, data, lambda: f"deleted {what}; version {data['version']}")
+
+
+@library.command()
+@library_option
+@click.option("--limit", "-n", type=click.IntRange(1), default=20, show_default=True, help="Only the last ones.")
+@json_option
+def history(folder: Path, limit: int, as_json: bool) -> None:
+    """List what changed, when."""
+    with _open(folder) as opened:
+        versions = opened.history()
+    data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
+
+    def text() -> str:
+        from kineme.table import Table, to_text
+
+        rows = [
+            (str(one.id), one.at, one.action, printable(", ".join(f"{k} {v}" for k, v in one.detail.items())))
+            for one in versions[-limit:]
+        ]
+        return to_text(Table(count(len(versions), "version"), ("version", "at", "action", "what"), rows))
+
+    say(as_json, data, text)
+
+
+@library.command()
+@library_option
+@json_option
+@click.pass_context
+def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
+    """Check every byte of a library; the exit status is 1 if something is wrong."""
+    with _open(folder) as opened:
+        problems = [str(problem) for problem in opened.verify()]
+        n = len(opened)
+    data = {"ok": not problems, "movements": n, "problems": problems}
+    say(as_json, data, lambda: "\n".join(problems) if problems else f"{count(n, 'movement')}, nothing wrong")
+    ctx.exit(1 if problems else 0)
+
+
+@library.command()
+@click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
+@library_option
+@json_option
+def export(path: Path, folder: Path, as_json: bool) -> None:
+    """Write a whole library to one file, to keep or to give away."""
+    with _open(folder) as opened:
+        opened.export(path)
+        data: dict[str, Any] = {"path": str(path), "movements": len(opened), "bytes": path.stat().st_size}
+    say(as_json, data, lambda: f"wrote {printable(path)}: {count(data['movements'], 'movement')}")
+
+
+@library.command("import")
+@click.argument("path", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@library_option
+@json_option
+def import_(path: Path, folder: Path, as_json: bool) -> None:
+    """Make a library of an exported file."""
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary.import_(path, folder) as opened:
+        data: dict[str, Any] = {"library": str(folder), "movements": len(opened), "symbols": len(opened.symbols())}
+    say(as_json, data, lambda: f"{printable(folder)}: {count(data['movements'], 'movement')}")
+
+
+def _brief(symbol: Any) -> dict[str, Any]:
+    return {
+        "name": symbol.name,
+        "id": symbol.id,
+        "description": symbol.description,
+        "movements": len(symbol),
+        "prototype": symbol.prototype,
+        "parents": list(symbol.parents),
+    }
+
+
+def _sheet_text(data: dict[str, Any]) -> str:
+    from kineme.table import Table, to_text
+
+    rows = [
+        (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""), f"{one['duration']:.3g}",
+         _place(one["start"], one), _place(one["goal"], one))
+        for one in data["members"]
+    ]  # fmt: skip
+    head = f"{printable(data['name'])}  {data['id']}"
+    if data["description"]:
+        head += f"\n{printable(data['description'])}"
+    return to_text(Table(head, ("movement", "name", "file", "duration [s]", "start", "goal"), rows))
+
+
+def _place(point: list[float], member: dict[str, Any]) -> str:
+    """A point in words; what single precision leaves of a zero is zero."""
+    least = 1e-6 * max(map(abs, [*member["start"], *member["goal"]]))
+    return ", ".join(f"{x if abs(x) > least else 0:.4g}" for x in point)

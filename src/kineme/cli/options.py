@@ -1,0 +1,53 @@
+"""Options that several commands share: which library, and the form of the output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg]
+    """Numbers separated by commas: one per dimension."""
+
+    name = "x,y,..."
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
+        """Text as numbers."""
+        try:
+            return [float(part) for part in value.split(",")]
+        except ValueError:
+            self.fail(f"expected numbers separated by commas, as 0.4,0.2, got {value!r}", param, ctx)
+
+
+class SymbolName(click.ParamType):  # type: ignore[type-arg]
+    """Name or id of a symbol; the shell completes it from the library named on the same line."""
+
+    name = "symbol"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Names that begin as typed; none without a library, never an error."""
+        from kineme.errors import KinemeError
+
+        folder = ctx.params.get("folder") or ctx.lookup_default("folder")
+        try:
+            names = _names(Path(folder)) if folder else []
+        except (KinemeError, OSError):
+            names = []
+        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+
+
+def _names(folder: Path) -> list[str]:
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary(folder, read_only=True) as library:
+        return [symbol.name for symbol in library.symbols()]
+
+
+library_option = click.option(
+    "--library", "-l", "folder", required=True, envvar="KINEME_LIBRARY", is_eager=True, show_envvar=True,
+    type=click.Path(file_okay=False, path_type=Path), help="Folder of the action library.",
+)  # fmt: skip
+json_option = click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")

@@ -1,0 +1,50 @@
+"""Learning from files: every movement keeps the file that it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from kineme.io.join_files import Recordings
+from kineme.library.learn import LearnReport, Progress
+from kineme.library.source import Source
+
+if TYPE_CHECKING:
+    from kineme.library.library import ActionLibrary
+
+
+def learn_recordings(
+    library: ActionLibrary,
+    recordings: Recordings,
+    options: Mapping[str, Any] | None = None,
+    label: str | None = None,
+    progress: Progress | None = None,
+) -> LearnReport:
+    """Store what `kineme.io.recordings.read_recordings` has read.
+
+    Parameters
+    ----------
+    library : ActionLibrary
+    recordings : Recordings
+    options : mapping, optional
+        What the reader was told. The same file read in another way is another source.
+    label : str, optional
+        Name of the symbol of all of them; by default each movement's own label.
+    progress : callable, optional
+        As for `ActionLibrary.learn`.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    told = {name: value for name, value in (options or {}).items() if value is not None}
+    files = {
+        one.path: Source(one.path, one.sha256, one.size, PurePosixPath(one.path).suffix.lower().lstrip("."), told, now)
+        for one in recordings.sources
+    }
+    return library.learn(
+        recordings.demonstrations,
+        [label] * len(recordings) if label is not None else list(recordings.labels),
+        [files[one.path] for one in recordings.sources],
+        places=[one.place for one in recordings.sources],
+        progress=progress,
+    )
