@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 from kineme import Demonstrations, Resample, Smooth, preprocess
 from kineme.trajectories.resample import relative_rows
+from kineme.trajectories.smooth import smooth_rows
 from kineme.trajectories.spline import spline_matrix, spline_rows
 
 CHOICES = ("always", "never")
@@ -66,6 +67,25 @@ def test_smoothing_splines_are_those_of_scipy(compiled, seed, origin, place):
         u = (t - t[0]) / (t[-1] - t[0])
         spline = make_smoothing_spline(u, x - x[0], lam=(len(t) - 1) / (2 * np.pi * 6.0) ** 4)
         np.testing.assert_allclose(one.positions - x[0], spline(u), atol=1e-7)
+
+
+@any_ragged
+def test_smoothing_splines_between_the_samples_are_those_of_scipy(compiled, seed, origin, place):
+    movements = _ragged(seed, least=5, n=40, origin=origin, place=place)
+    rows = smooth_rows(_demonstrations(movements), 3, 40, 6.0, 33)
+    for (t, x), row in zip(movements[3:], rows, strict=True):
+        u = (t - t[0]) / (t[-1] - t[0])
+        spline = make_smoothing_spline(u, x - x[0], lam=(len(t) - 1) / (2 * np.pi * 6.0) ** 4)
+        np.testing.assert_allclose(row, spline(np.linspace(0, 1, 33)).T, atol=1e-6)
+
+
+def test_movements_too_long_to_be_worked_on_side_by_side_are_the_same(compiled, monkeypatch):
+    demos = _demonstrations(_ragged(0, least=5))
+    before = relative_rows(demos, 0, 6, 33), smooth_rows(demos, 0, 6, 8.0, 33), Smooth(8.0).apply(demos).positions
+    monkeypatch.setattr("kineme.trajectories.spline._LONGEST", 20)
+    after = relative_rows(demos, 0, 6, 33), smooth_rows(demos, 0, 6, 8.0, 33), Smooth(8.0).apply(demos).positions
+    for one, other in zip(before, after, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), nearness=st.sampled_from([1e-5, 1e-7]))

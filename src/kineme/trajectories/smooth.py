@@ -12,11 +12,13 @@ from kineme.errors import TrajectoryError
 from kineme.parallel import for_tiles
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.smoothing_spline import even_rows_of_spline, smoothing_spline
+from kineme.trajectories.spline import fits_lanes
 from kineme.validation import Array, check_number, describe
 
-_OPERATIONS_PER_SAMPLE = 300  # elementary operations that SciPy's smoothing spline costs per sample and dimension
-_MIN_SAMPLES = 5
+_OPERATIONS_PER_SAMPLE = 30  # elementary operations that the banded solution costs per sample and dimension
 _TILE_MOVEMENTS = 256
+MIN_SMOOTHED = 5  # samples
 
 
 @dataclass(frozen=True)
@@ -51,35 +53,63 @@ class Smooth:
         TrajectoryError
             A movement of fewer than five samples.
         """
-        lengths, offsets, n_dims = demonstrations.lengths, demonstrations.offsets, demonstrations.n_dims
-        if lengths.min() < _MIN_SAMPLES:
+        lengths = demonstrations.lengths
+        if lengths.min() < MIN_SMOOTHED:
             i = int(lengths.argmin())
             raise TrajectoryError(
                 f"{describe(i, demonstrations.names)}: expected at least "
-                f"{_MIN_SAMPLES} samples to smooth, got {lengths[i]}; leave Smooth out or record faster"
+                f"{MIN_SMOOTHED} samples to smooth, got {lengths[i]}; leave Smooth out or record faster"
             )
-        starts = np.repeat(demonstrations.times[offsets[:-1]], lengths)
-        u = (demonstrations.times - starts) / np.repeat(demonstrations.durations, lengths)
-        penalties = (lengths - 1) / (2 * np.pi * self.cutoff) ** 4
         smoothed = np.empty_like(demonstrations.positions)
-        if use_compiled(_OPERATIONS_PER_SAMPLE * len(u) * n_dims):
-            from kineme.trajectories._compiled import fill_smoothed
 
-            def smooth_tile(start: int, stop: int) -> None:
-                tile = offsets[start : stop + 1]
-                fill_smoothed(u, demonstrations.positions, tile, penalties[start:stop], smoothed)
+        def smooth_tile(start: int, stop: int) -> None:
+            _fill_smoothed(demonstrations, start, stop, self.cutoff, smoothed)
 
-            for_tiles(smooth_tile, len(lengths), _TILE_MOVEMENTS)
-        else:
-            _fill_smoothed(u, demonstrations.positions, offsets, penalties, smoothed)
+        for_tiles(smooth_tile, len(lengths), _TILE_MOVEMENTS)
         return replace(demonstrations.movements, positions=smoothed)
 
 
-def _fill_smoothed(u: Array, x: Array, offsets: NDArray[np.intp], penalties: Array, smoothed: Array) -> None:
-    """The plain twin of the compiled loop: SciPy's smoothing spline, movement by movement."""
-    from scipy.interpolate import make_smoothing_spline
+def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, n_points: int) -> Array:
+    """Smoothing splines of movements start:stop, see `Smooth`, at `n_points` even times: (stop - start, d, n_points).
 
-    for i, penalty in enumerate(penalties):
-        rows = slice(offsets[i], offsets[i + 1])
-        start = x[offsets[i]]
-        smoothed[rows] = make_smoothing_spline(u[rows], x[rows] - start, lam=penalty)(u[rows]) + start
+    The splines themselves are evaluated, with their own second derivatives; `Smooth` and then `Resample` would fit
+    second ones through their values. Minus the first recorded position, so that a large offset costs no digits.
+    """
+    offsets, scales = _tile(demonstrations, start, stop, cutoff)
+    times, positions = demonstrations.times, demonstrations.positions
+    if not _compiled(demonstrations):
+        first, lengths = offsets[0], np.diff(offsets)
+        smoothed, m = smoothing_spline(times, positions, offsets, scales)
+        elapsed = times[first : offsets[-1]] - np.repeat(times[offsets[:-1]], lengths)
+        return even_rows_of_spline(elapsed * np.repeat(scales, lengths), smoothed, m, offsets - first, n_points)
+    from kineme.trajectories._splines import fill_smooth_rows
+
+    rows = np.empty((stop - start, demonstrations.n_dims, n_points))
+    fill_smooth_rows(times, positions, offsets, scales, rows)
+    return rows
+
+
+def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, smoothed: Array) -> None:
+    """Smooth movements start:stop at their own stamps."""
+    offsets, scales = _tile(demonstrations, start, stop, cutoff)
+    times, positions = demonstrations.times, demonstrations.positions
+    if _compiled(demonstrations):
+        from kineme.trajectories._splines import fill_smoothed
+
+        fill_smoothed(times, positions, offsets, scales, smoothed)
+        return
+    starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
+    smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
+
+
+def _compiled(demonstrations: Demonstrations) -> bool:
+    """Decided for all movements, though they come tile by tile."""
+    work = _OPERATIONS_PER_SAMPLE * demonstrations.positions.size
+    return fits_lanes(demonstrations.offsets) and use_compiled(work)
+
+
+def _tile(demonstrations: Demonstrations, start: int, stop: int, cutoff: float) -> tuple[NDArray[np.intp], Array]:
+    """Offsets of movements start:stop, and what to multiply their times with so that the penalty is 1."""
+    offsets = demonstrations.offsets[start : stop + 1]
+    penalties = (np.diff(offsets) - 1) / (2.0 * np.pi * cutoff) ** 4
+    return offsets, 1.0 / (np.cbrt(penalties) * demonstrations.durations[start:stop])

@@ -15,6 +15,7 @@ from kineme.compiled import use_compiled
 from kineme.validation import Array
 
 _OPERATIONS_PER_SAMPLE = 100  # elementary operations that SciPy's spline costs per sample and dimension
+_LONGEST = 20_000  # samples; compiled, each takes two kilobytes while it is worked on
 
 
 @lru_cache(maxsize=64)
@@ -59,13 +60,19 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))
-    if use_compiled(_OPERATIONS_PER_SAMPLE * positions.size):  # the whole block, though callers come tile by tile
-        from kineme.trajectories._compiled import fill_spline_rows
+    work = _OPERATIONS_PER_SAMPLE * positions.size  # of the whole block, though callers come tile by tile
+    if fits_lanes(offsets) and use_compiled(work):
+        from kineme.trajectories._splines import fill_spline_rows
 
         fill_spline_rows(parameter, positions, offsets, rows)
     else:
         _fill_spline_rows(parameter, positions, offsets, rows)
     return rows
+
+
+def fits_lanes(offsets: NDArray[np.intp]) -> bool:
+    """Whether no movement is so long that the compiled splines, made for many short ones, would waste memory."""
+    return bool(np.diff(offsets).max() <= _LONGEST)
 
 
 def _fill_spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], rows: Array) -> None:
