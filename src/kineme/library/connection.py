@@ -46,7 +46,10 @@ def connect(path: Path, mode: str, wait: float) -> sqlite3.Connection:
 
 def _cannot_keep_a_log(path: Path) -> bool:
     """Whether the folder is read-only and holds no log: then no writer can be there, and no lock is needed."""
-    return not os.access(path.parent, os.W_OK) and not path.with_name(path.name + "-wal").exists()
+    return (
+        not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+        and not path.with_name(path.name + "-wal").exists()
+    )
 
 
 def create(path: Path, meta: dict[str, str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, listed, select
+from kineme.library.rows import ALIVE, Row, among, damaged, listed, select
 from kineme.library.schema import COLUMNS
 from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
@@ -139,11 +139,11 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitiv
 
 def names_of(store: Store, ids: Ids) -> list[str | None]:
     """The name of each movement's symbol; None where it shows none."""
-    query = f"""SELECT movement, name FROM member AS m JOIN symbol_state AS s ON s.symbol = m.symbol
-        WHERE {among("m.movement")} AND m.added <= :v AND (m.removed IS NULL OR m.removed > :v)
-        AND s.added <= :v AND (s.removed IS NULL OR s.removed > :v)"""
+    keys = {"keys": listed(ids), "v": store.as_of}
     with store.reading() as connection:
-        found: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(ids)}))
+        names = {state[1]: state[2] for state in select(connection, "symbol_state", ALIVE, {"v": store.as_of})}
+        members = select(connection, "member", f"{among('movement')} AND {ALIVE}", keys)
+    found = {row[1]: names[row[2]] for row in members}
     return [found.get(key) for key in ids.tolist()]
 
 
@@ -152,7 +152,11 @@ def _chunks(store: Store, table: str, column: str, ids: Ids) -> Iterator[list[Ro
     wanted = np.unique(ids)
     for k in range(0, len(wanted), _ROWS):
         with store.reading() as connection:
-            yield select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
+            rows = select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
+        if len(rows) != len(wanted[k : k + _ROWS]):
+            lost = set(wanted[k : k + _ROWS].tolist()) - {row[0] for row in rows}
+            raise damaged(table, (min(lost),))
+        yield rows
 
 
 def _places(ids: Ids) -> dict[int, list[int]]:

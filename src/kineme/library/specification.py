@@ -38,7 +38,8 @@ class Specification:
     @classmethod
     def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
         """From a recognizer, fitted or not, and a DMP; None for the defaults."""
-        chosen: dict[str, Any] = {} if recognizer is None else recognizer.get_params()
+        names = {one.name for one in fields(cls)} - {"dmp"}
+        chosen: dict[str, Any] = {} if recognizer is None else {name: getattr(recognizer, name) for name in names}
         chosen["representations"] = tuple(chosen.get("representations") or DEFAULT_REPRESENTATIONS)
         return cls(**chosen, dmp=dmp or DEFAULT_DMP)
 

@@ -168,6 +168,10 @@ class Store:
                 "written: put it back, or open the library again"
             )
 
+    def __del__(self) -> None:
+        if hasattr(self, "_reader"):
+            self.close()
+
     def close(self) -> None:
         """Close both connections; the last one to close leaves a single file."""
         with self._turn:

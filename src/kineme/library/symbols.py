@@ -119,9 +119,8 @@ def _with_members(connection: sqlite3.Connection, version: int, states: Sequence
 
 
 def _members(connection: sqlite3.Connection, keys: list[int], version: int) -> dict[int, NDArray[np.int64]]:
-    query = f"SELECT symbol, movement FROM member WHERE {among('symbol')} AND {ALIVE}"
-    rows = connection.execute(query, {"keys": listed(keys), "v": version}).fetchall()
-    table = np.array(rows, dtype=np.int64).reshape(-1, 2)
+    rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": version})
+    table = np.array([(row[2], row[1]) for row in rows], dtype=np.int64).reshape(-1, 2)
     table = table[np.lexsort((table[:, 1], table[:, 0]))]
     table.setflags(write=False)
     first = np.searchsorted(table[:, 0], keys)
@@ -130,7 +129,10 @@ def _members(connection: sqlite3.Connection, keys: list[int], version: int) -> d
 
 
 def check_name(name: Any) -> str:
-    """Any text that can be written in Unicode is a name: separators, quotes and commands are letters like others."""
+    """Any text that can be written in Unicode is a name: separators, quotes and commands are letters like others.
+
+    The one exception is U+0000, which NumPy, C and shells cannot tell from the end of a text.
+    """
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
     try:
@@ -139,6 +141,8 @@ def check_name(name: Any) -> str:
         raise SpecificationError(
             f"expected a name in Unicode, got {name!r}, which holds half of a character; decode it again"
         ) from error
+    if "\0" in name:
+        raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
     return name
 
 

@@ -1,0 +1,251 @@
+"""Symbols change, ids stay, and every version can be seen again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from library_samples import contents, draw_movements
+
+import kineme
+from kineme import ActionLibrary, SpecificationError
+
+N = 12
+NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é", "\n\t", "$(reboot)", "%s", "名"]
+
+
+@pytest.fixture
+def library(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as made:
+        made.learn(draw_movements(N, labels=["wave", "nod", "bow"] * 4))
+        yield made
+
+
+class Model:
+    """What a library should say, kept in two dictionaries."""
+
+    def __init__(self):
+        self.names = {}  # key -> name
+        self.shows = dict.fromkeys(range(1, N + 1))  # movement -> key
+
+    def key(self, name):
+        return next((key for key, known in self.names.items() if known == name), None)
+
+    def apply(self, action, a, b, ids):
+        """Change the model as the library should; True if that is possible."""
+        source, target = self.key(a), self.key(b)
+        ids = [i for i in ids if i in self.shows]
+        if action == "assign" and ids:
+            self._show(ids, target if target is not None else self._make(b))
+        elif action == "release" and ids:
+            self._show(ids, None)
+        elif action == "delete movements" and ids:
+            for i in ids:
+                del self.shows[i]
+        elif action == "delete" and source is not None:
+            self._show(self.members(source), None)
+            del self.names[source]
+        elif action == "rename" and source is not None and target is None:
+            self.names[source] = b
+        elif action == "merge" and source is not None and source != target:
+            target = self._make(b) if target is None else target
+            self._show(self.members(source), target)
+            del self.names[source]
+        elif action == "split" and source is not None and target is None and ids and {*ids} <= {*self.members(source)}:
+            self._show(ids, self._make(b))
+        else:
+            return False
+        return True
+
+    def members(self, key):
+        return [i for i, shown in self.shows.items() if shown == key]
+
+    def said(self):
+        return sorted((name, self.members(key)) for key, name in self.names.items()), sorted(self.shows)
+
+    def _make(self, name):
+        key = object()
+        self.names[key] = name
+        return key
+
+    def _show(self, ids, key):
+        for i in ids:
+            self.shows[i] = key
+
+
+def _do(library, action, a, b, ids):
+    present = [i for i in ids if i in library.ids()]
+    {
+        "assign": lambda: library.assign(present, b),
+        "release": lambda: library.release(present),
+        "delete movements": lambda: library.delete(present),
+        "delete": lambda: library.delete(a),
+        "rename": lambda: library.rename(a, b),
+        "merge": lambda: library.merge([a], b),
+        "split": lambda: library.split(a, present, b),
+    }[action]()
+
+
+def _said(library):
+    return [(one.name, one.members.tolist()) for one in library.symbols()], library.ids().tolist()
+
+
+ACTIONS = ["assign", "release", "delete movements", "delete", "rename", "merge", "split"]
+STEP = st.tuples(
+    st.sampled_from(ACTIONS),
+    st.sampled_from(NAMES[:4]),
+    st.sampled_from(NAMES[:4]),
+    st.lists(st.integers(1, N), max_size=4, unique=True),
+)
+
+
+@settings(max_examples=10)
+@given(steps=st.lists(STEP, min_size=6, max_size=12))
+def test_a_library_says_what_a_simple_model_says_at_every_version(tmp_path_factory, steps):
+    folder, model, seen = tmp_path_factory.mktemp("actions"), Model(), []
+    with ActionLibrary(folder, create=True) as library:
+        library.learn(draw_movements(N, n_samples=8))
+        seen.append(model.said())
+        for step in [("assign", "", NAMES[0], [1, 2, 3, 4]), ("assign", "", NAMES[1], [5, 6]), *steps]:
+            before, said = library.version, model.said()
+            possible = model.apply(*step)
+            if possible:
+                _do(library, *step)
+                assert library.version == before + 1
+                seen.append(model.said())
+            else:
+                assert model.said() == said
+                with pytest.raises(kineme.KinemeError):
+                    _do(library, *step)
+                assert library.version == before
+            assert _said(library) == model.said()
+        for version, said in enumerate(seen, 1):
+            with library.at(version) as past:
+                assert _said(past) == said
+        assert library.verify() == []
+        assert len(library.history()) == library.version
+
+
+def test_the_id_of_a_symbol_stays_when_its_name_changes(library):
+    before = library["wave"]
+    library.rename("wave", "greeting")
+    after = library[before.id]
+    assert (after.name, after.id, after.members.tolist()) == ("greeting", before.id, before.members.tolist())
+    assert "greeting" in library
+    assert "wave" not in library
+    assert (after.created, after.changed) == (1, 2)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_text_is_a_name_and_only_a_name(library, name):
+    library.rename("bow", name + "!")
+    library.delete("wave")
+    library.delete("nod")
+    library.rename(name + "!", name)
+    library.assign([2], name + name)
+    library.describe(name, name)
+    assert library[name].description == name
+    assert library[name + name].members.tolist() == [2]
+    assert library.movements(name).labels.tolist() == [name] * 4
+    assert [one.name for one in library.symbols() if one.id == library[name].id] == [name]
+    assert library.verify() == []
+    assert sorted(path.name for path in library.folder.iterdir())[0] == "library.sqlite"
+
+
+TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), min_size=1)
+
+
+@given(names=st.lists(TEXT, min_size=30, max_size=30))
+def test_names_come_back_as_they_were_given(tmp_path_factory, names):
+    with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
+        library.learn(draw_movements(30, n_samples=8), labels=names)
+        assert {symbol.name for symbol in library.symbols()} == set(names)
+        assert [library.movements(ids=[i + 1])[0].label for i in range(30)] == names
+
+
+def test_merging_and_splitting_record_where_symbols_come_from(library):
+    wave, nod, bow = (library[name].id for name in ("wave", "nod", "bow"))
+    library.merge(["wave", "nod"], "head or hand")
+    merged = library["head or hand"]
+    assert set(merged.parents) == {wave, nod}
+    assert len(merged) == 8
+    library.split("head or hand", merged.members[:3], "hand")
+    assert library["hand"].parents == (merged.id,)
+    library.merge(["bow", "hand"], "bow")
+    assert library["bow"].id == bow
+    assert len(library["bow"]) == 7
+
+
+def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
+    first = int(library["wave"].members[0])
+    library.describe("wave", "with the hand", prototype=first, threshold=0.5)
+    assert (library["wave"].prototype, library["wave"].threshold) == (first, 0.5)
+    library.split("wave", [first], "other")
+    assert (library["wave"].prototype, library["wave"].description) == (None, "with the hand")
+    library.describe("other", prototype=first)
+    library.delete([first])
+    assert library["other"].prototype is None
+    assert library.verify() == []
+
+
+def test_how_a_movement_came_to_its_symbol_is_kept_when_symbols_merge(library):
+    library.assign([1], "nod", how="recognized")
+    library.merge(["nod"], "bow")
+    with library.store.reading() as connection:
+        rows = connection.execute("SELECT movement, how FROM member WHERE removed IS NULL").fetchall()
+    assert dict(rows) == dict.fromkeys(range(1, N + 1), "label") | {1: "recognized"}
+
+
+def test_a_deleted_movement_can_be_learned_again_and_the_past_still_shows_it(library):
+    before = contents(library)
+    version = library.version
+    library.delete(library["bow"].members)
+    assert len(library) == N - 4
+    report = library.learn(draw_movements(N))
+    assert report.added == 4
+    assert library.unlabeled().tolist() == report.ids[2::3].tolist()
+    with library.at(version) as past:
+        assert contents(past) == before
+
+
+def test_history_says_what_was_done(library):
+    library.rename("wave", "w")
+    library.delete([1, 2])
+    (_, renamed, deleted) = library.history()
+    assert (renamed.id, renamed.action, renamed.detail) == (2, "rename", {"old": "wave", "new": "w"})
+    assert (deleted.action, deleted.detail) == ("delete", {"movements": 2, "first": 1})
+    assert renamed.at <= deleted.at
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda it: it["wafe"], r"expected the name or id of a symbol, got 'wafe'; there are 3, such as 'wave'"),
+        (lambda it: it["\ud800"], r"expected the name or id of a symbol, got '\\ud800'"),
+        (lambda it: it.rename("wave", "nod"), r"expected a name that no symbol has, got 'nod'; merge the two"),
+        (lambda it: it.rename("wave", ""), r"expected a name of at least one character, got ''"),
+        (lambda it: it.rename("wave", "a\0"), r"expected a name without the character U\+0000, got 'a\\x00'"),
+        (lambda it: it.rename("wave", 5), r"expected a name of at least one character, got 5"),
+        (lambda it: it.split("wave", [1, 2], "x"), r"expected movements of 'wave', got 2, which is not one of them"),
+        (lambda it: it.split("wave", [1], "nod"), r"expected a name that no symbol has, got 'nod'"),
+        (lambda it: it.merge("wave", "x"), r"expected a list of symbols to merge, got 'wave'"),
+        (lambda it: it.merge(["wave"], "wave"), r"expected symbols other than 'wave' to merge into it, got \['wave'\]"),
+        (lambda it: it.assign([1], "x", how="guess"), r"expected how to be one of \['label', .*\], got 'guess'"),
+        (
+            lambda it: it.assign([1, 99], "x"),
+            r"movements in the library, got 99, which is not there \(1 of 2 are not\)",
+        ),
+        (lambda it: it.delete([]), r"expected ids of movements, whole numbers, at least one, got \[\]"),
+        (lambda it: it.delete([1.5]), r"expected ids of movements, whole numbers, at least one, got \[1.5\]"),
+        (lambda it: it.describe("wave", prototype=99), r"movements in the library, got 99"),
+        (lambda it: it.describe("wave", threshold=np.nan), r"expected threshold to be a number, got nan"),
+        (lambda it: it.describe("wave", 5), r"expected a description, got 5"),
+        (lambda it: it.at(2), r"expected a version from 0 to 1, got 2; see history\(\)"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_changes_nothing(library, change, message):
+    before = contents(library)
+    with pytest.raises(SpecificationError, match=message):
+        change(library)
+    assert contents(library) == before

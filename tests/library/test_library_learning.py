@@ -1,0 +1,244 @@
+"""What is learned comes back as it was, once."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from library_samples import draw_movements
+
+import kineme
+from kineme import ActionLibrary, Demonstrations, Trajectory, TrajectoryError
+from kineme.library import learn as learning
+from kineme.library.source import Source
+from kineme.recognition.views import view
+
+SINGLE = 2.0**-24  # relative error of a rounding to single precision
+
+
+@pytest.fixture
+def library(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as made:
+        yield made
+
+
+@given(seed=st.integers(0, 10**6), d=st.integers(1, 6), ragged=st.booleans())
+def test_recordings_come_back_in_single_precision_from_their_start(tmp_path_factory, seed, d, ragged):
+    demos = draw_movements(7, d, seed, ragged)
+    with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
+        ids = library.learn(demos).ids[[3, 1, 1, 6]]
+        back = library.movements(ids=ids)
+    for shown, one in zip(back, [demos[i] for i in (3, 1, 1, 6)], strict=True):
+        np.testing.assert_array_equal(shown.positions[0], one.positions[0])
+        from_start = one.positions - one.positions[0]
+        error = shown.positions - one.positions
+        assert (np.abs(error) <= SINGLE * np.abs(from_start) + 2 * np.spacing(np.abs(one.positions))).all()
+        assert shown.times[0] == one.times[0]
+        slack = SINGLE * one.duration + 2 * np.spacing(np.abs(one.times[-1]))
+        np.testing.assert_allclose(shown.times, one.times, rtol=0, atol=slack)
+        assert shown.name == one.name
+
+
+def test_even_times_are_computed_from_the_duration(library):
+    x = draw_movements(3).positions.reshape(3, -1, 2)
+    library.learn(Demonstrations.from_arrays(x, times=0.3 + np.linspace(0, 2.5, x.shape[1])))
+    np.testing.assert_allclose(library.movements()[1].times, 0.3 + np.linspace(0, 2.5, x.shape[1]), rtol=1e-14)
+
+
+def test_stamps_finer_than_single_precision_stay_apart(library):
+    """A day long, with two samples a tenth of a millisecond apart near its end."""
+    times = np.append(np.linspace(0, 86400.0, 50), 86400.0001)
+    library.learn([Trajectory(times, np.random.default_rng(0).normal(size=(51, 2)))])
+    np.testing.assert_array_equal(library.movements()[0].times, times)
+
+
+@pytest.mark.parametrize("ragged", [False, True])
+def test_features_are_what_a_recognizer_sees(library, ragged):
+    demos = draw_movements(20, ragged=ragged)
+    library.learn(demos)
+    how = library.specification
+    expected = np.concatenate(view(demos, how.representations, how.normalization, how.cutoff), axis=1)
+    assert library.features().dtype == np.float32
+    np.testing.assert_allclose(library.features(), expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(library.features([4, 2]), library.features()[[3, 1]])
+
+
+def test_primitives_are_what_the_dmp_learns_and_replay_the_movement(library):
+    demos = draw_movements(12, labels=["a", "b"] * 6)
+    library.learn(demos)
+    expected = library.specification.dmp.learn(demos)
+    back = library.primitives()
+    np.testing.assert_allclose(back.scaled_weights, expected.scaled_weights, rtol=2 * SINGLE)
+    for name in ("starts", "goals", "velocities", "durations", "extents"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(expected, name))
+    assert back.labels.tolist() == demos.labels.tolist()
+    assert library.primitives("b").names == demos.names[1::2]
+    paths = back.rollout(n_samples=40).positions
+    np.testing.assert_allclose(paths, demos.positions.reshape(12, 40, 2), atol=0.02 * np.ptp(demos.positions))
+
+
+def test_a_short_movement_does_not_change_how_others_are_seen(library):
+    """Four samples cannot be smoothed; the rest of the batch still is."""
+    noisy = [one.positions + np.random.default_rng(0).normal(0, 0.05, (40, 2)) for one in draw_movements(3)]
+    short = np.array([[0.0, 0], [1, 0], [1, 1], [0, 2]])
+    library.learn([*noisy, short])
+    how = library.specification
+    expected = np.concatenate(view(noisy, how.representations, how.normalization, how.cutoff), axis=1)
+    np.testing.assert_allclose(library.features()[:3], expected, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("ragged", [False, True])
+def test_learning_again_does_not_duplicate(library, ragged):
+    demos = draw_movements(9, ragged=ragged)
+    first = library.learn(demos)
+    again = library.learn(demos[::-1])
+    assert (again.added, again.known, len(library)) == (0, 9, 9)
+    assert again.ids.tolist() == first.ids[::-1].tolist()
+    assert library.version == first.version == again.version  # nothing happened
+
+
+def test_the_same_movement_twice_in_one_call_is_one_movement(library):
+    demos = draw_movements(3)
+    report = library.learn([demos[0], demos[1], demos[0]])
+    assert (report.added, report.known, report.ids.tolist()) == (2, 1, [1, 2, 1])
+
+
+def test_place_and_time_tell_movements_apart_but_not_their_origin_in_time(library):
+    one = draw_movements(1, ragged=True)[0]
+    shifted = Trajectory(one.times, one.positions + 1.0)
+    slower = Trajectory(2 * one.times, one.positions)
+    report = library.learn([one, shifted, slower])
+    assert report.added == 3
+    x = draw_movements(1)[0].positions
+    early, late = (Demonstrations.from_arrays([x], times=[t0 + np.arange(40) / 32]) for t0 in (0.0, 64.0))
+    assert library.learn(early).added == 1
+    assert library.learn(late).known == 1
+
+
+def test_a_movement_is_known_by_its_place_in_a_file_read_in_the_same_way(library, tmp_path):
+    path = tmp_path / "wave.csv"
+    path.write_text("0,1\n")
+    source = Source.of_file(path, options={"unit": "m"})
+    demos = draw_movements(4)
+    library.learn(demos, source=source)
+    moved = Source.of_file(path.rename(tmp_path / "other.csv"), options={"unit": "m"})
+    rounded = [one.positions.astype(np.float32) for one in demos]
+    assert library.learn(rounded, source=moved).known == 4
+    assert library.learn(rounded, source=Source.of_file(moved.path, options={"unit": "mm"})).added == 4
+    again = library.learn([demos[1].positions.astype(np.float16)], source=[moved], places=["1"])
+    assert again.ids.tolist() == [2]
+
+
+def test_a_label_makes_a_symbol_or_joins_it_and_a_person_may_rename_it(library):
+    demos = draw_movements(6, labels=["wave", "wave", "nod", "nod", "wave", "nod"])
+    assert library.learn(demos[:4]).symbols == ("wave", "nod")
+    assert library.learn(demos[4:]).symbols == ()
+    assert library["wave"].members.tolist() == [1, 2, 5]
+    library.rename("wave", "greeting")
+    assert library.learn(demos).symbols == ()  # they show a symbol already
+    assert library["greeting"].members.tolist() == [1, 2, 5]
+
+
+def test_movements_without_a_label_wait_for_one(library):
+    demos = draw_movements(5)
+    library.learn(demos, labels=["a", None, None, 7, None])
+    assert library.unlabeled().tolist() == [2, 3, 5]
+    assert library.movements().labels is None
+    assert library["7"].members.tolist() == [4]
+    library.learn(demos, labels=["b"] * 5)
+    assert library["b"].members.tolist() == [2, 3, 5]
+    assert not len(library.unlabeled())
+
+
+def test_batches_make_no_difference(tmp_path, monkeypatch):
+    demos = draw_movements(30, ragged=True, labels=["a", "b", "c"] * 10)
+    with ActionLibrary(tmp_path / "one", create=True) as one, ActionLibrary(tmp_path / "many", create=True) as many:
+        one.learn(demos)
+        monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 7)
+        seen = []
+        report = many.learn(demos, progress=lambda done, total: seen.append((done, total)))
+        assert seen == [(7, 30), (14, 30), (21, 30), (28, 30), (30, 30)]
+        assert (report.version, many.version, one.version) == (5, 5, 1)
+        np.testing.assert_array_equal(many.movements().positions, one.movements().positions)
+        np.testing.assert_allclose(many.features(), one.features(), atol=1e-6)
+        assert [s.members.tolist() for s in many.symbols()] == [s.members.tolist() for s in one.symbols()]
+
+
+def test_learning_that_was_interrupted_goes_on_where_it_ended(library, monkeypatch):
+    demos = draw_movements(30)
+    monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 10)
+
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        library.learn(demos, progress=stop)
+    there = len(library)
+    assert there in (10, 20)
+    report = library.learn(demos)
+    assert (report.added, report.known, len(library)) == (30 - there, there, 30)
+
+
+def test_disk_is_little_more_than_the_arrays_in_single_precision(tmp_path):
+    demos = draw_movements(3000, n_samples=200)
+    with ActionLibrary(tmp_path, create=True) as library:
+        library.learn(demos)
+    arrays = 4 * len(demos) * (200 * 2 + 600)
+    assert (tmp_path / "library.sqlite").stat().st_size < 1.25 * arrays
+    assert [path.name for path in tmp_path.iterdir()] == ["library.sqlite"]
+
+
+@pytest.mark.parametrize(
+    ("movements", "options", "message"),
+    [
+        ([np.ones((9, 2))], {}, r"trajectory 0: expected a movement, got 9 samples at the same place"),
+        (
+            [np.arange(20.0).reshape(10, 2), 1e-32 * np.arange(20.0).reshape(10, 2)],
+            {},
+            r"trajectory 1: expected an extent from 1e-30 to 1e\+30, got 1.8e-31; choose a unit",
+        ),
+        (np.random.default_rng(0).normal(size=(2, 9, 3)), {}, r"expected movements of 2 dimensions .* got 3; select"),
+        (np.random.default_rng(0).normal(size=(2, 9, 2)), {"labels": ["a"]}, r"one label for each of the 2 .* got 1"),
+        (np.random.default_rng(0).normal(size=(2, 9, 2)), {"places": ["a"]}, r"one place for each of the 2 .* got 1"),
+        (np.random.default_rng(0).normal(size=(2, 9, 2)), {"source": []}, r"one for each of the 2 movements, got 0"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_stored_is_refused_before_anything_is(library, movements, options, message):
+    library.learn(draw_movements(2))
+    before = library.version
+    with pytest.raises(TrajectoryError, match=message):
+        library.learn(movements, **options)
+    assert library.version == before
+
+
+@pytest.mark.parametrize(("label", "shown"), [("", "''"), ("a\ud800", r"'a\ud800'")])
+def test_a_label_is_text(library, label, shown):
+    with pytest.raises(kineme.SpecificationError, match=rf"expected a name .* got {re.escape(shown)}"):
+        library.learn(draw_movements(2), labels=["fine", label])
+    assert len(library) == 0
+
+
+def test_nothing_of_the_caller_is_changed(library):
+    x = draw_movements(3).positions.reshape(3, -1, 2).copy()
+    x.setflags(write=False)
+    before = x.copy()
+    library.learn(x)
+    np.testing.assert_array_equal(x, before)
+
+
+def test_the_specification_is_kept_with_the_library(tmp_path):
+    recognizer = kineme.Recognizer(scale="none", translation=False, cutoff=None, max_angle=0.3)
+    dmp = kineme.DMP("bio-inspired", n_basis=15, fit="trajectory", preprocessing=(kineme.Smooth(12.0),))
+    with ActionLibrary(tmp_path, create=True, recognizer=recognizer, dmp=dmp) as library:
+        library.learn(draw_movements(4))
+    with ActionLibrary(tmp_path) as library:
+        assert library.specification.dmp == dmp
+        assert library.specification.recognizer().get_params() == {
+            **recognizer.get_params(),
+            "representations": library.specification.representations,
+        }
+        assert library.primitives().dmp == dmp
+        np.testing.assert_allclose(library.features()[:, 0], draw_movements(4).positions[::40, 0], rtol=1e-6)
