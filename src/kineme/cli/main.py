@@ -9,6 +9,7 @@ import click
 
 from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
+from kineme.cli.inspect import inspect
 from kineme.cli.library import library
 from kineme.cli.reproduce import reproduce
 from kineme.errors import KinemeError
@@ -33,5 +34,6 @@ def main() -> None:
 
 main.add_command(evaluate)
 main.add_command(generate)
+main.add_command(inspect)
 main.add_command(library)
 main.add_command(reproduce)

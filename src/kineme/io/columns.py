@@ -59,8 +59,8 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     taken = {*movement, label}
     time = _time(heads, kinds, layout, named, taken)
     taken.add(time)
-    if layout.columns is not None:
-        positions = tuple(_number(heads, one) for one in layout.columns)
+    if layout.coordinates is not None:
+        positions = tuple(_number(heads, one) for one in layout.coordinates)
     else:
         free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
         positions = tuple(k for k in free if not (named and _says_nothing_new(heads, k)))
@@ -135,8 +135,8 @@ def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
 
 
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
-    if layout.movement is not None:
-        return tuple(_number(heads, one) for one in layout.movement)
+    if layout.keys is not None:
+        return tuple(_number(heads, one) for one in layout.keys)
     if not named:
         return ()
     kind = MOVEMENT_WORDS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,6 +70,12 @@ class Recordings:
     def labels(self) -> tuple[str | None, ...]:
         """The label of each movement, also where others have none."""
         return tuple(source.label for source in self.sources)
+
+    def without_labels(self) -> Recordings:
+        """The same movements, with no label on any."""
+        plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
+        sources = tuple(source._replace(label=None) for source in self.sources)
+        return replace(self, demonstrations=plain, sources=sources)
 
 
 def join_files(files: Sequence[FileRead], where: str, problems: Sequence[Problem] = ()) -> Recordings:

@@ -23,9 +23,9 @@ class Layout:
     ----------
     time : str or int, optional
         Column of the time stamps.
-    columns : tuple of str or int, optional
+    columns : str or int or sequence of them, optional
         Columns of the coordinates, in that order.
-    movement : tuple of str or int, optional
+    movement : str or int or sequence of them, optional
         Columns that tell the movements of a long table apart.
     label : str or int, optional
         Column that names the action.
@@ -42,8 +42,8 @@ class Layout:
     """
 
     time: Column | None = None
-    columns: tuple[Column, ...] | None = None
-    movement: tuple[Column, ...] | None = None
+    columns: Column | Sequence[Column] | None = None
+    movement: Column | Sequence[Column] | None = None
     label: Column | None = None
     units: str | float | None = None
     skip: str = "movement"
@@ -57,9 +57,19 @@ class Layout:
                 f"expected units to be one of {', '.join(UNITS)} or a number of seconds, got {self.units!r}"
             )
 
+    @property
+    def coordinates(self) -> tuple[Column, ...] | None:
+        """The columns of the coordinates."""
+        return _several(self.columns)
 
-def several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | None:
+    @property
+    def keys(self) -> tuple[Column, ...] | None:
+        """The columns that tell movements apart."""
+        return _several(self.movement)
+
+
+def _several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | None:
     """One column or many, as a tuple."""
     if columns is None:
         return None
-    return (columns,) if isinstance(columns, (str, int)) else tuple(columns)
+    return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # none given is none said

@@ -8,7 +8,7 @@ from pathlib import Path
 from kineme.errors import DataError
 from kineme.io.folders import files_under
 from kineme.io.join_files import Recordings, join_files
-from kineme.io.layout import Column, Layout, several
+from kineme.io.layout import Column, Layout
 from kineme.io.read_file import format_of, read_bytes, read_file
 from kineme.trajectories.trajectory import Trajectory
 
@@ -55,7 +55,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     SpecificationError
         An unknown unit or choice.
     """
-    layout = Layout(time, several(columns), several(movement), label, units, skip)
+    layout = Layout(time, columns, movement, label, units, skip)
     path = Path(path)
     if path.is_dir():
         files, problems = files_under(path)

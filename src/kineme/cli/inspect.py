@@ -1,0 +1,43 @@
+"""``kineme inspect``: what a set of recordings holds, before anything is learned from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import json_option
+from kineme.cli.output import printable, say
+from kineme.cli.reading import layout_options, read
+
+
+@click.command()
+@click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
+@layout_options
+@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
+@json_option
+def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) -> None:
+    """Inspect RECORDINGS, a folder or a file, or - for CSV from the standard input.
+
+    Shows, per label: how many movements, how long, sampled how fast and how evenly, with which gaps. Below: how the
+    files were understood, movements that occur twice, and what could not be read and why. In a folder, the name of
+    the innermost folder is the label.
+
+    Example: kineme inspect recordings/ --plot recordings.png
+    """
+    from kineme.inspection.inspect import inspect as look
+    from kineme.inspection.report import as_data, as_words
+
+    found = read(recordings, options)
+    if plot is not None:
+        _draw(found, plot)
+    seen = look(found)
+    say(as_json, as_data(seen), lambda: as_words(seen, printable))
+
+
+def _draw(found: Any, path: Path) -> None:
+    from kineme.figures import save_figure
+    from kineme.inspection.figure import draw_recordings
+
+    save_figure(draw_recordings(found), path)

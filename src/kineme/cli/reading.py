@@ -1,0 +1,72 @@
+"""Reading recordings for a command: the options that say what the columns are, and the standard input."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+STANDARD_INPUT = "standard input.csv"
+
+
+class Unit(click.ParamType):  # type: ignore[type-arg]
+    """A unit of time by name, or its length in seconds."""
+
+    name = "s|ms|us|ns|SECONDS"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
+        """A number where it reads as one."""
+        try:
+            return float(value)
+        except ValueError:
+            return str(value)
+
+
+class Heads(click.ParamType):  # type: ignore[type-arg]
+    """Columns separated by commas, by head or counted from 0."""
+
+    name = "a,b,..."
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
+        """The columns."""
+        return value if isinstance(value, tuple) else tuple(part.strip() for part in value.split(","))
+
+
+_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
+    click.option("--columns", type=Heads(), help="Columns of the coordinates."),
+    click.option("--movement", type=Heads(), help="Columns that tell the movements of a table apart."),
+    click.option("--label-column", metavar="COLUMN", help="Column that names the action."),
+    click.option("--units", type=Unit(), help="Unit of the time stamps, or the step of samples without, in seconds."),
+    click.option(
+        "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
+        help="What a missing or repeated sample costs.",
+    ),
+)  # fmt: skip
+
+
+def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say what the columns of a table are; by default that is found out."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def read(path: Path, options: dict[str, Any]) -> Any:
+    """Recordings from a folder, a file, or - the standard input, as `layout_options` say."""
+    from kineme.io.layout import Layout
+    from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+
+    known = {"label" if name == "label_column" else name: value for name, value in options.items()}
+    if str(path) == "-":
+        return read_recordings_from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT, Layout(**known))
+    return read_recordings(path, **known, progress=_watched)
+
+
+def _watched(files: Any) -> Any:
+    from tqdm import tqdm
+
+    return tqdm(files, desc="reading", unit="file", leave=False, disable=None)  # None: on a terminal only

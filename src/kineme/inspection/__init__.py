@@ -1,0 +1,1 @@
+"""What a set of recordings holds: counts, durations, rates, gaps, problems, and a picture."""
