@@ -82,7 +82,7 @@ def answers(recognizer: Recognizer, X: Any, error_rate: float) -> list[Answer]:
     found: list[Answer] = []
     for tile in recognizer._tiles(seen):
         n = len(tile[0].rows)
-        found += _of_tile(recognizer, demos[len(found) : len(found) + n], tile, error_rate)
+        found += answers_to(recognizer, demos[len(found) : len(found) + n], tile, error_rate)
     return found
 
 
@@ -94,9 +94,10 @@ def known_labels(classes: NDArray[Any], scores: Array, p_values: Array, error_ra
     return np.asarray(labels)
 
 
-def _of_tile(
+def answers_to(
     recognizer: Recognizer, demos: Demonstrations, seen: tuple[Prepared, ...], error_rate: float
 ) -> list[Answer]:
+    """An answer for each movement of a tile that the recognizer has looked at."""
     by_look = recognizer.similarity_.logs(seen, recognizer.views_)  # (R, n, m)
     logs = LOG_MEANS[recognizer.mean](by_look)
     nearest = np.maximum.reduceat(logs, recognizer.first_, axis=1)

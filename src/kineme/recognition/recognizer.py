@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.parallel import for_tiles
 from kineme.recognition.choice import CANDIDATES, chosen_weights, given_weights, suffices
 from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
@@ -20,7 +22,7 @@ from kineme.recognition.labels import check_labels
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
 from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
-from kineme.recognition.views import view
+from kineme.recognition.views import tile_movements, view
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice, check_number
 
@@ -134,18 +136,12 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def look_at(self, X: Any) -> tuple[Prepared, ...]:
         """Movements as rows per representation, ready to be compared with the stored ones."""
-        check_is_fitted(self)
-        demos = Demonstrations.of(X)
-        if demos.n_dims != self.n_dims_:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims_} dimensions as in fit, got {demos.n_dims}; select the dimensions"
-            )
-        return self._view(demos)
+        return self._view(self._checked(X))
 
     def decision_function(self, X: Any) -> Array:
         """Score of each class, shape (n, C): larger is more like it; scales depend on the classifier."""
-        seen = self.look_at(X)
-        return np.concatenate([self.classifier_.scores(self, tile) for tile in self._tiles(seen)])
+        check_is_fitted(self)
+        return self._scored(X, self.classifier_)
 
     def predict(self, X: Any) -> NDArray[Any]:
         """The most similar class of each movement, shape (n,)."""
@@ -264,6 +260,27 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_is_fitted(self)
         return Live(self, Decision(confidence, patience), early or Early())
 
+    def over(self, stored: Any, labels: NDArray[Any], views: tuple[Prepared, ...], calibration: Calibration) -> Self:
+        """A recognizer that compares in the same way, by the nearest, with other movements that were seen already.
+
+        Parameters
+        ----------
+        stored : Demonstrations
+            Ordered by class; or what gives them when indexed by an array.
+        labels : ndarray of shape (m,)
+            Sorted.
+        views : tuple of R Prepared
+            Their rows.
+        calibration : Calibration
+            Of their classes, in order.
+        """
+        new = copy(self)
+        new.demonstrations_, new.labels_, new.views_, new.calibration_ = stored, labels, views, calibration
+        new.classes_, new.first_ = np.unique(labels, return_index=True)
+        new.classifier_ = Nearest()
+        new.hypotheses_ = {}
+        return new
+
     def _choose_representations(self, per_class: NDArray[Any]) -> None:
         """Look at the demonstrations, set the widths and the weights, and keep the representations with weight."""
         choosing = self._chooses(per_class)
@@ -310,8 +327,27 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def _nearest(self, X: Any) -> Array:
         """Log similarity to the nearest demonstration of each class, shape (n, C)."""
-        nearest = Nearest()
-        return np.concatenate([nearest.scores(self, tile) for tile in self._tiles(self.look_at(X))])
+        return self._scored(X, Nearest())
+
+    def _scored(self, X: Any, classifier: Classifier) -> Array:
+        """Scores (n, C), tile by tile: what is seen of a movement is compared before it leaves the core's cache."""
+        demos = self._checked(X)
+        scores = np.empty((len(demos), len(self.classes_)))
+
+        def score(start: int, stop: int) -> None:
+            scores[start:stop] = classifier.scores(self, self._view(demos.between(start, stop)))
+
+        for_tiles(score, len(demos), min(tile_movements(demos.n_dims), max(1, _TILE_PAIRS // len(self.labels_))))
+        return scores
+
+    def _checked(self, X: Any) -> Demonstrations:
+        check_is_fitted(self)
+        demos = Demonstrations.of(X)
+        if demos.n_dims != self.n_dims_:
+            raise TrajectoryError(
+                f"expected movements of {self.n_dims_} dimensions as in fit, got {demos.n_dims}; select the dimensions"
+            )
+        return demos
 
     def _tiles(self, seen: tuple[Prepared, ...]) -> Iterator[tuple[Prepared, ...]]:
         n, step = len(seen[0].rows), max(1, _TILE_PAIRS // len(self.labels_))
