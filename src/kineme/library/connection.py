@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
@@ -63,7 +64,7 @@ def create(path: Path, meta: dict[str, str]) -> None:
             connection.execute("BEGIN")
             for statement in CREATE:
                 connection.execute(statement)
-            insert(connection, "meta", meta.items())
+            insert(connection, "meta", [*meta.items(), ("schema", schema_seal(connection))])
             connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
             connection.execute("COMMIT")
 
@@ -86,7 +87,15 @@ def migrate(connection: sqlite3.Connection, path: Path) -> None:
         for version in range(check_kind(connection, path), SCHEMA_VERSION):
             for statement in MIGRATIONS[version]:
                 connection.execute(statement)
+        connection.execute("DELETE FROM meta WHERE key = 'schema'")
+        insert(connection, "meta", [("schema", schema_seal(connection))])
         connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+
+def schema_seal(connection: sqlite3.Connection) -> str:
+    """A checksum of the tables' definitions, without which the other checksums would mean nothing."""
+    query = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
+    return str(zlib.crc32(repr(connection.execute(query).fetchall()).encode()))
 
 
 @contextmanager

@@ -54,6 +54,8 @@ def in_plain_words(path: Path, wait: float) -> Iterator[None]:
         raise
     except OSError as error:
         raise DataError(f"expected to read or write {path}, got an error of the system ({error})") from error
+    except UnicodeDecodeError as error:  # of a name of a column
+        raise DataError(_DAMAGED.format(path=path, error=error)) from error
     except sqlite3.Error as error:
         code = getattr(error, "sqlite_errorcode", None)
         words = _WORDS.get(code & 0xFF) if code is not None else None

@@ -16,6 +16,8 @@ from kineme.library.specification import Specification
 from kineme.library.store import Store
 
 if TYPE_CHECKING:
+    from kineme.anchoring.proposals import Proposal
+    from kineme.library.anchor import LibraryProposals
     from kineme.library.history import Version
     from kineme.library.learn import LearnReport
     from kineme.library.source import Source
@@ -265,3 +267,44 @@ class ActionLibrary:
     def release(self, ids: Any) -> None:
         """Let movements show no symbol any more."""
         changes.release(self.store, ids)
+
+    def join(self, error_rate: float = 0.05) -> dict[str, int]:
+        """Let movements without a symbol join the symbols that they are recognized as.
+
+        Returns
+        -------
+        dict
+            Name of the symbol -> how many joined it.
+        """
+        from kineme.library.anchor import join_symbols
+
+        return join_symbols(self, error_rate)
+
+    def propose(
+        self, ids: Any = None, method: str | None = None, n_clusters: int | None = None, min_members: int = 3
+    ) -> LibraryProposals:
+        """Kinds among the movements without a symbol, or among `ids`, for a person to name.
+
+        Where there are symbols, what makes a kind is measured by them, see `kineme.anchoring.place.place`; else, and
+        where `method` or `n_clusters` is given, the movements are clustered, see `kineme.anchoring.propose.propose`.
+        A kind of which four fifths were in one proposal that was rejected is not proposed again. Fewer than three
+        movements make no proposal.
+        """
+        from kineme.library.anchor import propose_kinds
+
+        return propose_kinds(self, ids, method, n_clusters, min_members)
+
+    def accept(self, proposal: Proposal, name: str, description: str | None = None) -> None:
+        """Let the members of a proposal show the symbol of that name, made if there is none, its medoid the prototype.
+
+        Members that were given to other symbols since the proposal was made stay there.
+        """
+        from kineme.library.anchor import accept
+
+        accept(self, proposal, name, description)
+
+    def reject(self, proposal: Proposal) -> None:
+        """Remember that these movements are no kind: they stay without a symbol and are not proposed again."""
+        from kineme.library.anchor import reject
+
+        reject(self, proposal)

@@ -14,9 +14,9 @@ from threading import RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.connection import check_kind, connect, create, migrate, transaction
+from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
-from kineme.library.rows import Row, insert, select
+from kineme.library.rows import Row, damaged, insert, select
 from kineme.library.schema import SCHEMA_VERSION
 from kineme.library.specification import Specification
 
@@ -70,8 +70,8 @@ class Store:
         with in_plain_words(self.path, wait):
             self._reader = connect(self.path, "ro" if self.read_only else "rw", wait)
             try:
-                self._check()
-                meta: dict[str, str] = dict(select(self._reader, "meta"))
+                self._check_kind()
+                meta = self._checked_meta()
                 self.id = meta["id"]
                 self.specification = Specification.from_json(meta)
                 self.as_of = self._checked_version(as_of)
@@ -87,7 +87,7 @@ class Store:
             )
         create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
 
-    def _check(self) -> None:
+    def _check_kind(self) -> None:
         """Refuse what is no library; bring an older one up to date."""
         self._file = self.path.stat().st_ino
         if check_kind(self._reader, self.path) == SCHEMA_VERSION:
@@ -98,6 +98,13 @@ class Store:
                 "open it once without read_only to bring it up to date"
             )
         migrate(self._reader, self.path)
+
+    def _checked_meta(self) -> dict[str, str]:
+        """What the library says of itself, once the definitions of its tables have been found undamaged."""
+        meta: dict[str, str] = dict(select(self._reader, "meta"))
+        if meta.get("schema") != schema_seal(self._reader):
+            raise damaged("sqlite_master", ("of definitions",))
+        return meta
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])

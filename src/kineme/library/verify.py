@@ -59,7 +59,7 @@ def _all_of(check: Callable[[sqlite3.Connection], Iterator[Problem]], connection
             found.append(problem)
             if len(found) >= _SHOWN:
                 break
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         found.append(Problem("", None, f"the file cannot be read to the end ({error})"))
     return found
 
@@ -75,7 +75,7 @@ def _seals(table: str) -> Callable[[sqlite3.Connection], Iterator[Problem]]:
         try:
             for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc FROM {table}"):
                 yield from _broken(table, row)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             yield Problem(table, None, f"table {table} cannot be read as a whole ({error})")
             yield from _one_by_one(connection, table)
 
@@ -98,7 +98,7 @@ def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]
     for (key,) in connection.execute("SELECT id FROM movement").fetchall():
         try:
             row = connection.execute(f"SELECT *, movement FROM {table} WHERE movement = ?", (key,)).fetchone()
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             yield Problem(table, key, f"{row_name(table, key)}: cannot be read ({error})")
         else:
             yield from _broken(table, row[:-1]) if row is not None else ()
