@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.anchor import anchor
 from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
@@ -32,6 +33,7 @@ def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 
 
+main.add_command(anchor)
 main.add_command(evaluate)
 main.add_command(generate)
 main.add_command(inspect)

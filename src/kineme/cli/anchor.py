@@ -1,0 +1,181 @@
+"""``kineme anchor``: from movements without a name to symbols, with a person or by a script."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import json_option, library_option
+from kineme.cli.output import count, printable, say
+
+
+class Choice(click.ParamType):  # type: ignore[type-arg]
+    """Numbers of proposals separated by commas, or all."""
+
+    name = "0,1,...|all"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> list[int] | str:
+        """Text as numbers."""
+        if value == "all":
+            return "all"
+        try:
+            return [int(part) for part in value.split(",")]
+        except ValueError:
+            self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
+
+
+@click.command()
+@library_option
+@click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
+              help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip
+@click.option("--clusters", type=click.IntRange(1), help="How many kinds.  [default: as many as fit]")
+@click.option("--min-members", type=click.IntRange(2), default=3, show_default=True, help="That make a kind.")
+@click.option("--join/--no-join", default=True, show_default=True,
+              help="First let movements join the symbols that they are recognized as.")  # fmt: skip
+@click.option("--accept", type=Choice(), help="Name these proposals, without asking.")
+@click.option("--reject", type=Choice(), help="Leave these movements unnamed, and do not propose them again.")
+@click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+              help='A JSON file of names: {"0": "wave", "1": "nod"}.  [default: kind 1, kind 2, ...]')  # fmt: skip
+@click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
+              help="Folder for a picture of every proposal.")  # fmt: skip
+@json_option
+def anchor(folder: Path, **options: Any) -> None:
+    """Propose kinds among the movements without a name, and turn them into symbols.
+
+    On a terminal it asks for each; with --accept or --reject it does not; with neither it lists them.
+
+    Example: kineme anchor --library actions/ --accept all --names names.json
+    """
+    from kineme.cli.anchor_session import Session
+    from kineme.library.library import ActionLibrary
+
+    scripted = options["accept"] is not None or options["reject"] is not None
+    interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
+    names = _names(options["names"])
+    writes = scripted or interactive
+    with ActionLibrary(folder, read_only=not writes) as library:
+        joined = library.join() if writes and options["join"] and library.symbols() else {}
+        proposals = library.propose(
+            method=options["method"], n_clusters=options["clusters"], min_members=options["min_members"]
+        )
+        pictures = _draw(library, proposals, options["pictures"])
+        data = {"joined": joined, **_as_data(proposals), "pictures": [str(path) for path in pictures]}
+        if interactive:
+            click.echo(_text(data))
+            Session(library, proposals, pictures[1:]).run()
+            return
+        data["accepted"] = _accept(library, proposals, options["accept"], names)
+        data["rejected"] = _reject(library, proposals, options["reject"])
+    say(options["as_json"], data, lambda: _text(data))
+
+
+def _names(path: Path | None) -> dict[int, str]:
+    from kineme.errors import DataError
+
+    if path is None:
+        return {}
+    try:
+        names = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(names, dict) or not all(isinstance(name, str) for name in names.values()):
+            raise ValueError("numbers of proposals with names")
+        return {int(number): name for number, name in names.items()}
+    except ValueError as error:
+        raise DataError(
+            f'expected {path} to hold names by the number of the proposal, as {{"0": "wave"}}, got something else '
+            f"({error})"
+        ) from error
+
+
+def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
+    """A sheet of all proposals, then a picture of each."""
+    from kineme.anchoring.proposal_figure import draw_proposal
+    from kineme.anchoring.sheet_figure import draw_proposals
+    from kineme.figures import save_figure
+
+    if not len(proposals):
+        return []
+    folder.mkdir(parents=True, exist_ok=True)
+    movements = proposals.movements(library)
+    like = library.specification.recognizer()
+    paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
+    for k, one in enumerate(proposals.found.proposals):
+        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"kind-{k}.png"))
+    old = len(proposals)
+    while (stale := folder / f"kind-{old}.png").exists():  # of an earlier run, under a number that means nothing now
+        stale.unlink()
+        old += 1
+    return paths
+
+
+def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
+    numbers = range(len(proposals)) if choice == "all" else choice or []
+    for number in numbers:
+        if not 0 <= number < len(proposals):
+            raise click.BadParameter(
+                f"there are {len(proposals)} proposals, counted from 0, got {number}", param_hint=option
+            )
+    return list(dict.fromkeys(numbers))
+
+
+def _accept(library: Any, proposals: Any, choice: Any, names: dict[int, str]) -> dict[str, int]:
+    done = {}
+    for k in _chosen(proposals, choice, "--accept"):
+        name = names.get(k) or _free_name(library)
+        library.accept(proposals[k], name)
+        done[name] = len(proposals[k])
+    return done
+
+
+def _free_name(library: Any) -> str:
+    taken = {symbol.name for symbol in library.symbols()}
+    return next(name for k in range(1, len(taken) + 2) if (name := f"kind {k}") not in taken)
+
+
+def _reject(library: Any, proposals: Any, choice: Any) -> list[int]:
+    chosen = _chosen(proposals, choice, "--reject")
+    for k in chosen:
+        library.reject(proposals[k])
+    return chosen
+
+
+def _as_data(proposals: Any) -> dict[str, Any]:
+    return {
+        "proposals": [
+            {
+                "number": k,
+                "movements": [int(i) for i in one.members],
+                "medoid": one.medoid,
+                "cohesion": one.cohesion,
+                "stability": one.stability,
+                "nearest": one.nearest,
+            }
+            for k, one in enumerate(proposals[i] for i in range(len(proposals)))
+        ],
+        "left_over": [int(i) for i in proposals.left_over],
+    }
+
+
+def _text(data: dict[str, Any]) -> str:
+    from kineme.table import Table, to_text
+
+    lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
+    found = data["proposals"]
+    rows = [
+        (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",
+         "" if one["nearest"] is None else str(one["nearest"]))
+        for one in found
+    ]  # fmt: skip
+    title = f"{count(len(found), 'proposal')}, {count(len(data['left_over']), 'movement')} left over"
+    lines.append(
+        to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
+    )
+    if data["pictures"]:
+        lines.append(f"pictures: {printable(data['pictures'][0])}")
+    lines += [f"{printable(name)}: {count(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
+    if data.get("rejected"):
+        lines.append(f"rejected {', '.join(map(str, data['rejected']))}")
+    return "\n".join(lines)

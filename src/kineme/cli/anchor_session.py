@@ -1,0 +1,117 @@
+"""The dialogue of ``kineme anchor``: one proposal after the other, until all are named or the person stops."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from kineme.cli.output import count, printable
+from kineme.errors import KinemeError
+
+HELP = """\
+  a name         makes it a symbol, or joins the symbol of that name
+  (nothing)      leaves it for later
+  /split         looks for two kinds in it
+  /reject        leaves its movements unnamed, and does not propose it again
+  /members       lists its movements
+  /name TEXT     a name that begins with a slash
+  /quit          stops; what is named stays"""
+
+
+class Item(NamedTuple):
+    """A proposal on the list: its members are ids of movements."""
+
+    title: str
+    proposal: Any
+    picture: Path | None
+
+
+class Session:
+    """Ask about each proposal; every answer is committed at once.
+
+    Parameters
+    ----------
+    library : ActionLibrary
+        Opened for writing.
+    proposals : LibraryProposals
+    pictures : list of Path
+        One per proposal.
+    """
+
+    def __init__(self, library: Any, proposals: Any, pictures: list[Path]) -> None:
+        self.library = library
+        self.items = deque(Item(str(k), proposals[k], pictures[k]) for k in range(len(proposals)))
+
+    def run(self) -> None:
+        """Until the list is empty, /quit, or the end of the input."""
+        if self.items:
+            click.echo("Give each a name; /help says what else there is.")
+        while self.items:
+            item = self.items[0]
+            click.echo(self._summary(item))
+            try:
+                line = click.prompt("name", default="", show_default=False)
+            except click.Abort:
+                click.echo()
+                break
+            try:
+                if not self._answer(item, line):
+                    break
+            except KinemeError as error:
+                click.echo(f"  {error}")
+        left = len(self.library.unlabeled())
+        click.echo(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
+
+    def _answer(self, item: Item, line: str) -> bool:
+        """Do what the person says; whether to go on."""
+        command, _, rest = line.partition(" ")
+        if command in {"/quit", "/q"}:
+            return False
+        if command == "/help":
+            click.echo(HELP)
+        elif command == "/members":
+            self._members(item)
+        elif command == "/split":
+            self._split(item)
+        elif command == "/reject":
+            self.library.reject(item.proposal)
+            self.items.popleft()
+        elif command == "/name":
+            self._accept(item, rest)
+        elif command.startswith("/"):
+            click.echo(f"  expected a name or one of /split, /reject, /members, /name, /quit, got {printable(command)}")
+        elif line:
+            self._accept(item, line)
+        else:
+            self.items.popleft()
+        return True
+
+    def _accept(self, item: Item, name: str) -> None:
+        if name in self.library and not click.confirm(f"  join {printable(name)}, which exists?", default=True):
+            return
+        self.library.accept(item.proposal, name)
+        self.items.popleft()
+        symbol = self.library[name]
+        click.echo(f"  {printable(symbol.name)}: {count(len(symbol), 'movement')} ({symbol.id})")
+
+    def _split(self, item: Item) -> None:
+        parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
+        if len(parts) < 2:
+            click.echo("  no two kinds of two movements or more in it")
+            return
+        self.items.popleft()
+        for k in reversed(range(len(parts))):
+            self.items.appendleft(Item(f"{item.title}{'ab'[k]}", parts[k], None))
+
+    def _members(self, item: Item) -> None:
+        names = self.library.movements(ids=item.proposal.members).names or ()
+        for key, name in zip(item.proposal.members.tolist(), names, strict=False):
+            click.echo(f"  {key}  {printable(name or '')}")
+
+    def _summary(self, item: Item) -> str:
+        one = item.proposal
+        where = f"; see {printable(item.picture)}" if item.picture else ""
+        return f"\n{item.title}: {count(len(one), 'movement')}, stability {one.stability:.2f}{where}"

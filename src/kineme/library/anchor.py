@@ -1,0 +1,149 @@
+"""Anchoring in a library: kinds of movement among those without a symbol, for a person to name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.anchoring.place import place
+from kineme.anchoring.proposals import Proposal, Proposals
+from kineme.anchoring.propose import propose
+from kineme.anchoring.seen import see_rows
+from kineme.errors import SpecificationError
+from kineme.recognition.recognizer import Recognizer
+from kineme.trajectories.demonstrations import Demonstrations
+
+if TYPE_CHECKING:
+    from kineme.library.library import ActionLibrary
+
+Ids = NDArray[np.int64]
+
+_AGAIN = 0.8  # of a proposal's members in one that was rejected: it is the same one
+_KNOWN = 3000  # movements of symbols that new ones are compared with, at most, evenly many of each symbol
+
+
+@dataclass(frozen=True, eq=False)
+class LibraryProposals:
+    """Proposals of kinds among movements of a library.
+
+    Indexing gives a `Proposal` whose members and medoid are ids of movements.
+
+    Attributes
+    ----------
+    ids : ndarray of shape (n,)
+        The movements looked at.
+    found : Proposals
+        The same in places among `ids`, as the pictures of `kineme.anchoring` want them.
+    """
+
+    ids: Ids
+    found: Proposals
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __getitem__(self, index: int) -> Proposal:
+        one = self.found[index]
+        return replace(one, members=self.ids[one.members], medoid=int(self.ids[one.medoid]))
+
+    @property
+    def left_over(self) -> Ids:
+        """Movements in no proposal."""
+        return self.ids[self.found.left_over]
+
+    def __repr__(self) -> str:
+        return f"LibraryProposals({len(self)} kinds of {len(self.ids)} movements, {len(self.left_over)} left over)"
+
+    def movements(self, library: ActionLibrary) -> Demonstrations:
+        """The recordings, for the pictures."""
+        return library.movements(ids=self.ids)
+
+
+def propose_kinds(
+    library: ActionLibrary,
+    ids: Any = None,
+    method: str | None = None,
+    n_clusters: int | None = None,
+    min_members: int = 3,
+) -> LibraryProposals:
+    """Kinds among the movements without a symbol, or among `ids`; see `ActionLibrary.propose`."""
+    chosen = library.unlabeled() if ids is None else np.unique(np.asarray(ids, dtype=np.int64))
+    if len(chosen) < 3:
+        return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
+    if ids is None and method is None and n_clusters is None and library.symbols():
+        found = place(library.movements(ids=chosen), known_recognizer(library), min_members=min_members).proposals
+    else:
+        like = library.specification.recognizer()
+        seen = see_rows(library.features(chosen), library.n_dims or 0, like)
+        found = propose(seen, method or "agglomerative", n_clusters, min_members=min_members, like=like)
+    return LibraryProposals(chosen, _without(found, _rejected_before(library, chosen)) if ids is None else found)
+
+
+def join_symbols(library: ActionLibrary, error_rate: float = 0.05) -> dict[str, int]:
+    """Let movements without a symbol join those that they are recognized as; see `ActionLibrary.join`."""
+    waiting = library.unlabeled()
+    if not len(waiting) or not any(map(len, library.symbols())):
+        return {}
+    names = known_recognizer(library).predict_known(library.movements(ids=waiting), error_rate)
+    joined = {}
+    for name in dict.fromkeys(name for name in names if name is not None):
+        members = waiting[np.array([one == name for one in names])]
+        library.assign(members, name, "recognized")
+        joined[str(name)] = len(members)
+    return joined
+
+
+def known_recognizer(library: ActionLibrary) -> Recognizer:
+    """A recognizer of the symbols, fitted to at most 3000 of their movements, evenly many of each symbol."""
+    symbols = [symbol for symbol in library.symbols() if len(symbol)]
+    share = max(1, _KNOWN // max(1, len(symbols)))
+    some = [one.members[np.unique(np.linspace(0, len(one) - 1, share).astype(int))] for one in symbols]
+    labels = np.repeat([one.name for one in symbols], [len(members) for members in some])
+    return library.specification.recognizer().fit(library.movements(ids=np.concatenate(some)), labels)
+
+
+def accept(library: ActionLibrary, proposal: Proposal, name: str, description: str | None = None) -> None:
+    """Let the members of a proposal show a symbol; see `ActionLibrary.accept`."""
+    members = np.intersect1d(proposal.members, library.unlabeled())
+    if not len(members):
+        raise SpecificationError(
+            f"expected movements without a symbol, all {len(proposal.members)} of this proposal show one by now; "
+            "propose again"
+        )
+    new = name not in library
+    library.assign(members, name, "anchored")
+    if new and proposal.medoid in members:
+        library.describe(name, description, prototype=proposal.medoid)
+    elif description is not None:
+        library.describe(name, description)
+
+
+def reject(library: ActionLibrary, proposal: Proposal) -> None:
+    """Remember that these movements are no kind; see `ActionLibrary.reject`."""
+    with library.store.writing("reject", {"movements": proposal.members.tolist()}):
+        pass
+
+
+def _rejected_before(library: ActionLibrary, ids: Ids) -> list[NDArray[np.intp]]:
+    """Places among `ids` of what was rejected, per rejection."""
+    rejected = [one.detail["movements"] for one in library.history() if one.action == "reject"]
+    return [np.flatnonzero(np.isin(ids, one)) for one in rejected]
+
+
+def _without(found: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
+    """The proposals that are not a rejected one again, renumbered."""
+    kept = [
+        k
+        for k, one in enumerate(found.proposals)
+        if not any(np.isin(one.members, places).mean() >= _AGAIN for places in rejected)
+    ]
+    number = np.full(len(found) + 1, -1, dtype=np.intp)
+    number[kept] = np.arange(len(kept))
+    proposals = tuple(
+        replace(one, nearest=None if one.nearest is None or number[one.nearest] < 0 else int(number[one.nearest]))
+        for one in (found.proposals[k] for k in kept)
+    )
+    return Proposals(proposals, number[found.clusters], found.widths)
