@@ -20,6 +20,8 @@ def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Cluste
 def hdbscan(distances: Array, n_clusters: int | None, min_members: int) -> Clusters:
     """Clusters of density that persist longest, none (-1) in between; their number is found.
 
+    Density needs a metric: that of the kernel's space, ``sqrt(2 - 2 K)``, from ``1 - K``.
+
     Sources: R. Campello, D. Moulavi, J. Sander, "Density-based clustering based on hierarchical density estimates",
     PAKDD 2013; the implementation is scikit-learn's.
     """
@@ -27,7 +29,7 @@ def hdbscan(distances: Array, n_clusters: int | None, min_members: int) -> Clust
 
     size = min(min_members, len(distances))
     model = HDBSCAN(min_cluster_size=max(2, size), min_samples=max(1, size - 1), metric="precomputed", copy=True)
-    return np.asarray(model.fit_predict(distances), dtype=np.intp)
+    return np.asarray(model.fit_predict(np.sqrt(2.0 * np.maximum(distances, 0.0))), dtype=np.intp)
 
 
 #: Name -> from distances (n, n), a number of clusters and of members to the cluster of each movement, -1 for none.
