@@ -17,6 +17,20 @@ from kineme.io.found import Block, Detected, Problem
 from kineme.io.layout import Layout
 
 
+#: What readers raise on a file that is not what its name says; nested too deep and too large for the memory included.
+_UNREADABLE = (
+    KinemeError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    OSError,
+    ArithmeticError,
+    RecursionError,
+    MemoryError,
+)
+
+
 class FileRead(NamedTuple):
     """What a file gave: movements and how they were understood, or neither; and what was wrong."""
 
@@ -60,7 +74,7 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
     try:
         detected, block = form.read(data, layout)
         block, problems = check_block(block, name, layout.skip)
-    except (KinemeError, ValueError, KeyError, TypeError, EOFError, OSError, OverflowError, MemoryError) as error:
+    except _UNREADABLE as error:
         return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     block = replace(block, labels=[label if one is None else one for one in block.labels])
