@@ -11,6 +11,7 @@ from kineme.cli.anchor import anchor
 from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
+from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.reproduce import reproduce
 from kineme.errors import KinemeError
@@ -37,5 +38,6 @@ main.add_command(anchor)
 main.add_command(evaluate)
 main.add_command(generate)
 main.add_command(inspect)
+main.add_command(learn)
 main.add_command(library)
 main.add_command(reproduce)

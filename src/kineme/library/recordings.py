@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ def learn_recordings(
     library: ActionLibrary,
     recordings: Recordings,
     options: Mapping[str, Any] | None = None,
-    label: str | None = None,
+    labels: Sequence[str | None] | None = None,
     progress: Progress | None = None,
 ) -> LearnReport:
     """Store what `kineme.io.recordings.read_recordings` has read.
@@ -30,8 +30,8 @@ def learn_recordings(
     recordings : Recordings
     options : mapping, optional
         What the reader was told. The same file read in another way is another source.
-    label : str, optional
-        Name of the symbol of all of them; by default each movement's own label.
+    labels : sequence of n str or None, optional
+        Names of symbols; by default each movement's own label.
     progress : callable, optional
         As for `ActionLibrary.learn`.
     """
@@ -43,7 +43,7 @@ def learn_recordings(
     }
     return library.learn(
         recordings.demonstrations,
-        [label] * len(recordings) if label is not None else list(recordings.labels),
+        list(recordings.labels) if labels is None else labels,
         [files[one.path] for one in recordings.sources],
         places=[one.place for one in recordings.sources],
         progress=progress,

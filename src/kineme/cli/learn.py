@@ -1,0 +1,99 @@
+"""``kineme learn``: recordings into an action library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import json_option, library_option
+from kineme.cli.output import count, printable, say
+from kineme.cli.reading import layout_options, read
+
+_SHOWN = 10  # problems written out
+
+
+@click.command()
+@click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
+@library_option
+@click.option("--label", help="Name of the symbol of all of them.  [default: the label in the file, or its folder]")
+@click.option("--no-labels", is_flag=True, help="Learn them without a symbol, for kineme anchor.")
+@layout_options
+@json_option
+def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
+    """Learn RECORDINGS, files or folders, or - for CSV from the standard input, into a library.
+
+    The library is made if there is none. In a folder, the name of the innermost folder is the label. What is known
+    already is not stored again; what cannot be read is listed, and the rest is learned.
+
+    Example: kineme learn recordings/ --library actions/
+    """
+    from kineme.library.library import ActionLibrary
+
+    as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
+    if label is not None and no_labels:
+        raise click.UsageError("expected --label or --no-labels, not both")
+    found, problems = _read_all(recordings, options)
+    with ActionLibrary(folder, create=True) as library:
+        reports = [_learn(library, one, options, label, no_labels) for one in found]
+        data = {
+            "library": str(folder),
+            "added": sum(one.added for one in reports),
+            "known": sum(one.known for one in reports),
+            "symbols": [name for one in reports for name in one.symbols],
+            "movements": len(library),
+            "version": library.version,
+            "problems": problems,
+        }
+    say(as_json, data, lambda: _text(data))
+
+
+def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[Any], list[str]]:
+    """What could be read, and what could not; an error if that is everything."""
+    from kineme.errors import DataError
+
+    found: list[Any] = []
+    problems: list[str] = []
+    first: DataError | None = None
+    for path in paths:
+        try:
+            found.append(read(path, options))
+            problems += map(str, found[-1].problems)
+        except DataError as error:
+            first = first or error
+            problems.append(str(error))
+    if not found and first is not None:
+        raise first
+    return found, problems
+
+
+def _learn(library: Any, recordings: Any, options: dict[str, Any], label: str | None, no_labels: bool) -> Any:
+    from kineme.library.recordings import learn_recordings
+
+    labels = [None if no_labels else label or one for one in recordings.labels]
+    with _progress(len(recordings)) as progress:
+        return learn_recordings(library, recordings, options, labels, progress)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar on a terminal, to be told the movements done and their number."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc="learning", unit="movement", leave=False, disable=None) as bar:
+        yield lambda done, _: bar.update(done - bar.n)
+
+
+def _text(data: dict[str, Any]) -> str:
+    new = f", {count(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
+    known = f", {data['known']:,} known already" if data["known"] else ""
+    held = f"{printable(data['library'])} holds {count(data['movements'], 'movement')}"
+    problems = data["problems"]
+    lines = [f"learned {count(data['added'], 'movement')}{known}{new}; {held}"]
+    lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
+    if len(problems) > _SHOWN:
+        lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")
+    return "\n".join(lines)

@@ -1,0 +1,110 @@
+"""``kineme learn`` on real recordings written out as files, as people have them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.io.movements import write_movement
+
+
+def run(*arguments, **options):
+    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+def answer(*arguments, **options):
+    done = run(*arguments, "--json", **options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def demos():
+    return kineme.load_lasa(["CShape", "GShape"])
+
+
+@pytest.fixture
+def recordings(demos, tmp_path):
+    for i, one in enumerate(demos):
+        folder = tmp_path / "recordings" / str(one.label)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_movement(folder / f"{i}.csv", {"times": one.times, "positions": one.positions})
+    return tmp_path / "recordings"
+
+
+def test_a_folder_of_folders_becomes_symbols(recordings, demos, tmp_path):
+    learned = answer("learn", recordings, "-l", tmp_path / "actions")
+    assert (learned["added"], learned["known"], learned["problems"]) == (14, 0, [])
+    assert sorted(learned["symbols"]) == ["CShape", "GShape"]
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
+        stored = library.movements("GShape")
+    expected = demos[demos.labels == "GShape"]
+    by_name = dict(zip(stored.names, stored, strict=True))
+    for i, one in enumerate(expected, start=7):
+        again = by_name[f"GShape/{i}.csv"]
+        np.testing.assert_allclose(again.positions, one.positions, atol=1e-5)  # single precision, mm
+        np.testing.assert_allclose(again.times, one.times, atol=1e-6)
+
+
+def test_learning_again_adds_nothing_also_from_another_place(recordings, tmp_path):
+    library = tmp_path / "actions"
+    answer("learn", recordings, "-l", library)
+    assert answer("learn", recordings, "-l", library)["known"] == 14
+    moved = recordings.rename(tmp_path / "elsewhere")
+    again = answer("learn", moved, moved / "CShape" / "0.csv", "-l", library)
+    assert (again["added"], again["known"], again["movements"]) == (0, 15, 14)
+
+
+def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_path):
+    (recordings / "CShape" / "bad.csv").write_text("time,x,y\n0,1,2\n1,2,oops\n")
+    learned = answer("learn", recordings, "-l", tmp_path / "actions")
+    assert learned["added"] == 14
+    assert learned["problems"] == ["CShape/bad.csv, line 3: expected a number in 'y', got 'oops'"]
+    text = run("learn", recordings, "-l", tmp_path / "actions").stdout
+    assert "14 known already" in text
+    assert "left out CShape/bad.csv, line 3" in text
+
+
+def test_labels_can_be_given_or_left_out(recordings, tmp_path):
+    library = tmp_path / "actions"
+    assert answer("learn", recordings / "CShape", "--no-labels", "-l", library)["symbols"] == []
+    assert answer("library", "list", "-l", library)["unlabeled"] == 7
+    assert answer("learn", recordings / "GShape", "--label", "gee/../", "-l", library)["symbols"] == ["gee/../"]
+    listed = answer("library", "list", "-l", library)
+    assert [(one["name"], one["movements"]) for one in listed["symbols"]] == [("gee/../", 7)]
+    labeled_later = answer("learn", recordings, "-l", library)
+    assert (labeled_later["added"], labeled_later["symbols"]) == (0, ["CShape"])
+    both = run("learn", recordings, "--label", "x", "--no-labels", "-l", library)
+    assert both.returncode == 2
+
+
+def test_the_standard_input_is_a_recording(recordings, tmp_path):
+    table = (recordings / "CShape" / "0.csv").read_text()
+    learned = answer("learn", "-", "--label", "piped", "-l", tmp_path / "actions", input=table)
+    assert (learned["added"], learned["symbols"]) == (1, ["piped"])
+
+
+@pytest.mark.parametrize("what", ["nothing", "empty"])
+def test_nothing_to_learn_is_a_failure_that_leaves_no_library(what, tmp_path):
+    (tmp_path / "empty").mkdir()
+    done = run("learn", tmp_path / what, "-l", tmp_path / "actions")
+    assert done.returncode == 1
+    assert done.stderr.startswith("kineme: expected")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "actions").exists()
+
+
+def test_movements_of_other_dimensions_are_refused_and_nothing_changes(recordings, tmp_path):
+    library = tmp_path / "actions"
+    answer("learn", recordings, "-l", library)
+    (tmp_path / "space.csv").write_text("time,x,y,z\n" + "".join(f"{t},{t},{t * t},1\n" for t in range(9)))
+    done = run("learn", tmp_path / "space.csv", "-l", library)
+    assert done.returncode == 1
+    assert "expected movements of 2 dimensions as all others of the library" in done.stderr
+    assert len(answer("library", "history", "-l", library)) == 1
