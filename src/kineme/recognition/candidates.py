@@ -22,7 +22,7 @@ Single = NDArray[np.float32]
 N_CODES = 12  # per representation and dimension: on handwriting, the best of 200,000 is then the first or second
 _TILE_ROWS = 16_384  # codes at a time: what is computed of them stays in a core's cache
 _ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
-_NEWTON_STEPS = 3  # each brings the bound in space closer, and none below what it bounds
+_NEWTON_STEPS = 4  # each brings the bound in space closer, and none below what it bounds
 
 
 class Code(NamedTuple):

@@ -94,11 +94,11 @@ def calibrate(recognizer: Recognizer) -> Calibration:
         rows = tuple(one.take(chosen) for one in recognizer.views_)
         away = distances(recognizer.similarity_.log_average(rows, recognizer.views_))
         away[np.arange(len(chosen)), chosen] = np.inf
-        blocks.append(_Block(away[:, start : start + count].copy(), chosen - start))
+        blocks.append(ClassDistances(away[:, start : start + count].copy(), chosen - start))
         away[:, start : start + count] = np.inf
         impostors.append(away.min(axis=1))
-    typical = _REACH * float(np.median(np.concatenate(impostors))) * math.sqrt(math.pi / 4 / math.log(20))
-    known = {int(size): _scored(blocks, int(size), typical) for size in np.unique(counts)}
+    typical = typical_scale(np.concatenate(impostors))
+    known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
     scales = np.array([known[int(size)][0][c] for c, size in enumerate(counts)])
     own = tuple(block.nearest(int(size))[0] / s for block, size, s in zip(blocks, counts, scales, strict=True))
     empty = np.empty(0)
@@ -109,8 +109,13 @@ def calibrate(recognizer: Recognizer) -> Calibration:
     )
 
 
+def typical_scale(impostors: Array) -> float:
+    """The scale of classes shown once, from distances of demonstrations to the nearest other class."""
+    return _REACH * float(np.median(impostors)) * math.sqrt(math.pi / 4 / math.log(20))
+
+
 @dataclass(frozen=True, eq=False)
-class _Block:
+class ClassDistances:
     """Distances (k, n) of k calibrating demonstrations, at `places`, to the n demonstrations of their class."""
 
     distances: Array
@@ -132,7 +137,7 @@ class _Block:
         return np.where(np.isfinite(without), without, np.nan)
 
 
-def _scored(blocks: list[_Block], size: int, typical: float) -> tuple[Array, Array]:
+def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> tuple[Array, Array]:
     """Scales of all classes and scores of all demonstrations, each seeing `size` others of its class at most."""
     several = [block for block in blocks if len(block.distances) > 1]
     if not several:

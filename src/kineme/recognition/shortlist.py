@@ -64,6 +64,20 @@ class Stored:
         every = [log_bounds(similarity, asked, block) for block in self.codes]
         return np.asarray(np.concatenate(every, axis=1)[:, self.members])
 
+    def codes_at(self, rows: Rows) -> tuple[Code, ...]:
+        """Codes of some rows, in their order."""
+        ends = np.cumsum([len(block[0].values) for block in self.codes])
+        which = np.searchsorted(ends, rows, side="right")
+        order = np.argsort(np.argsort(which, kind="stable"))
+        parts = [
+            tuple(code.take(rows[which == b] - (ends[b - 1] if b else 0)) for code in block)
+            for b, block in enumerate(self.codes)
+        ]
+        return tuple(
+            Code(*(np.concatenate(fields)[order] for fields in zip(*same, strict=True)))
+            for same in zip(*parts, strict=True)
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Shortlist:
