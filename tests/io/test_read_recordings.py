@@ -126,7 +126,7 @@ def test_a_file_cut_or_altered_anywhere_gives_a_movement_or_a_problem(tmp_path, 
     whole, rng = path.read_bytes(), np.random.default_rng(5)
     for trial in range(60):
         damaged = bytearray(whole[: rng.integers(len(whole))] if trial % 2 else whole)
-        for place in rng.integers(max(1, min(len(damaged), 2000)), size=4 if len(damaged) else 0):
+        for place in rng.integers(max(1, min(len(damaged), 2000)), size=4 if damaged else 0):
             damaged[place] = rng.integers(256)
         path.write_bytes(damaged)
         try:

@@ -16,7 +16,6 @@ from kineme.io.formats import FORMATS, Format
 from kineme.io.found import Block, Detected, Problem
 from kineme.io.layout import Layout
 
-
 #: What readers raise on a file that is not what its name says; nested too deep and too large for the memory included.
 _UNREADABLE = (
     KinemeError,
