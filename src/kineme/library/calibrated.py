@@ -1,0 +1,77 @@
+"""The comparison of a large library: widths, weights, calibration, from samples; the last is kept in a cache."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zipfile
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kineme.io.atomic import write_atomically
+from kineme.library import read
+from kineme.library.store import Store
+from kineme.recognition.conformal import Calibration
+from kineme.recognition.recognizer import Recognizer
+from kineme.recognition.sampled_calibration import calibrate_sample
+from kineme.recognition.shortlist import Stored
+
+if TYPE_CHECKING:
+    from kineme.library.serving import Members
+
+FILE = "calibration.cache"
+
+_FORMAT = "1"
+_SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
+
+
+def sample_recognizer(store: Store, members: Members) -> Recognizer:
+    """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
+    chosen = np.unique(np.linspace(0, len(members.ids) - 1, _SAMPLE).astype(int))
+    demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
+    recognizer = store.specification.recognizer().set_params(classifier="nearest")
+    return recognizer.fit(demos, members.labels[chosen])
+
+
+def calibrate(store: Store, members: Members, recognizer: Recognizer, stored: Stored) -> Calibration:
+    """The calibration of a recognizer on all members, taken from the cache if that is of the same ones."""
+    path, key = store.folder / FILE, _key(store, members)
+    try:
+        return _unpacked(path.read_bytes(), key)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        made = calibrate_sample(recognizer, stored)
+    if not store.read_only:
+        with suppress(OSError):  # no room, no permission: it is made again next time
+            write_atomically(path, _packed(made, key))
+    return made
+
+
+def _key(store: Store, members: Members) -> str:
+    """Changes with the library, its specification, and which movement shows which symbol."""
+    text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
+    digest = hashlib.sha256("\0".join(text).encode())
+    digest.update(members.ids.tobytes() + members.first.tobytes())
+    return digest.hexdigest()
+
+
+def _packed(calibration: Calibration, key: str) -> bytes:
+    pooled = {id(one): one for one in calibration.pooled}  # classes of one size share theirs
+    numbers = {name: k for k, name in enumerate(pooled)}
+    arrays: dict[str, Any] = {f"pooled {k}": one for k, one in enumerate(pooled.values())}
+    arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
+    arrays |= {"own": np.concatenate(calibration.own), "ends": np.cumsum([len(one) for one in calibration.own])}
+    file = io.BytesIO()
+    np.savez(file, key=np.array(key), scales=calibration.scales, **arrays)
+    return file.getvalue()
+
+
+def _unpacked(data: bytes, key: str) -> Calibration:
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        if str(arrays["key"]) != key:
+            raise ValueError("of other members")
+        which = arrays["which"]
+        pooled = [arrays[f"pooled {k}"] for k in range(int(which.max()) + 1)]
+        own = tuple(np.split(arrays["own"], arrays["ends"][:-1]))
+        return Calibration(arrays["scales"], own, tuple(pooled[k] for k in which))
