@@ -9,7 +9,7 @@ from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.read import as_ids
-from kineme.library.rows import Row, among, listed, next_key, retire, select
+from kineme.library.rows import Row, among, listed, next_key, select
 from kineme.library.schema import COLUMNS
 from kineme.library.store import NOW, Change, Store
 from kineme.library.symbols import HOW, check_name, join, make, state_of
@@ -45,7 +45,7 @@ def delete_symbol(store: Store, who: str) -> None:
     with store.writing("delete", {"symbol": who}) as change:
         state = state_of(change.connection, who, NOW)
         _leave(change, "symbol = :key", {"key": state[1]})
-        retire(change.connection, "symbol_state", [state], change.version)
+        change.retire("symbol_state", [state])
 
 
 def delete_movements(store: Store, ids: Any) -> None:
@@ -58,7 +58,7 @@ def delete_movements(store: Store, ids: Any) -> None:
         for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys):
             _replace_state(change, state, prototype=None)
         gone = select(change.connection, "movement", f"removed IS NULL AND {among('id')}", keys)
-        retire(change.connection, "movement", gone, change.version)
+        change.retire("movement", gone)
 
 
 def merge(store: Store, names: Sequence[str], into: str) -> None:
@@ -85,7 +85,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> None:
         for state in merged:
             members = _leave(change, "symbol = :key", {"key": state[1]})
             _rejoin(change, members, key)
-            retire(change.connection, "symbol_state", [state], change.version)
+            change.retire("symbol_state", [state])
 
 
 def split(store: Store, name: str, ids: Any, new: str) -> None:
@@ -126,7 +126,7 @@ def release(store: Store, ids: Any) -> None:
 
 def _replace_state(change: Change, state: Row, **values: Any) -> None:
     """The same symbol with other values from this version on."""
-    retire(change.connection, "symbol_state", [state], change.version)
+    change.retire("symbol_state", [state])
     record = dict(zip(_STATE, state, strict=True)) | values
     record |= {"id": next_key(change.connection, "symbol_state"), "added": change.version, "removed": None}
     change.insert("symbol_state", [tuple(record[name] for name in _STATE)])
@@ -135,7 +135,7 @@ def _replace_state(change: Change, state: Row, **values: Any) -> None:
 def _leave(change: Change, where: str, parameters: dict[str, Any]) -> list[Row]:
     """End memberships; gives the rows that were ended."""
     rows = select(change.connection, "member", f"removed IS NULL AND {where}", parameters)
-    retire(change.connection, "member", rows, change.version)
+    change.retire("member", rows)
     return rows
 
 

@@ -37,4 +37,4 @@ def history(store: Store) -> tuple[Version, ...]:
     """Every change up to the version shown, the first one first."""
     with store.reading() as connection:
         rows = select(connection, "version", "id <= :v", {"v": store.as_of})
-    return tuple(Version(key, at, action, json.loads(detail)) for key, at, action, detail in rows)
+    return tuple(Version(key, at, action, json.loads(detail)) for key, at, action, detail, *_ in rows)

@@ -197,7 +197,7 @@ class ActionLibrary:
         return symbols.symbol(self.store, who)
 
     def __contains__(self, who: object) -> bool:
-        return any(who in (symbol.name, symbol.id) for symbol in self.symbols())
+        return symbols.exists(self.store, who)
 
     def history(self) -> tuple[Version, ...]:
         """Every change, the first one first."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -23,23 +24,32 @@ _ROWS = 4096  # fetched at a time
 
 def all_ids(store: Store) -> Ids:
     """Ids of all movements, ascending."""
-    return _column(store, f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id")
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        query = f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id"
+        return _column(connection, query, moment.version, moment.movements)
 
 
 def unlabeled_ids(store: Store) -> Ids:
     """Ids of the movements that show no symbol, ascending."""
     members = f"SELECT movement FROM member WHERE {ALIVE}"
-    return _column(store, f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id")
+    query = f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id"
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        return _column(connection, query, moment.version, moment.movements - moment.members)
 
 
 def count(store: Store) -> int:
     """Number of movements."""
-    return int(_column(store, f"SELECT count(*) FROM movement WHERE {ALIVE}")[0])
-
-
-def _column(store: Store, query: str) -> Ids:
     with store.reading() as connection:
-        return np.array([key for (key,) in connection.execute(query, {"v": store.as_of})], dtype=np.int64)
+        return store.moment(connection).movements
+
+
+def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
+    found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
+    if len(found) != expected:
+        raise damaged("movement", (f"(expected {expected} rows, got {len(found)})",))
+    return found
 
 
 def as_ids(store: Store, ids: Any) -> Ids:
@@ -57,6 +67,12 @@ def as_ids(store: Store, ids: Any) -> Ids:
         query = f"SELECT id FROM movement WHERE {ALIVE} AND {among('id')}"
         rows = connection.execute(query, {"v": store.as_of, "keys": listed(wanted)})
         missing = np.setdiff1d(wanted, [key for (key,) in rows])
+        for table in ("raw", "feature"):  # these have no removed rows: the movement must be there, if not alive
+            query = (
+                f"SELECT movement FROM {table} WHERE {among('movement')} AND movement NOT IN (SELECT id FROM movement)"
+            )
+            for row in connection.execute(query, {"keys": listed(missing)}) if len(missing) else ():
+                raise damaged("movement", row)
     if len(missing):
         raise SpecificationError(
             f"expected ids of movements in the library, got {missing[0]}, which is not there "
@@ -143,6 +159,8 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
     with store.reading() as connection:
         names = {state[1]: state[2] for state in select(connection, "symbol_state", ALIVE, {"v": store.as_of})}
         members = select(connection, "member", f"{among('movement')} AND {ALIVE}", keys)
+    if lost := {row[2] for row in members} - names.keys():
+        raise damaged("symbol", (min(lost),))
     found = {row[1]: names[row[2]] for row in members}
     return [found.get(key) for key in ids.tolist()]
 

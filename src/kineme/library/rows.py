@@ -83,8 +83,8 @@ def listed(values: Iterable[Any]) -> str:
 def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], version: int) -> None:
     """Mark rows, whose last column is ``removed``, as removed from `version` on."""
     gone = [(*row[:-1], version) for row in rows]
-    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ? AND removed IS NULL"
-    connection.executemany(statement, ((version, seal(table, row), row[0]) for row in gone))
+    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ?"
+    connection.executemany(statement, [(version, seal(table, row), row[0]) for row in gone])
 
 
 def next_key(connection: sqlite3.Connection, table: str) -> int:

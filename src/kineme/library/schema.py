@@ -13,7 +13,7 @@ PAGE_SIZE = 32768  # a row of features fills a seventh of it or less, so little 
 #: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
 COLUMNS: dict[str, tuple[str, ...]] = {
     "meta": ("key", "value"),
-    "version": ("id", "at", "action", "detail"),
+    "version": ("id", "at", "action", "detail", "movements", "members", "symbols"),
     "source": ("id", "path", "sha256", "size", "read_at", "kind", "options", "added"),
     "movement": (
         "id", "source", "place", "digest", "name", "label", "n_samples", "t0", "duration", "added", "removed",
@@ -31,11 +31,15 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 #: Tables of a key and bytes, one row per movement.
 BLOBS = ("raw", "primitive", "feature")
 
+#: Tables whose rows are alive or removed; each version says how many are alive, in columns of these names.
+COUNTED = {"movement": "movements", "member": "members", "symbol_state": "symbols"}
+
 #: What makes an empty file a library. Columns carry the type and the meaning of `COLUMNS`.
 CREATE = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
     """CREATE TABLE version (
-        id INTEGER PRIMARY KEY, at TEXT NOT NULL, action TEXT NOT NULL, detail TEXT NOT NULL, crc INTEGER NOT NULL)""",
+        id INTEGER PRIMARY KEY, at TEXT NOT NULL, action TEXT NOT NULL, detail TEXT NOT NULL,
+        movements INTEGER NOT NULL, members INTEGER NOT NULL, symbols INTEGER NOT NULL, crc INTEGER NOT NULL)""",
     """CREATE TABLE source (
         id INTEGER PRIMARY KEY, path TEXT NOT NULL, sha256 TEXT NOT NULL, size INTEGER NOT NULL, read_at TEXT NOT NULL,
         kind TEXT NOT NULL, options TEXT NOT NULL, added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
@@ -68,7 +72,6 @@ CREATE = (
     "CREATE UNIQUE INDEX symbol_name ON symbol_state (name) WHERE removed IS NULL",
     "CREATE UNIQUE INDEX symbol_now ON symbol_state (symbol) WHERE removed IS NULL",
     "CREATE UNIQUE INDEX member_now ON member (movement) WHERE removed IS NULL",
-    "CREATE INDEX member_symbol ON member (symbol)",
     "CREATE INDEX source_sha256 ON source (sha256)",
 )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -16,11 +16,21 @@ from typing import Any
 from kineme.errors import DataError, SpecificationError
 from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
-from kineme.library.rows import Row, damaged, insert, select
-from kineme.library.schema import SCHEMA_VERSION
+from kineme.library.rows import Row, damaged, insert, retire, select
+from kineme.library.schema import COUNTED, SCHEMA_VERSION
 from kineme.library.specification import Specification
 
 NOW = (1 << 62) - 1  # later than every version: what is there now
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A version, and how many rows are alive at it: by that count, rows that damage has hidden are missed."""
+
+    version: int
+    movements: int = 0
+    members: int = 0
+    symbols: int = 0
 
 
 @dataclass(frozen=True)
@@ -29,10 +39,21 @@ class Change:
 
     connection: sqlite3.Connection
     version: int
+    counts: dict[str, int]
 
-    def insert(self, table: str, rows: list[Row]) -> None:
+    def insert(self, table: str, rows: Sequence[Row]) -> None:
         """Add rows to a table."""
         insert(self.connection, table, rows)
+        self._count(table, len(rows))
+
+    def retire(self, table: str, rows: Sequence[Row]) -> None:
+        """Remove rows, as they were selected, from this version on."""
+        retire(self.connection, table, rows, self.version)
+        self._count(table, -len(rows))
+
+    def _count(self, table: str, more: int) -> None:
+        if table in COUNTED:
+            self.counts[COUNTED[table]] += more
 
 
 class Store:
@@ -101,10 +122,14 @@ class Store:
 
     def _checked_meta(self) -> dict[str, str]:
         """What the library says of itself, once the definitions of its tables have been found undamaged."""
-        meta: dict[str, str] = dict(select(self._reader, "meta"))
-        if meta.get("schema") != schema_seal(self._reader):
-            raise damaged("sqlite_master", ("of definitions",))
-        return meta
+        try:
+            meta: dict[str, str] = dict(select(self._reader, "meta"))
+            if meta.get("schema") == schema_seal(self._reader):
+                return meta
+        except sqlite3.OperationalError as error:
+            if "no such" not in str(error):  # table or column
+                raise
+        raise damaged("sqlite_master", ("of definitions",))
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
@@ -138,6 +163,16 @@ class Store:
         with in_plain_words(self.path, self.wait):
             yield self._reader
 
+    def moment(self, connection: sqlite3.Connection) -> Moment:
+        """The version that is shown, which stays the same while others are added."""
+        last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": self.as_of}).fetchone()[0]
+        if last is None:
+            return Moment(0)
+        rows = select(connection, "version", "id = :last", {"last": last})
+        if not rows:
+            raise damaged("version", (last,))
+        return Moment(last, *rows[0][4:])
+
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
         """One transaction, which becomes one version; put what is worth telling into `detail` before it ends.
@@ -157,11 +192,14 @@ class Store:
             if self._writer is None:
                 self._writer = connect(self.path, "rw", self.wait)
             with transaction(self._writer):
-                version = int(self._writer.execute("SELECT coalesce(max(id), 0) + 1 FROM version").fetchone()[0])
-                yield Change(self._writer, version)
+                last = self.moment(self._writer)
+                change = Change(
+                    self._writer, last.version + 1, {name: getattr(last, name) for name in COUNTED.values()}
+                )
+                yield change
                 at = datetime.now(UTC).isoformat(timespec="milliseconds")
                 text = json.dumps(detail, ensure_ascii=False)
-                insert(self._writer, "version", [(version, at, action, text)])
+                insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
 
     def _check_that_it_is_there(self) -> None:
         """A deleted file can still be written to, and would take the writes with it."""

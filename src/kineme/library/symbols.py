@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, listed, next_key, select
+from kineme.library.rows import ALIVE, Row, among, damaged, listed, next_key, select
 from kineme.library.schema import COLUMNS
-from kineme.library.store import Change, Store
+from kineme.library.store import Change, Moment, Store
 
 #: How a movement came to its symbol.
 HOW = ("label", "anchored", "recognized")
@@ -63,15 +63,27 @@ class Symbol:
 def symbols(store: Store) -> tuple[Symbol, ...]:
     """All symbols, by name."""
     with store.reading() as connection:
-        states = select(connection, "symbol_state", ALIVE, {"v": store.as_of})
-        return tuple(sorted(_with_members(connection, store.as_of, states), key=lambda symbol: symbol.name))
+        moment = store.moment(connection)
+        states = select(connection, "symbol_state", ALIVE, {"v": moment.version})
+        if len(states) != moment.symbols:
+            raise damaged("symbol_state", (f"(expected {moment.symbols} rows, got {len(states)})",))
+        return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
 def symbol(store: Store, who: str) -> Symbol:
     """The symbol of that name or id."""
     with store.reading() as connection:
-        state = state_of(connection, who, store.as_of)
-        return _with_members(connection, store.as_of, [state])[0]
+        moment = store.moment(connection)
+        return _with_members(connection, moment, [state_of(connection, who, moment.version)])[0]
+
+
+def exists(store: Store, who: object) -> bool:
+    """Whether there is a symbol of that name or id."""
+    try:
+        with store.reading() as connection:
+            return bool(state_of(connection, str(who), store.as_of))
+    except SpecificationError:
+        return False
 
 
 def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
@@ -95,31 +107,36 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {known}")
 
 
-def _with_members(connection: sqlite3.Connection, version: int, states: Sequence[Row]) -> list[Symbol]:
+def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
     records = [dict(zip(COLUMNS["symbol_state"], row, strict=True)) for row in states]
     keys = [record["symbol"] for record in records]
-    named = {
+    about = {
         key: (name, made) for key, name, made in select(connection, "symbol", among("key"), {"keys": listed(keys)})
     }
-    members = _members(connection, keys, version)
+    if lost := set(keys) - about.keys():
+        raise damaged("symbol", (min(lost),))
+    members = _members(connection, keys, moment)
     return [
         Symbol(
-            named[record["symbol"]][0],
+            about[record["symbol"]][0],
             record["name"],
             record["description"],
             members[record["symbol"]],
             record["prototype"],
             record["threshold"],
             tuple(json.loads(record["parents"])),
-            named[record["symbol"]][1],
+            about[record["symbol"]][1],
             record["added"],
         )
         for record in records
     ]
 
 
-def _members(connection: sqlite3.Connection, keys: list[int], version: int) -> dict[int, NDArray[np.int64]]:
-    rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": version})
+def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
+    rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
+    n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
+    if n != moment.members:
+        raise damaged("member", (f"(expected {moment.members} rows, got {n})",))
     table = np.array([(row[2], row[1]) for row in rows], dtype=np.int64).reshape(-1, 2)
     table = table[np.lexsort((table[:, 1], table[:, 0]))]
     table.setflags(write=False)

@@ -1,0 +1,108 @@
+"""A library as one file, and back, bit for bit."""
+
+from __future__ import annotations
+
+import re
+import shutil
+
+import pytest
+from library_samples import contents, draw_movements, tables
+
+from kineme import ActionLibrary, DataError
+from kineme.library.connection import FILE
+
+
+@pytest.fixture(scope="module")
+def eventful(tmp_path_factory):
+    """A library with a past: every table has rows, some of them removed."""
+    folder = tmp_path_factory.mktemp("origin") / "actions"
+    with ActionLibrary(folder, create=True) as library:
+        library.learn(draw_movements(12, ragged=True, labels=["wave", "nod", "bow"] * 4))
+        library.rename("wave", "naïve 'wave'; --")
+        library.merge(["nod", "bow"], "head")
+        library.split("head", library["head"].members[:2], "tilt")
+        library.describe("tilt", "to the side", prototype=int(library["tilt"].members[0]), threshold=0.25)
+        library.delete([4, 5])
+    return folder
+
+
+def test_every_row_of_every_table_comes_back(eventful, tmp_path):
+    with ActionLibrary(eventful) as library:
+        assert library.export(tmp_path / "one.kineme") == tmp_path / "one.kineme"
+        expected = contents(library)
+        with ActionLibrary.import_(tmp_path / "one.kineme", tmp_path / "copy") as copy:
+            assert contents(copy) == expected
+            assert tables(tmp_path / "copy") == tables(eventful)
+            assert copy.verify() == []
+            for version in range(library.version + 1):
+                with library.at(version) as then, copy.at(version) as copied:
+                    assert contents(copied) == contents(then)
+
+
+def test_an_export_of_an_import_is_the_same_file(eventful, tmp_path):
+    with ActionLibrary(eventful, read_only=True) as library:
+        library.export(tmp_path / "one")
+    with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy") as copy:
+        copy.export(tmp_path / "two")
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["copy", "one", "two"]
+
+
+def test_an_imported_library_is_a_library_like_any_other(eventful, tmp_path):
+    with ActionLibrary(eventful) as library:
+        library.export(tmp_path / "one")
+    with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy", wait=0.5) as copy:
+        assert copy.learn(draw_movements(12, ragged=True)).known == 10  # two were deleted
+        copy.rename("tilt", "lean")
+    with ActionLibrary(eventful) as library:
+        assert "tilt" in library
+        assert "lean" not in library
+
+
+def test_an_export_holds_what_was_committed_when_it_began(eventful, tmp_path):
+    shutil.copytree(eventful, tmp_path / "actions")
+    with ActionLibrary(tmp_path / "actions") as library, library.store.writing("note") as change:
+        change.connection.execute("DELETE FROM member")
+        library.export(tmp_path / "one")
+        change.connection.rollback()
+        change.connection.execute("BEGIN")
+    with ActionLibrary.import_(tmp_path / "one", tmp_path / "copy") as copy:
+        assert len(copy["head"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda data: data[: len(data) // 2], r"damaged bytes"),
+        (
+            lambda data: data.replace(b"to the side", b"to the left"),
+            r"\(2 problems, the first: row 5 of table version: damaged bytes\); nothing was imported: export it again",
+        ),
+        (lambda data: b"not a database" * 100, r"to be a library, got a file that is no database"),
+        (lambda data: b"", r"got another program's database"),
+    ],
+)
+def test_a_spoiled_export_is_not_imported(eventful, tmp_path, spoil, message):
+    with ActionLibrary(eventful) as library:
+        library.export(tmp_path / "one")
+    (tmp_path / "two").write_bytes(spoil((tmp_path / "one").read_bytes()))
+    with pytest.raises(DataError, match=message):
+        ActionLibrary.import_(tmp_path / "two", tmp_path / "copy")
+    assert list((tmp_path / "copy").iterdir()) == []
+
+
+def test_nothing_is_overwritten(eventful, tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    with ActionLibrary(eventful) as library:
+        with pytest.raises(DataError, match=rf"expected a new file, but {re.escape(str(tmp_path))}/taken is there"):
+            library.export(tmp_path / "taken")
+        with pytest.raises(DataError, match=r"expected a folder .*nowhere to write one into, there is none; create it"):
+            library.export(tmp_path / "nowhere" / "one")
+        library.export(tmp_path / "one")
+    before = (eventful / FILE).read_bytes()
+    with pytest.raises(DataError, match=rf"expected a new file, but .*{FILE} is there already; choose another"):
+        ActionLibrary.import_(tmp_path / "one", eventful)
+    with pytest.raises(DataError, match=r"expected an exported library at .*three, found no file there"):
+        ActionLibrary.import_(tmp_path / "three", tmp_path / "copy")
+    assert (eventful / FILE).read_bytes() == before
+    assert (tmp_path / "taken").read_text() == "mine"
