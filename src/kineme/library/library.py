@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from kineme.library.anchor import LibraryProposals
     from kineme.library.history import Version
     from kineme.library.learn import LearnReport
+    from kineme.library.serving import Serving
     from kineme.library.source import Source
     from kineme.library.symbols import Symbol
     from kineme.library.verify import Problem
@@ -198,6 +200,40 @@ class ActionLibrary:
 
     def __contains__(self, who: object) -> bool:
         return symbols.exists(self.store, who)
+
+    def recognize(self, movements: Any, error_rate: float = 0.05) -> Any:
+        """What each movement is, or that it is unknown; labels are names of symbols.
+
+        Up to 2000 movements that show a symbol, all are compared as `kineme.Recognizer` does. Above, few are, chosen by
+        short codes of all: the label is the same, and p-values are given for the 64 symbols that come closest. The
+        first answer after a change takes longer; what it prepares is kept beside the database unless `read_only`.
+
+        Parameters
+        ----------
+        movements : one movement or many
+            A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
+        error_rate : float, default 0.05
+            Share of true movements that may be called unknown. See `kineme.recognition.conformal.Calibration`.
+
+        Returns
+        -------
+        Answer, or list of Answer for many movements
+            ``nearest[k].index`` is the id of a movement.
+
+        Raises
+        ------
+        SpecificationError
+            No movement shows a symbol, or there is only one movement.
+        TrajectoryError
+            Movements of another number of dimensions.
+        """
+        return self._serving.recognize(movements, error_rate)
+
+    @cached_property
+    def _serving(self) -> Serving:
+        from kineme.library.serving import Serving
+
+        return Serving(self.store)
 
     def history(self) -> tuple[Version, ...]:
         """Every change, the first one first."""
