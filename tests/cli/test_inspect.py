@@ -1,0 +1,108 @@
+"""``kineme inspect`` as a user runs it, on real recordings."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+import kineme
+from kineme.io.movements import write_movement
+
+PNG = b"\x89PNG\r\n"
+
+
+def run(*arguments, **options):
+    command = [sys.executable, "-W", "error", "-m", "kineme", "inspect", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, check=False, **options)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    for one in kineme.load_lasa(["CShape", "Snake"]):
+        (folder / one.label).mkdir(exist_ok=True)
+        write_movement(folder / one.label / f"{one.name}.csv", {"times": one.times, "positions": one.positions})
+    (folder / "Snake" / "bad.csv").write_text("time,x,y\n0,1,2\n1,oops,3\n")
+    return folder
+
+
+def test_a_folder_in_words_and_as_a_picture(folder, tmp_path):
+    done = run(folder, "--plot", tmp_path / "out.png")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == b""  # no progress bar where there is no terminal
+    text = done.stdout.decode()
+    assert text.startswith("14 movements of 2 dimensions in 14 files")
+    assert "Snake/bad.csv, line 3: expected a number in 'x', got 'oops'" in text
+    assert (tmp_path / "out.png").read_bytes().startswith(PNG)
+
+
+def test_a_folder_as_data(folder):
+    done = run(folder, "--json")
+    data = json.loads(done.stdout)
+    assert [(one["label"], one["movements"]) for one in data["labels"]] == [("CShape", 7), ("Snake", 7)]
+    assert data["problems"] == [
+        {"file": "Snake/bad.csv", "line": 3, "reason": "expected a number in 'x', got 'oops'"},
+    ]
+    (how,) = data["detected"]
+    assert (how["time"], how["units"], how["columns"], how["files"]) == ("time", "s", ["x", "y"], 14)
+
+
+def test_a_table_from_the_standard_input_with_columns_named():
+    rows = "".join(f"a;{k * 20};{k};{-k}\n" for k in range(9))
+    options = ("--time", "clock", "--columns", "y, x", "--label-column", "what", "--units", "ms", "--json")
+    done = run("-", *options, input=f"what;clock;x;y\n{rows}".encode())
+    data = json.loads(done.stdout)
+    assert data["detected"][0] | {"columns": ["y", "x"], "units": "ms", "units_from": "given"} == data["detected"][0]
+    assert data["labels"][0]["rate"]["median"] == pytest.approx(50)
+    assert data["labels"][0]["label"] == "a"
+
+
+def test_samples_may_be_left_out_alone_and_units_be_a_number():
+    rows = "".join(f"{k},{'' if k == 3 else k},{k}\n" for k in range(9))
+    done = run("-", "--skip", "sample", "--units", "0.01", "--json", input=f"time,x,y\n{rows}".encode())
+    data = json.loads(done.stdout)
+    assert data["labels"][0]["samples"]["median"] == 8
+    assert data["labels"][0]["rate"]["median"] == pytest.approx(100)
+    assert data["problems"][0]["line"] == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "data", "words"),
+    [
+        (["nowhere"], b"", "kineme: expected a file or folder of recordings, found nothing at 'nowhere'"),
+        (["-"], b"", "kineme: expected recordings in standard input.csv, found none; 1 could not be read"),
+        (["-", "--columns", "z"], b"time,x\n0,1\n", r"expected a column 'z', got the columns ['time', 'x']"),
+        (["-", "--units", "h"], b"time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
+        (["-", "--plot", "a.gif"], b"0 1\n1 2\n2 3\n3 4\n", "kineme: expected a picture ending in one of png"),
+    ],
+)
+def test_a_failure_is_one_clear_line_and_a_status(arguments, data, words, tmp_path):
+    done = run(*arguments, input=data, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stdout == b""
+    assert words in done.stderr.decode()
+    assert done.stderr.count(b"\n") == 1
+
+
+def test_names_cannot_command_the_terminal(tmp_path):
+    label = "a\x1b[31m$(b)"
+    rows = "".join(f"{label},{k},{k}\n" for k in range(5))
+    done = run("-", input=f"label,time,x\n{rows}".encode())
+    assert b"\x1b" not in done.stdout
+    assert rb"a\x1b[31m$(b)" in done.stdout
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are those of POSIX systems")
+def test_progress_is_shown_on_a_terminal(folder):
+    ours, theirs = os.openpty()
+    command = [sys.executable, "-m", "kineme", "inspect", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs) as process:
+        os.close(theirs)
+        out = process.stdout.read()
+    seen = os.read(ours, 10_000)
+    os.close(ours)
+    assert out.startswith(b"14 movements")
+    assert b"reading" in seen
+    assert b"/15" in seen
