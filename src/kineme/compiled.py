@@ -22,8 +22,16 @@ _REPAYS_IMPORT = 100_000_000
 _REPAYS_CALL = 10_000
 
 
-def use_compiled(n_operations: int) -> bool:
-    """Whether a job of about `n_operations` elementary operations should run compiled."""
+_spent = 0  # elementary operations of jobs that ran plain so far
+
+
+def use_compiled(n_operations: int, now: int | None = None) -> bool:
+    """Whether a job of about `n_operations` elementary operations should run compiled.
+
+    Numba is imported for a job that repays it, and also once as much time went into small jobs: whoever comes again
+    and again waits at most twice as long as if that had been known. `now` is the part of the job that this call does.
+    """
+    global _spent  # noqa: PLW0603 - the history of the process is what decides
     choice = os.environ.get("KINEME_COMPILED", "auto")
     if choice not in CHOICES:
         raise SpecificationError(
@@ -32,7 +40,10 @@ def use_compiled(n_operations: int) -> bool:
         )
     if choice != "auto":
         return choice == "always"
-    return n_operations >= (_REPAYS_CALL if "numba" in sys.modules else _REPAYS_IMPORT)
+    if "numba" in sys.modules:
+        return n_operations >= _REPAYS_CALL
+    _spent += n_operations if now is None else now
+    return max(n_operations, _spent) >= _REPAYS_IMPORT
 
 
 def jit(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:

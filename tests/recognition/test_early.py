@@ -12,6 +12,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.recognition.early import cut, earliness, partial_shares
 from kineme.recognition.hypotheses import Early
 from kineme.recognition.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
+from kineme.recognition.views import N_POINTS
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.smooth import Smooth
 
@@ -79,7 +80,7 @@ def test_a_straight_line_at_even_speed():
 
 
 def test_the_smoother_is_the_smoothing_spline():
-    x = np.cumsum(np.random.default_rng(1).normal(size=(200, 2)), axis=0)
+    x = np.cumsum(np.random.default_rng(1).normal(size=(N_POINTS, 2)), axis=0)
     spline = Smooth(10.0).apply(Demonstrations.from_arrays([x])).positions
     np.testing.assert_allclose(smoother(10.0) @ x, spline, atol=1e-8)
     np.testing.assert_allclose(smooth_paths(Demonstrations.from_arrays([x]), 10.0)[0].T, spline - spline[0], atol=1e-8)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, Resample, Smooth, SpecificationError, TrajectoryError, TrimRest, preprocess
+from kineme import DMP, Demonstrations, Resample, Smooth, SpecificationError, TrimRest, preprocess
 
 
 def _one(x, times=None):
@@ -86,12 +86,15 @@ def test_smoothing_brings_a_noisy_movement_nearer_to_the_clean_one(make_movement
     assert np.linalg.norm(smoothed - x) < 0.4 * np.linalg.norm(noisy - x)
 
 
-def test_smoothing_needs_five_samples():
-    four = Demonstrations.from_arrays([np.arange(9.0), np.arange(4.0)], names=["nine", "four"])
-    with pytest.raises(
-        TrajectoryError, match=r"trajectory 1 \('four'\): expected at least 5 samples to smooth, got 4; leave"
-    ):
-        preprocess(four, [Smooth()])
+@pytest.mark.parametrize("choice", ["always", "never"])
+def test_the_fewest_samples_are_smoothed_too(choice, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", choice)
+    x, h, cutoff = np.array([0.0, 1.0, -1.0, 0.5]), 1 / 3, 0.7
+    lam = 3 / (2 * np.pi * cutoff) ** 4
+    Q = np.array([[1, -2, 1, 0], [0, 1, -2, 1]]) / h
+    R = h * np.array([[2 / 3, 1 / 6], [1 / 6, 2 / 3]])
+    expected = x - lam * Q.T @ np.linalg.solve(R + lam * Q @ Q.T, Q @ x)
+    np.testing.assert_allclose(preprocess(_one(x), [Smooth(cutoff)]).positions[:, 0], expected, atol=1e-12)
 
 
 def _rested(x, before, after):

@@ -120,8 +120,9 @@ def _within(product: NDArray[np.complex128], max_angle: float) -> Array:
     if max_angle >= math.pi:
         return size
     # Re(product exp(-i angle)) is largest at the angle of the product, or at the end of the range next to it.
-    beyond = np.maximum(np.abs(np.angle(product)) - max_angle, 0.0)
-    return np.asarray(size * np.cos(beyond))
+    c, s = math.cos(max_angle), math.sin(max_angle)
+    at_end = c * product.real + s * np.abs(product.imag)
+    return np.where(product.real >= c * size, size, at_end)
 
 
 def _covariances(A: Array, B: Array) -> Array:

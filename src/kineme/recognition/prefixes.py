@@ -7,11 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.recognition.views import N_POINTS
+from kineme.recognition.views import N_POINTS, even_paths
 from kineme.trajectories.arc_length import arc_length_phase
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.preprocess import preprocess
-from kineme.trajectories.resample import relative_rows
 from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array
 
@@ -45,9 +43,8 @@ class Prefixes(NamedTuple):
 
 def smooth_paths(movements: Demonstrations, cutoff: float | None) -> Array:
     """Movements as the recognizer smooths them, minus their start, at even times, shape (n, d, T)."""
-    if cutoff is not None and movements.lengths.min() > 4:
-        movements = preprocess(movements, [Smooth(cutoff)])
-    return relative_rows(movements, 0, len(movements), N_POINTS)
+    paths = even_paths(movements, 0, len(movements), cutoff)
+    return paths - paths[:, :, :1]
 
 
 @lru_cache(maxsize=8)

@@ -22,7 +22,7 @@ from kineme.recognition.labels import check_labels
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
 from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
-from kineme.recognition.views import tile_movements, view
+from kineme.recognition.views import tile_movements, view, view_tile
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice, check_number
 
@@ -321,7 +321,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return math.pi / 3 if n_dims in (2, 3) else 0.0
 
     def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
-        seen = view(demos, self.looks(), Normalization(self.translation, self.scale), self.cutoff)
+        return self._prepared(view(demos, self.looks(), Normalization(self.translation, self.scale), self.cutoff))
+
+    def _prepared(self, seen: tuple[Array, ...]) -> tuple[Prepared, ...]:
         # Single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
         return tuple(self.procrustes_.prepare(block.astype(np.float32)) for block in seen)
 
@@ -332,10 +334,12 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def _scored(self, X: Any, classifier: Classifier) -> Array:
         """Scores (n, C), tile by tile: what is seen of a movement is compared before it leaves the core's cache."""
         demos = self._checked(X)
+        normalization = Normalization(self.translation, self.scale)
         scores = np.empty((len(demos), len(self.classes_)))
 
         def score(start: int, stop: int) -> None:
-            scores[start:stop] = classifier.scores(self, self._view(demos.between(start, stop)))
+            seen = view_tile(demos, start, stop, self.looks(), normalization, self.cutoff)
+            scores[start:stop] = classifier.scores(self, self._prepared(seen))
 
         for_tiles(score, len(demos), min(tile_movements(demos.n_dims), max(1, _TILE_PAIRS // len(self.labels_))))
         return scores

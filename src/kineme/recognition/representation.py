@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import encoder, forcing_matrix
 from kineme.recognition.normalization import Normalization
@@ -55,7 +53,8 @@ class Representation:
     def along(self, paths: Array) -> Array:
         """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
         if self.arc_share == 0:
-            return np.asarray(paths @ spline_matrix(paths.shape[2], self.n_points).T)
+            every, rest = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if rest == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
     def describe(self, along: Array, normalization: Normalization) -> Array:

@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import Representation
-from kineme.recognition.views import N_POINTS
+from kineme.recognition.views import even_paths
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.preprocess import preprocess
-from kineme.trajectories.resample import relative_rows
-from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array
 
 if TYPE_CHECKING:
@@ -86,8 +83,4 @@ def _fitted(recognizer: Recognizer, look: Representation, A: Demonstrations, B: 
 
 def _paths(demos: Demonstrations, cutoff: float | None) -> Array:
     """Smooth even paths (n, d, T), in the place where they were recorded."""
-    starts = demos.positions[demos.offsets[:-1]][:, :, None]
-    if cutoff is not None and demos.lengths.min() > 4:
-        demos = preprocess(demos, [Smooth(cutoff)])
-        starts = demos.positions[demos.offsets[:-1]][:, :, None]
-    return relative_rows(demos, 0, len(demos), N_POINTS) + starts
+    return even_paths(demos, 0, len(demos), cutoff) + demos.positions[demos.offsets[:-1]][:, :, None]

@@ -1,4 +1,4 @@
-"""Movements as a recognizer sees them: smoothed once, then one block of rows per representation."""
+"""Movements as a recognizer sees them: smooth paths, then one block of rows per representation."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from kineme.parallel import for_tiles
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import Representation
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.preprocess import preprocess
 from kineme.trajectories.resample import relative_rows
-from kineme.trajectories.smooth import Smooth
+from kineme.trajectories.smooth import smooth_rows
 from kineme.validation import Array
 
-_TILE_SAMPLES = 100_000  # numbers in one tile of paths
-N_POINTS = 200  # even samples between the recording and the phases
+_TILE_SAMPLES = 50_000  # numbers in one tile of paths: with what is made of them they stay in a core's cache
+N_POINTS = 199  # even samples between the recording and the phases; every second is one of 100
 
 
 def view(
@@ -25,21 +24,46 @@ def view(
 ) -> tuple[Array, ...]:
     """Smooth movements below `cutoff` cycles each, and describe them: rows (n, d * S) per representation."""
     demos = Demonstrations.of(movements)
-    if cutoff is not None and demos.lengths.min() > 4:
-        demos = preprocess(demos, [Smooth(cutoff)])
-    n, d = len(demos), demos.n_dims
-    rows = tuple(np.empty((n, d * one.n_points)) for one in representations)
+    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in representations)
 
-    def see(start: int, stop: int) -> None:
-        paths = relative_rows(demos, start, stop, N_POINTS)
-        if not normalization.translation:
-            paths = paths + demos.positions[demos.offsets[start:stop]][:, :, None]
-        along: dict[tuple[float, int], Array] = {}  # representations share their phases
-        for one, block in zip(representations, rows, strict=True):
-            phase = (one.arc_share, one.n_points)
-            if phase not in along:
-                along[phase] = one.along(paths)
-            block[start:stop] = one.describe(along[phase], normalization)
+    def fill(start: int, stop: int) -> None:
+        seen = view_tile(demos, start, stop, representations, normalization, cutoff)
+        for block, tile in zip(rows, seen, strict=True):
+            block[start:stop] = tile
 
-    for_tiles(see, n, max(1, _TILE_SAMPLES // (d * N_POINTS)))
+    for_tiles(fill, len(demos), tile_movements(demos.n_dims))
     return rows
+
+
+def view_tile(
+    demos: Demonstrations,
+    start: int,
+    stop: int,
+    representations: Sequence[Representation],
+    normalization: Normalization,
+    cutoff: float | None,
+) -> tuple[Array, ...]:
+    """The rows of movements start:stop."""
+    paths = even_paths(demos, start, stop, cutoff)
+    if not normalization.translation:
+        paths = paths + demos.positions[demos.offsets[start:stop]][:, :, None]
+    along: dict[tuple[float, int], Array] = {}  # representations share their phases
+    seen = []
+    for one in representations:
+        phase = (one.arc_share, one.n_points)
+        if phase not in along:
+            along[phase] = one.along(paths)
+        seen.append(one.describe(along[phase], normalization))
+    return tuple(seen)
+
+
+def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
+    """Movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T)."""
+    if cutoff is None:
+        return relative_rows(demos, start, stop, N_POINTS)
+    return smooth_rows(demos, start, stop, cutoff, N_POINTS)
+
+
+def tile_movements(n_dims: int) -> int:
+    """Movements of one tile."""
+    return max(1, _TILE_SAMPLES // (n_dims * N_POINTS))

@@ -203,8 +203,8 @@ def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
 def _locate(u, scale, interval, weights):  # type: ignore[no-untyped-def]
     """For each even target, its knot interval, and the weights there of both knots' positions and derivatives.
 
-    The parameter u starts at 0. Counting the knots at or below each target, then adding up, has no branch to mispredict: on irregular stamps it is
-    several times faster than walking along the knots.
+    The parameter u starts at 0. Counting the knots at or below each target, then adding up, has no branch to
+    mispredict: on irregular stamps it is several times faster than walking along the knots.
     """
     n_points, last = len(interval), len(u) - 1
     step = u[last] / (n_points - 1)

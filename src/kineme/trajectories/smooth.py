@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.compiled import use_compiled
-from kineme.errors import TrajectoryError
 from kineme.parallel import for_tiles
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.smoothing_spline import even_rows_of_spline, smoothing_spline
 from kineme.trajectories.spline import fits_lanes
-from kineme.validation import Array, check_number, describe
+from kineme.validation import Array, check_number
 
 _OPERATIONS_PER_SAMPLE = 30  # elementary operations that the banded solution costs per sample and dimension
 _TILE_MOVEMENTS = 256
-MIN_SMOOTHED = 5  # samples
 
 
 @dataclass(frozen=True)
@@ -46,26 +44,13 @@ class Smooth:
         check_number("cutoff", self.cutoff, above=0.0)
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
-        """The movements, smoothed.
-
-        Raises
-        ------
-        TrajectoryError
-            A movement of fewer than five samples.
-        """
-        lengths = demonstrations.lengths
-        if lengths.min() < MIN_SMOOTHED:
-            i = int(lengths.argmin())
-            raise TrajectoryError(
-                f"{describe(i, demonstrations.names)}: expected at least "
-                f"{MIN_SMOOTHED} samples to smooth, got {lengths[i]}; leave Smooth out or record faster"
-            )
+        """The movements, smoothed."""
         smoothed = np.empty_like(demonstrations.positions)
 
         def smooth_tile(start: int, stop: int) -> None:
             _fill_smoothed(demonstrations, start, stop, self.cutoff, smoothed)
 
-        for_tiles(smooth_tile, len(lengths), _TILE_MOVEMENTS)
+        for_tiles(smooth_tile, len(demonstrations), _TILE_MOVEMENTS)
         return replace(demonstrations.movements, positions=smoothed)
 
 
@@ -77,7 +62,7 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
     """
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.times, demonstrations.positions
-    if not _compiled(demonstrations):
+    if not _compiled(demonstrations, offsets):
         first, lengths = offsets[0], np.diff(offsets)
         smoothed, m = smoothing_spline(times, positions, offsets, scales)
         elapsed = times[first : offsets[-1]] - np.repeat(times[offsets[:-1]], lengths)
@@ -93,7 +78,7 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
     """Smooth movements start:stop at their own stamps."""
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.times, demonstrations.positions
-    if _compiled(demonstrations):
+    if _compiled(demonstrations, offsets):
         from kineme.trajectories._splines import fill_smoothed
 
         fill_smoothed(times, positions, offsets, scales, smoothed)
@@ -102,10 +87,12 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
     smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts
 
 
-def _compiled(demonstrations: Demonstrations) -> bool:
+def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:
     """Decided for all movements, though they come tile by tile."""
-    work = _OPERATIONS_PER_SAMPLE * demonstrations.positions.size
-    return fits_lanes(demonstrations.offsets) and use_compiled(work)
+    whole, now = demonstrations.positions.size, demonstrations.n_dims * int(offsets[-1] - offsets[0])
+    return fits_lanes(demonstrations.offsets) and use_compiled(
+        _OPERATIONS_PER_SAMPLE * whole, _OPERATIONS_PER_SAMPLE * now
+    )
 
 
 def _tile(demonstrations: Demonstrations, start: int, stop: int, cutoff: float) -> tuple[NDArray[np.intp], Array]:

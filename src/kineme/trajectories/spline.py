@@ -60,8 +60,11 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))
-    work = _OPERATIONS_PER_SAMPLE * positions.size  # of the whole block, though callers come tile by tile
-    if fits_lanes(offsets) and use_compiled(work):
+    # Decided for the whole block, though callers come tile by tile.
+    whole, now = (
+        _OPERATIONS_PER_SAMPLE * n_dims * n_samples for n_samples in (len(positions), offsets[-1] - offsets[0])
+    )
+    if fits_lanes(offsets) and use_compiled(whole, now):
         from kineme.trajectories._splines import fill_spline_rows
 
         fill_spline_rows(parameter, positions, offsets, rows)
