@@ -6,23 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-
-class Numbers(click.ParamType):  # type: ignore[type-arg]
-    """Numbers separated by commas: one per dimension."""
-
-    name = "x,y,..."
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
-        """Text as numbers."""
-        try:
-            return [float(part) for part in value.split(",")]
-        except ValueError:
-            self.fail(f"expected numbers separated by commas, as 0.4,0.2, got {value!r}", param, ctx)
+from kineme.cli.options import Numbers, SymbolName, json_option, library_option_of
+from kineme.cli.output import printable
 
 
 @click.command()
-@click.argument("source", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("source", type=SymbolName())
+@library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
 @click.option("--start", type=Numbers(), help="Where to start.  [default: as demonstrated]")
 @click.option("--goal", type=Numbers(), help="Where to go.  [default: as demonstrated]")
 @click.option("--duration", type=float, help="Seconds.  [default: as demonstrated]")
@@ -38,30 +30,59 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Keep the primitive in this .kineme file."
 )
 @click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), default="-", show_default=True,
-              help="A .csv, .npz or .json file; - for CSV on the screen.")  # fmt: skip
+              help="A .csv, .npz or .json file; - for the screen, as CSV or --json.")  # fmt: skip
+@json_option
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: a .png, .svg or .pdf file.")
 def generate(**options: Any) -> None:
-    """Generate a movement from SOURCE, a recording (.csv, .tsv, .txt, .npz, .json) or a saved primitive (.kineme).
+    """Generate a movement from SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
 
-    Example: kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
-    """
+    As in:
+
+    \b
+    kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
+    kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
+    """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.generation.generate import generate as make
-    from kineme.generation.generate import primitives_from
-    from kineme.primitives.dmp import DMP
 
-    source, output = options["source"], options["output"]
-    dmp = DMP(options["formulation"], n_basis=options["n_basis"], fit="trajectory")
-    primitives = primitives_from(source, dmp)
-    if options["index"] >= len(primitives):
-        raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")
-    primitive = primitives[options["index"]]
+    output = options["output"]
+    primitive = _primitive(options)
     wishes = _wishes(options)
     made = make(primitive, wishes)
     if options["save"]:
         primitive.save(options["save"])
     if options["plot"]:
         _plot(options["plot"], primitive, made, wishes.obstacles)
-    _write(output, made)
+    _write(output, made, ".json" if options["as_json"] else ".csv")
+
+
+def _primitive(options: dict[str, Any]) -> Any:
+    """A batch of one: of a symbol, a recording or a file of primitives."""
+    source = options["source"]
+    if _is_symbol(source, options["folder"]):
+        from kineme.library.grounding import primitive_of
+        from kineme.library.library import ActionLibrary
+
+        with ActionLibrary(options["folder"], read_only=True) as library:
+            return primitive_of(library, source)
+    from kineme.generation.generate import primitives_from
+    from kineme.primitives.dmp import DMP
+
+    if not Path(source).exists():
+        raise FileNotFoundError(
+            f"expected a recording or a saved primitive, found no file {printable(source)}; "
+            "for a symbol, name its --library"
+        )
+    dmp = DMP(options["formulation"], n_basis=options["n_basis"], fit="trajectory")
+    primitives = primitives_from(Path(source), dmp)
+    if options["index"] >= len(primitives):
+        raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")
+    return primitives[options["index"]]
+
+
+def _is_symbol(source: str, folder: Path | None) -> bool:
+    """A library on the command line means a symbol; one from the environment leaves files their names."""
+    given = click.get_current_context().get_parameter_source("folder")
+    return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 
 
 def _wishes(options: dict[str, Any]) -> Any:
@@ -89,10 +110,10 @@ def _plot(path: Path, primitive: Any, made: Any, obstacles: Any) -> None:
     save_figure(draw_movement(primitive, made, obstacles), path)
 
 
-def _write(output: Path, made: Any) -> None:
+def _write(output: Path, made: Any, ending: str) -> None:
     from kineme.io.movements import encode_movement, write_movement
 
     if str(output) == "-":
-        click.echo(encode_movement(made, ".csv"), nl=False)
+        click.echo(encode_movement(made, ending), nl=False)
     else:
         write_movement(output, made)

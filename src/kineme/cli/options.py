@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +47,13 @@ def _names(folder: Path) -> list[str]:
         return [symbol.name for symbol in library.symbols()]
 
 
-library_option = click.option(
-    "--library", "-l", "folder", required=True, envvar="KINEME_LIBRARY", is_eager=True, show_envvar=True,
-    type=click.Path(file_okay=False, path_type=Path), help="Folder of the action library.",
-)  # fmt: skip
+def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
+    """The option ``--library``, also from the environment."""
+    return click.option(
+        "--library", "-l", "folder", required=required, envvar="KINEME_LIBRARY", is_eager=True, show_envvar=True,
+        type=click.Path(file_okay=False, path_type=Path), help=words,
+    )  # fmt: skip
+
+
+library_option = library_option_of(required=True, words="Folder of the action library.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")
