@@ -50,7 +50,7 @@ def propose(
         Whose representations, invariances and mean to take; it need not be fitted.
     max_clustered : int, optional
         More movements than this are clustered by a spread sample of so many, and the others join their nearest sampled
-        movement if it is within the radius of its kind, else they are left over. By default 5000, in space 1500.
+        movement if it is within the radius of its kind, else they are left over. By default 5000, in space 800.
 
     Returns
     -------

@@ -19,7 +19,7 @@ _TILE = 20_000  # movements at a time
 
 def largest_clustered(n_dims: int) -> int:
     """Movements that are all compared with each other by default; in space a pair costs a decomposition."""
-    return 1500 if n_dims == 3 else 5000
+    return 800 if n_dims == 3 else 5000
 
 
 def spread_sample(seen: Seen, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import cut_tree, fcluster, linkage
+from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from kineme.validation import Array
@@ -22,10 +22,10 @@ def average_linkage(distances: Array) -> Array:
 
 
 def cuts(tree: Array, counts: Sequence[int]) -> list[NDArray[np.intp]]:
-    """Clusters 0, 1, ... of each movement for each number of clusters."""
-    found = np.asarray(cut_tree(tree, n_clusters=sorted(set(counts))))
-    place = {count: k for k, count in enumerate(sorted(set(counts)))}
-    return [found[:, place[count]].astype(np.intp) for count in counts]
+    """Clusters 0, 1, ... of each movement for each number of clusters: the first n - c merges are made."""
+    rank = np.arange(len(tree), dtype=np.float64)  # of the merges: heights may be equal, ranks are not
+    ends = [len(tree) - count for count in counts]
+    return [np.asarray(fcluster(tree, end, "monocrit", monocrit=rank), dtype=np.intp) - 1 for end in ends]
 
 
 def cut_at(tree: Array, height: float) -> NDArray[np.intp]:
