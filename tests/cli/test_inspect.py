@@ -96,7 +96,10 @@ def test_names_cannot_command_the_terminal(tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are those of POSIX systems")
 def test_progress_is_shown_on_a_terminal(folder):
+    import termios
+
     ours, theirs = os.openpty()
+    termios.tcsetwinsize(ours, (24, 80))
     command = [sys.executable, "-m", "kineme", "inspect", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs) as process:
         os.close(theirs)
