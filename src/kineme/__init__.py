@@ -22,6 +22,7 @@ if _TYPE_CHECKING:
     )
     from kineme.features.dmp_features import DMPFeatures
     from kineme.features.rhythmic_features import RhythmicFeatures
+    from kineme.io.recordings import read_recordings
     from kineme.library.library import ActionLibrary
     from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
@@ -46,6 +47,7 @@ _HOME = {
     "Resample": "kineme.trajectories.resample",
     "datasets": "kineme",
     "load_lasa": "kineme.datasets.lasa",
+    "read_recordings": "kineme.io.recordings",
     "DMP": "kineme.primitives.dmp",
     "Primitives": "kineme.primitives.primitives",
     "control": "kineme",
@@ -68,6 +70,7 @@ _HOME = {
 
 __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
+    "read_recordings",
     "DMP", "Primitives", "control", "RhythmicDMP", "RhythmicPrimitives", "orientation", "styles",
     "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer", "ActionLibrary",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
