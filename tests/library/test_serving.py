@@ -1,0 +1,229 @@
+"""What a library answers, small or large: the ordinary answer, whatever became of its caches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from library_samples import draw_movements
+
+from kineme import ActionLibrary, Demonstrations, Recognizer
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.library import calibrated, index
+from kineme.library.serving import Serving
+
+
+def _kinds(counts, d=2, seed=0, spread=0.05):
+    """Copies of random movements, varied by a few smooth waves of their own."""
+    kinds, rng = draw_movements(len(counts), d, seed), np.random.default_rng([seed, 1])
+    which = np.repeat(np.arange(len(counts)), counts)
+    u = np.linspace(0, 1, 40)
+    waves = np.sin(np.pi * u[:, None] * np.arange(1, 5)) @ rng.normal(size=(len(which), 4, d))
+    paths = kinds.positions.reshape(len(counts), 40, d)[which] + spread * waves
+    order = rng.permutation(len(which))
+    labels = np.array([f"kind {k:02d}" for k in which])
+    return Demonstrations.from_arrays(paths, labels, names=[f"no {i}" for i in range(len(which))])[order]
+
+
+def _questions(counts, d=2, seed=0):
+    return _kinds([1] * len(counts), d, seed, spread=0.15)
+
+
+def _plain(answers):
+    return [(a.label, a.ranked, [n.index for n in a.nearest], a.confidence, dict(a.p_values)) for a in answers]
+
+
+def _same(ours, theirs):
+    for a, b in zip(ours, theirs, strict=True):
+        assert a[:3] == b[:3]
+        assert a[3] == pytest.approx(b[3], abs=1e-5)
+        assert a[4] == pytest.approx(b[4], abs=1e-5)
+
+
+@pytest.fixture
+def make(tmp_path):
+    opened = []
+
+    def made(demos=None, name="actions", **options):
+        library = ActionLibrary(tmp_path / name, create=not options.get("read_only", False), **options)
+        opened.append(library)
+        if demos is not None:
+            library.learn(demos)
+        return library
+
+    yield made
+    for library in opened:
+        library.close()
+
+
+@pytest.mark.parametrize("counts", [[1] * 6, [10] * 4, [1, 2, 5, 9]])
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_small_library_answers_as_the_recognizer_of_its_movements(make, counts, d):
+    demos, asked = _kinds(counts, d), _questions(counts, d)
+    recognizer = Recognizer(representations=make().specification.representations).fit(demos)
+    order = np.argsort(demos.labels, kind="stable")
+    for ours, theirs in zip(make(demos).recognize(asked), recognizer.recognize(asked), strict=True):
+        assert ours.label == theirs.label
+        assert ours.p_values == pytest.approx(theirs.p_values, abs=1e-4)
+        assert [one.index - 1 for one in ours.nearest] == [order[one.index] for one in theirs.nearest]
+        assert [one.name for one in ours.nearest] == [one.name for one in theirs.nearest]
+        np.testing.assert_allclose(ours.transform.matrix, theirs.transform.matrix, atol=1e-4)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, 4, 12])
+def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
+    """Classes of one size calibrate the same, whether sampled or not."""
+    demos, asked = _kinds([count] * 6, d, seed=count), _questions([count] * 6, d, seed=count)
+    library = make(demos)
+    ours = Serving(library.store, exhaustive=0)
+    theirs = library.specification.recognizer().set_params(classifier="nearest").fit(demos)
+    order = np.argsort(demos.labels, kind="stable")
+    for a, b in zip(ours.recognize(asked), theirs.recognize(asked), strict=True):
+        assert a.label == b.label
+        assert a.ranked == b.ranked
+        assert a.p_values == pytest.approx(b.p_values, abs=1e-4)
+        assert a.nearest[0].index - 1 == order[b.nearest[0].index]
+        assert a.nearest[0].name == b.nearest[0].name
+        np.testing.assert_allclose(a.transform.matrix, b.transform.matrix, atol=1e-4)
+
+
+def test_large_classes_keep_the_error_rate(make):
+    """New members of classes larger than what is sampled of them are unknown about as often as was asked for."""
+    kinds = _kinds([150] * 4, seed=7, spread=0.1)
+    rng = np.random.default_rng(0)
+    known = rng.permutation(len(kinds))
+    library = make(kinds[known[:400]])
+    answers = Serving(library.store, exhaustive=0).recognize(kinds[known[400:]], error_rate=0.1)
+    labels = kinds.labels[known[400:]]
+    assert np.mean([a.label in {None, name} for a, name in zip(answers, labels, strict=True)]) == 1
+    assert 0.03 < np.mean([a.label is None for a in answers]) < 0.2
+
+
+def _flip(path, where):
+    data = bytearray(path.read_bytes())
+    data[int(where * (len(data) - 1))] ^= 0xFF
+    path.write_bytes(data)
+
+
+def _cut(path, where):
+    path.write_bytes(path.read_bytes()[: int(where * path.stat().st_size)])
+
+
+DAMAGES = {"flipped": _flip, "truncated": _cut, "gone": lambda path, where: path.unlink()}
+
+
+@pytest.mark.parametrize("name", [index.FILE, calibrated.FILE])
+@pytest.mark.parametrize("damage", DAMAGES)
+@given(where=st.floats(0, 0.999))
+def test_a_damaged_cache_is_made_again(tmp_path_factory, name, damage, where):
+    folder = tmp_path_factory.mktemp("actions")
+    asked = _questions([3] * 5)
+    with ActionLibrary(folder, create=True) as library:
+        library.learn(_kinds([3] * 5))
+        before = _plain(Serving(library.store, exhaustive=0).recognize(asked))
+        whole = (folder / name).read_bytes()
+        DAMAGES[damage](folder / name, where)
+        _same(_plain(Serving(library.store, exhaustive=0).recognize(asked)), before)
+        assert len((folder / name).read_bytes()) == len(whole)
+        assert not list(folder.glob(".*cache*"))
+
+
+def test_the_caches_of_another_library_are_not_believed(make):
+    counts = [3] * 5
+    one, other = make(_kinds(counts, seed=1), "one"), make(_kinds(counts, seed=2), "other")
+    asked = _questions(counts, seed=2)
+    before = _plain(Serving(other.store, exhaustive=0).recognize(asked))
+    Serving(one.store, exhaustive=0).recognize(asked)
+    for name in (index.FILE, calibrated.FILE):
+        (other.folder / name).write_bytes((one.folder / name).read_bytes())
+    _same(_plain(Serving(other.store, exhaustive=0).recognize(asked)), before)
+
+
+def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_path):
+    """A copy of the database goes on where the original did, with other movements under the same ids."""
+    counts = [3] * 5
+    library = make(_kinds(counts, seed=1)[:8])
+    library.export(tmp_path / "backup")
+    library.learn(_kinds(counts, seed=1)[8:])
+    asked = _questions(counts, seed=1)
+    Serving(library.store, exhaustive=0).recognize(asked)
+    again = ActionLibrary.import_(tmp_path / "backup", tmp_path / "again")
+    with again:
+        again.learn(_kinds(counts, seed=5)[8:])
+        before = _plain(Serving(again.store, exhaustive=0).recognize(asked))
+        (again.folder / index.FILE).write_bytes((library.folder / index.FILE).read_bytes())
+        _same(_plain(Serving(again.store, exhaustive=0).recognize(asked)), before)
+
+
+def test_answers_follow_every_change(make):
+    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    library = make(demos[:8])
+    serving, fresh = Serving(library.store, exhaustive=0), []
+    for change in (
+        lambda: library.learn(demos[8:16]),
+        lambda: library.learn(demos[16:]),
+        lambda: library.learn(_kinds([1], seed=9), labels=[None]),
+        lambda: library.rename("kind 01", "wave"),
+        lambda: library.merge(["kind 02", "kind 03"], "both"),
+        lambda: library.delete(library["wave"].members[:2]),
+        lambda: library.delete("kind 04"),
+    ):
+        serving.recognize(asked)
+        change()
+        fresh = Serving(library.store, exhaustive=0)
+        _same(_plain(serving.recognize(asked)), _plain(fresh.recognize(asked)))
+    names = {name for answer in fresh.recognize(asked) for name in answer.p_values}
+    assert names == {"kind 00", "wave", "both", "kind 05"}
+
+
+def test_an_earlier_version_answers_as_it_did(make):
+    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    library = make(demos[:12])
+    before, version = _plain(Serving(library.store, exhaustive=0).recognize(asked)), library.version
+    library.learn(demos[12:])
+    library.rename(demos.labels[0], "wave")
+    Serving(library.store, exhaustive=0).recognize(asked)
+    with library.at(version) as past:
+        _same(_plain(Serving(past.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(past.recognize(asked)), _plain(past.recognize(asked)))
+
+
+def test_reading_only_leaves_nothing_behind(make):
+    library = make(_kinds([4] * 6))
+    reader = make(read_only=True)
+    before = sorted(path.name for path in library.folder.iterdir())
+    assert len(Serving(reader.store, exhaustive=0).recognize(_questions([4] * 6))) == 6
+    assert sorted(path.name for path in library.folder.iterdir()) == before
+
+
+def test_one_movement_gets_one_answer_and_unlabeled_ones_give_none(make):
+    demos = _kinds([3] * 4)
+    library = make(demos)
+    nameless = library.learn(_questions([3] * 4), labels=[None] * 4).ids
+    for serving in (library, Serving(library.store, exhaustive=0)):
+        for one in _questions([3] * 4):
+            answer = serving.recognize(one)
+            assert answer.ranked[0] == one.label
+            assert not {near.index for near in answer.nearest} & set(nameless.tolist())
+
+
+def test_a_library_with_one_symbol_knows_it_from_others(make):
+    library = make(_kinds([12]))
+    for serving in (library, Serving(library.store, exhaustive=0)):
+        (answer,) = serving.recognize(_questions([12]))
+        assert list(answer.p_values) == ["kind 00"]
+
+
+def test_what_cannot_be_answered_says_why(make):
+    library = make()
+    library.learn(_kinds([2]), labels=[None, None])
+    with pytest.raises(SpecificationError, match=r"that show a symbol, got none among 2 movements; learn some with"):
+        library.recognize(_questions([1]))
+    with pytest.raises(SpecificationError, match=r"expected training movements that differ, got one movement"):
+        make(_kinds([1]), "one").recognize(_questions([1]))
+    for exhaustive in (0, 2000):
+        serving = Serving(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
+        with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as in fit, got 3"):
+            serving.recognize(_questions([1], d=3))
