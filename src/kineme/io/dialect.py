@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.columns import is_time
 
 COMMENTS = ("#", "%", "//")
-PEEK = 50  # lines to look at before deciding
+_PEEK = 20  # samples to look at before deciding
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 
@@ -41,9 +41,15 @@ def split(line: str, separator: str | None) -> list[str]:
     return [cell.strip() for cell in line.rstrip("\r\n").split(separator)]
 
 
-def detect_dialect(lines: Sequence[str]) -> Dialect:
-    """How a table is written, from its first lines."""
-    kept = [k for k, line in enumerate(lines) if not is_skipped(line)][:PEEK]
+def detect_dialect(text: Iterable[str]) -> Dialect:
+    """How a table is written, from its first lines; no more are taken than needed."""
+    lines, kept = [], []
+    for line in text:
+        lines.append(line)
+        if not is_skipped(line):
+            kept.append(len(lines) - 1)
+        if len(kept) == _PEEK:
+            break
     if not kept:
         raise DataError("expected samples, got an empty file")
     separator = _separator([lines[k] for k in kept[:2]])

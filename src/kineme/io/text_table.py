@@ -12,7 +12,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
-from kineme.io.dialect import COMMENTS, PEEK, Dialect, detect_dialect, is_skipped
+from kineme.io.dialect import COMMENTS, Dialect, detect_dialect, is_skipped
 from kineme.io.layout import Layout
 from kineme.io.slow_table import read_slowly
 from kineme.io.table import Table
@@ -31,7 +31,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         No text, no samples, or no columns to be found.
     """
     encoding = _encoding(data)
-    dialect = detect_dialect(list(islice(_lines(data, encoding), 10 * PEEK)))
+    dialect = detect_dialect(_lines(data, encoding))
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored) if k is not None}
     dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
