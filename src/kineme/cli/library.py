@@ -16,7 +16,8 @@ def library() -> None:
     """Look into an action library, and keep it in order."""
 
 
-def _open(folder: Path, *, read_only: bool = True) -> Any:
+def opened(folder: Path, *, read_only: bool = True) -> Any:
+    """The library in a folder."""
     from kineme.library.library import ActionLibrary
 
     return ActionLibrary(folder, read_only=read_only)
@@ -28,8 +29,8 @@ def _open(folder: Path, *, read_only: bool = True) -> Any:
 @json_option
 def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     """List the symbols of a library."""
-    with _open(folder) as opened:
-        shown = opened if version is None else opened.at(version)
+    with opened(folder) as actions:
+        shown = actions if version is None else actions.at(version)
         symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
         data = {
             "movements": len(shown),
@@ -60,8 +61,8 @@ def show(symbol: str, folder: Path, as_json: bool) -> None:
     """Show one symbol: its movements, where they come from, and how they vary."""
     from kineme.library.sheet import sheet
 
-    with _open(folder) as opened:
-        data = sheet(opened, symbol)
+    with opened(folder) as actions:
+        data = sheet(actions, symbol)
     say(as_json, data, lambda: _sheet_text(data))
 
 
@@ -72,9 +73,9 @@ def show(symbol: str, folder: Path, as_json: bool) -> None:
 @json_option
 def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
     """Give a symbol another NAME; its id stays."""
-    with _open(folder, read_only=False) as opened:
-        opened.rename(symbol, name)
-        data = {**_brief(opened[name]), "was": symbol, "version": opened.version}
+    with opened(folder, read_only=False) as actions:
+        actions.rename(symbol, name)
+        data = {**_brief(actions[name]), "was": symbol, "version": actions.version}
     say(as_json, data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})")
 
 
@@ -85,9 +86,9 @@ def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
 @json_option
 def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
     """Write down what a symbol means."""
-    with _open(folder, read_only=False) as opened:
-        opened.describe(symbol, text)
-        data = {**_brief(opened[symbol]), "version": opened.version}
+    with opened(folder, read_only=False) as actions:
+        actions.describe(symbol, text)
+        data = {**_brief(actions[symbol]), "version": actions.version}
     say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
 
 
@@ -98,9 +99,9 @@ def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
 @json_option
 def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
     """Make one symbol of several."""
-    with _open(folder, read_only=False) as opened:
-        opened.merge(symbols, into)
-        data = {**_brief(opened[into]), "version": opened.version}
+    with opened(folder, read_only=False) as actions:
+        actions.merge(symbols, into)
+        data = {**_brief(actions[into]), "version": actions.version}
     say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
 
 
@@ -120,9 +121,9 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
     what = printable(symbol) if symbol is not None else count(len(movements), "movement")
     if not yes:
         click.confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
-    with _open(folder, read_only=False) as opened:
-        opened.delete(symbol if symbol is not None else list(movements))
-        data = {"deleted": symbol if symbol is not None else list(movements), "version": opened.version}
+    with opened(folder, read_only=False) as actions:
+        actions.delete(symbol if symbol is not None else list(movements))
+        data = {"deleted": symbol if symbol is not None else list(movements), "version": actions.version}
     say(as_json, data, lambda: f"deleted {what}; version {data['version']}")
 
 
@@ -132,8 +133,8 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
 @json_option
 def history(folder: Path, limit: int, as_json: bool) -> None:
     """List what changed, when."""
-    with _open(folder) as opened:
-        versions = opened.history()
+    with opened(folder) as actions:
+        versions = actions.history()
     data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
 
     def text() -> str:
@@ -154,9 +155,9 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
 @click.pass_context
 def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
     """Check every byte of a library; the exit status is 1 if something is wrong."""
-    with _open(folder) as opened:
-        problems = [str(problem) for problem in opened.verify()]
-        n = len(opened)
+    with opened(folder) as actions:
+        problems = [str(problem) for problem in actions.verify()]
+        n = len(actions)
     data = {"ok": not problems, "movements": n, "problems": problems}
     say(as_json, data, lambda: "\n".join(problems) if problems else f"{count(n, 'movement')}, nothing wrong")
     ctx.exit(1 if problems else 0)
@@ -168,9 +169,9 @@ def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
 @json_option
 def export(path: Path, folder: Path, as_json: bool) -> None:
     """Write a whole library to one file, to keep or to give away."""
-    with _open(folder) as opened:
-        opened.export(path)
-        data: dict[str, Any] = {"path": str(path), "movements": len(opened), "bytes": path.stat().st_size}
+    with opened(folder) as actions:
+        actions.export(path)
+        data: dict[str, Any] = {"path": str(path), "movements": len(actions), "bytes": path.stat().st_size}
     say(as_json, data, lambda: f"wrote {printable(path)}: {count(data['movements'], 'movement')}")
 
 
@@ -182,8 +183,8 @@ def import_(path: Path, folder: Path, as_json: bool) -> None:
     """Make a library of an exported file."""
     from kineme.library.library import ActionLibrary
 
-    with ActionLibrary.import_(path, folder) as opened:
-        data: dict[str, Any] = {"library": str(folder), "movements": len(opened), "symbols": len(opened.symbols())}
+    with ActionLibrary.import_(path, folder) as actions:
+        data: dict[str, Any] = {"library": str(folder), "movements": len(actions), "symbols": len(actions.symbols())}
     say(as_json, data, lambda: f"{printable(folder)}: {count(data['movements'], 'movement')}")
 
 

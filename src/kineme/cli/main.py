@@ -13,7 +13,9 @@ from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
+from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
+from kineme.cli.symbols import COMMANDS
 from kineme.errors import KinemeError
 
 
@@ -40,4 +42,7 @@ main.add_command(generate)
 main.add_command(inspect)
 main.add_command(learn)
 main.add_command(library)
+for command in COMMANDS:
+    library.add_command(command)
+main.add_command(recognize)
 main.add_command(reproduce)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def primitive_of(library: ActionLibrary, who: str) -> Primitives:
 
 
 def ground_symbol(
-    library: ActionLibrary, who: str, by: str = "medoid", units: str | list[str] | None = None
+    library: ActionLibrary, who: str, by: str = "medoid", units: str | Sequence[str] | None = None
 ) -> dict[str, Any]:
     """A symbol in a planner's terms; see `ActionLibrary.ground`."""
     symbol = library[who]

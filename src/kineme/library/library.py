@@ -18,6 +18,7 @@ from kineme.library.store import Store
 
 if TYPE_CHECKING:
     from kineme.anchoring.proposals import Proposal
+    from kineme.anchoring.space import Between, Near
     from kineme.library.anchor import LibraryProposals
     from kineme.library.history import Version
     from kineme.library.learn import LearnReport
@@ -344,3 +345,40 @@ class ActionLibrary:
         from kineme.library.anchor import reject
 
         reject(self, proposal)
+
+    def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
+        """A symbol in a planner's terms: the primitive that stands for it, and the ranges that were demonstrated.
+
+        Plain data, as `kineme.anchoring.regain.grounding_schema` describes it; `kineme.anchoring.regain.primitive_from`
+        makes it move again.
+
+        Parameters
+        ----------
+        who : str
+            Name or id of a symbol.
+        by : {"medoid", "mean"}, default "medoid"
+            What stands for it: its prototype or most typical movement, or the mean laid onto that one.
+        units : str or sequence of d str, optional
+            Of the positions, as "mm", or of each dimension.
+        """
+        from kineme.library.grounding import ground_symbol
+
+        return ground_symbol(self, who, by, units)
+
+    def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
+        """The symbols most like one, nearest first; see `kineme.anchoring.space.ConceptualSpace`."""
+        from kineme.library.grounding import space_of
+
+        return space_of(self).nearest(self[who].name, k)
+
+    def between(self, a: str, b: str, eps: float = 0.25) -> tuple[Between, ...]:
+        """The symbols that lie between two, the smallest detour first."""
+        from kineme.library.grounding import space_of
+
+        return space_of(self).between(self[a].name, self[b].name, eps)
+
+    def morph(self, a: str, b: str, shares: Any = 0.5) -> Primitives:
+        """Primitives on the way from a symbol to another, one for each share of the way: 0 is a, 1 is b."""
+        from kineme.library.grounding import morph_symbols
+
+        return morph_symbols(self, a, b, shares)

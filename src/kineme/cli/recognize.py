@@ -1,0 +1,91 @@
+"""``kineme recognize``: what a recording shows, by the symbols of a library."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import json_option, library_option
+from kineme.cli.output import printable, say
+from kineme.cli.reading import layout_options, read
+
+
+@click.command()
+@click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
+@library_option
+@click.option(
+    "--error-rate", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
+    help="Share of true movements that may be called unknown.",
+)  # fmt: skip
+@click.option("--top", type=click.IntRange(1), default=3, show_default=True, help="Symbols listed per movement.")
+@layout_options
+@json_option
+def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:
+    """Recognize the movements in RECORDINGS, a file or a folder, or - for CSV from the standard input.
+
+    A movement that is like no symbol is unknown. What cannot be read is listed.
+
+    Example: kineme recognize new.csv --library actions/
+    """
+    from kineme.library.library import ActionLibrary
+
+    found = read(recordings, options)
+    with ActionLibrary(folder, read_only=True) as library:
+        answers = library.recognize(found.demonstrations, error_rate)
+        stored = {symbol.name: symbol.id for symbol in library.symbols()}
+    data = {
+        "movements": [_as_data(source, one, stored, top) for source, one in zip(found.sources, answers, strict=True)],
+        "problems": [str(problem) for problem in found.problems],
+    }
+    say(as_json, data, lambda: _text(data))
+
+
+def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[str, Any]:
+    transform = answer.transform
+    return {
+        "recording": source.path,
+        "place": source.place,
+        "symbol": answer.label,
+        "id": None if answer.label is None else ids[answer.label],
+        "confidence": answer.confidence,
+        "ranked": [{"symbol": str(name), "p_value": answer.p_values.get(name)} for name in answer.ranked[:top]],
+        "like": [{"movement": one.index, "name": one.name, "similarity": one.similarity} for one in answer.nearest],
+        "transform": {
+            "matrix": transform.matrix.tolist(),
+            "shift": transform.shift.tolist(),
+            "scale": transform.scale.tolist(),
+            "angle": transform.angle,
+            "duration_ratio": transform.duration_ratio,
+        },
+        "representations": dict(answer.responsibilities),
+    }
+
+
+def _text(data: dict[str, Any]) -> str:
+    from kineme.table import Table, to_text
+
+    rows = []
+    for one in data["movements"]:
+        name = f"{one['recording']} {one['place']}".strip()
+        others = ", ".join(f"{printable(each['symbol'])} {_share(each['p_value'])}" for each in one["ranked"])
+        rows.append(
+            (printable(name), "unknown" if one["symbol"] is None else printable(one["symbol"]),
+             f"{one['confidence']:.2f}", others, printable(one["like"][0]["name"] or one["like"][0]["movement"]),
+             "" if one["symbol"] is None else _relative(one["transform"]))
+        )  # fmt: skip
+    heads = ("recording", "symbol", "confidence", "ranked, with p-values", "most like", "relative to it")
+    lines = [to_text(Table("", heads, rows))]
+    return "\n".join(lines + [f"not read: {printable(problem)}" for problem in data["problems"]])
+
+
+def _relative(transform: dict[str, Any]) -> str:
+    """Size, direction and duration, as against the movement that it is most like."""
+    degrees = round(math.degrees(transform["angle"])) + 0
+    return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
+
+
+def _share(p_value: float | None) -> str:
+    return "" if p_value is None else f"{p_value:.2g}"

@@ -1,0 +1,97 @@
+"""``kineme library`` ground, nearest, between, map: what symbols mean to a planner, and to each other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.library import opened
+from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.output import count, printable, say
+
+
+@click.command()
+@click.argument("symbol", type=SymbolName())
+@library_option
+@click.option("--by", type=click.Choice(["medoid", "mean"]), default="medoid", show_default=True,
+              help="What stands for it: its most typical movement, or the mean.")  # fmt: skip
+@click.option("--units", help="Of the positions, as mm, or one for each dimension, separated by commas.")
+@click.option("--output", "-o", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), default="-",
+              show_default=True, help="A .json file; - for the screen.")  # fmt: skip
+def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) -> None:
+    """Write a symbol for a planner: primitive, parameters and their demonstrated ranges, as JSON.
+
+    kineme library schema prints the schema of it.
+    """
+    with opened(folder) as actions:
+        grounding = actions.ground(symbol, by, units.split(",") if units and "," in units else units)
+    _write(grounding, output)
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON Schema of what ground writes."""
+    from kineme.anchoring.regain import grounding_schema
+
+    _write(grounding_schema(), Path("-"))
+
+
+@click.command()
+@click.argument("symbol", type=SymbolName())
+@click.option("-k", type=click.IntRange(1), default=3, show_default=True, help="How many.")
+@library_option
+@json_option
+def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
+    """List the symbols most like one."""
+    with opened(folder) as actions:
+        data = [one._asdict() for one in actions.nearest(symbol, k)]
+    say(as_json, data, lambda: "\n".join(f"{one['distance']:.3f}  {printable(one['symbol'])}" for one in data))
+
+
+@click.command()
+@click.argument("first", type=SymbolName())
+@click.argument("second", type=SymbolName())
+@library_option
+@json_option
+def between(first: str, second: str, folder: Path, as_json: bool) -> None:
+    """List the symbols that lie between two, the smallest detour first."""
+    with opened(folder) as actions:
+        data = [one._asdict() for one in actions.between(first, second)]
+    say(as_json, data, lambda: "\n".join(map(_lies, data)) or "none")
+
+
+@click.command("map")
+@click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
+@library_option
+def draw(path: Path, folder: Path) -> None:
+    """Draw the symbols on a map, those that are alike near each other: a .png, .svg or .pdf file."""
+    from kineme.anchoring.map_figure import draw_map
+    from kineme.figures import save_figure
+    from kineme.library.grounding import prototype_of, space_of
+
+    with opened(folder) as actions:
+        space = space_of(actions)
+        typical = [prototype_of(actions, actions[name]) for name in space.symbols]
+        save_figure(draw_map(space, actions.movements(ids=typical)), path)
+    click.echo(f"wrote {printable(path)}: {count(len(space.symbols), 'symbol')}")
+
+
+def _lies(one: dict[str, Any]) -> str:
+    return f"{one['share']:.0%} of the way, detour {one['excess']:.0%}  {printable(one['symbol'])}"
+
+
+def _write(data: dict[str, Any], output: Path) -> None:
+    from kineme.io.atomic import write_atomically
+
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+    if str(output) == "-":
+        click.echo(text, nl=False)
+    else:
+        write_atomically(output, text.encode())
+
+
+#: For the group ``kineme library``.
+COMMANDS = (ground, schema, nearest, between, draw)
