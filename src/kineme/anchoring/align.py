@@ -55,7 +55,7 @@ def maps_onto(paths: Array, onto: Array, like: Recognizer | None = None) -> Maps
 
 
 def paths_of(movements: Demonstrations | Primitives, like: Recognizer | None = None) -> Array:
-    """Even paths over time (n, d, 200) where they were recorded; smoothed as the recognizer does, or rolled out."""
+    """Even paths over time (n, d, T) where they were recorded; smoothed as the recognizer does, or rolled out."""
     if isinstance(movements, Primitives):
         return np.ascontiguousarray(movements.rollout(n_samples=N_POINTS).positions.transpose(0, 2, 1))
     cutoff = (like or Recognizer()).cutoff
