@@ -1,5 +1,6 @@
 # make demo   the paper's tables and figures, in out/
 # make test   formatter, linter, type checker, tests
+# make soak   faults of the action library, many times: minutes
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
@@ -7,7 +8,7 @@
 
 PYTHON ?= python3
 
-.PHONY: demo test bench evaluate figures lock clean
+.PHONY: demo test soak bench evaluate figures lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -17,6 +18,9 @@ test: .venv-dev/ready
 	.venv-dev/bin/ruff check .
 	.venv-dev/bin/mypy
 	.venv-dev/bin/pytest -n 2 --dist loadscope
+
+soak: .venv-dev/ready
+	.venv-dev/bin/pytest soak -p no:cacheprovider
 
 .venv/ready: requirements/run.txt pyproject.toml
 	$(call environment,.venv,requirements/run.txt)

@@ -46,9 +46,11 @@ def count(store: Store) -> int:
 
 
 def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
+    """Ids, if they are as many as there should be; ids are given one after the other, so that none is left out."""
     found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
-    if len(found) != expected:
-        raise damaged("movement", (f"(expected {expected} rows, got {len(found)})",))
+    last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
+    if len(found) != expected or last != n or (np.diff(found) <= 0).any():
+        raise damaged("movement", (f"(expected {expected} of {last}, got {len(found)} of {n})",))
     return found
 
 

@@ -6,7 +6,7 @@ import json
 import sqlite3
 import uuid
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -85,6 +85,8 @@ class Store:
         self.read_only = read_only or as_of is not None
         self.wait = wait
         self._turn = RLock()
+        # Threads share the connection to read from; a SQLite that was built without locks of its own gets ours.
+        self._look: AbstractContextManager[Any] = RLock() if sqlite3.threadsafety < 3 else nullcontext()
         self._writer: sqlite3.Connection | None = None
         if not self.path.exists():
             self._create(specification)
@@ -160,7 +162,7 @@ class Store:
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
         """The connection to read from. It sees committed versions only, also while this process writes."""
-        with in_plain_words(self.path, self.wait):
+        with self._look, in_plain_words(self.path, self.wait):
             yield self._reader
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
