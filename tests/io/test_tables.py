@@ -303,3 +303,34 @@ def test_missing_numbers_agree_with_an_independent_reader():
     expected = expected[np.isfinite(expected).all(axis=1)]
     found = read(text, skip="sample").demonstrations
     np.testing.assert_array_equal(np.column_stack((found.times, found.positions)), expected)
+
+
+@pytest.mark.parametrize("style", ["{}", "{}Z", "{}+02:00", " {} "])
+@pytest.mark.parametrize("between", ["T", " "])
+@pytest.mark.parametrize("head", ["time,x,y", "", "Timestamp [ms],x,y"])
+def test_dates_are_time_stamps(style, between, head):
+    dates = [f"2024-05-06{between}07:08:{9 + k / 4:09.6f}" for k in range(6)]
+    rows = [",".join(map(str, (style.format(date), k, -k))) for k, date in enumerate(dates)]
+    found = read("\n".join([head] * bool(head) + rows))
+    np.testing.assert_allclose(np.diff(found.demonstrations.times), 0.25, atol=3e-7)
+    offset = 7200 if "+" in style else 0
+    assert found.demonstrations.times[0] == 1714979289 - offset
+    assert found.detected[0][0][4:6] == ("s", "dates")
+    assert found.demonstrations.n_dims == 2
+
+
+def test_a_cell_that_is_no_date_is_found_by_its_line():
+    rows = [(f"2024-05-06 07:{8 + k // 60:02}:{k % 60:02}", k) for k in range(40)]
+    rows[30] = ("yesterday", 30)
+    with pytest.raises(kineme.DataError, match="line 32: expected a date in 'time', got 'yesterday'"):
+        read(lines(rows, "time,x"))
+    assert read(lines(rows, "time,x"), skip="sample").demonstrations.lengths.tolist() == [39]
+
+
+def test_decimal_commas_between_blanks():
+    found = read("0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
+    np.testing.assert_array_equal(
+        np.column_stack((found.times, found.positions)), [[0, 1.5], [0.1, 2.5], [0.2, 3.5], [0.3, 4.5]]
+    )
+    named = read("t x\n0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
+    np.testing.assert_array_equal(named.positions, found.positions)

@@ -42,12 +42,12 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     ----------
     heads : sequence of str
         One per column.
-    kinds : sequence of {"number", "text"}
+    kinds : sequence of {"number", "date", "text"}
         What the columns hold.
     layout : Layout
         What the caller says; it wins.
     named : bool, default True
-        Whether the file has heads. Without, the first column of numbers is time and the others are coordinates.
+        Whether the file has heads. Without, the first column that is no text is time, the others are coordinates.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _time(
     if layout.time is not None:
         return _number(heads, layout.time)
     free = [k for k in range(len(heads)) if k not in taken]
-    found = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] == "number"][:1]
+    found = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] != "text"][:1]
     if len(found) == 1:
         return found[0]
     if isinstance(layout.units, float | int) and not found:

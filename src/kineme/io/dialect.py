@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.columns import is_time
+from kineme.io.dates import is_date
 
 COMMENTS = ("#", "%", "//")
 _PEEK = 20  # samples to look at before deciding
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_COMMA_NUMBERS = re.compile(rf"\s*{_COMMA_NUMBER.pattern}(\s+{_COMMA_NUMBER.pattern})+\s*")  # between blanks
 
 
 class Dialect(NamedTuple):
@@ -24,7 +26,7 @@ class Dialect(NamedTuple):
     heads: tuple[str, ...]
     named: bool
     first: int  # line of the first sample, counted from 0
-    kinds: tuple[str, ...]  # "number" or "text" per column
+    kinds: tuple[str, ...]  # "number", "date" or "text" per column
 
 
 def is_skipped(line: str) -> bool:
@@ -67,7 +69,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
 def _separator(lines: Sequence[str]) -> str | None:
     for mark in (";", "\t", ","):
         if all(mark in line for line in lines):
-            return mark
+            return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark
     return None
 
 
@@ -93,4 +95,6 @@ def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int)
 
 def _kind(cells: Sequence[str], comma: bool) -> str:
     filled = [cell for cell in cells if cell]
+    if filled and all(map(is_date, filled)):
+        return "date"
     return "number" if 2 * sum(is_number(cell, comma) for cell in filled) >= len(filled) else "text"

@@ -44,11 +44,14 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
             raise
         raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
     columns = [read.get(k) for k in range(len(heads))]
-    return Table(heads, columns, table.num_rows, _no_lines), roles
+    dated = roles.time is not None and kinds[roles.time] == "date"
+    return Table(heads, columns, table.num_rows, _no_lines, dates_in="ns" if dated else None), roles
 
 
 def _kind(pa: Any, kind: Any) -> str:
     of = pa.types
+    if of.is_timestamp(kind) or of.is_date(kind) or of.is_duration(kind):
+        return "date"
     return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
 
 

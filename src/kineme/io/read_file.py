@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -76,7 +75,8 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
     except _UNREADABLE as error:
         return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
-    block = replace(block, labels=[label if one is None else one for one in block.labels])
+    labels = [label if one is None else one for one in block.labels]
+    block = Block(block.positions, block.times, block.offsets, labels, block.places)  # lets go of the file's bytes
     return FileRead(name, sha256, len(data), mtime, detected, block, problems)
 
 

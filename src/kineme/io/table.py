@@ -21,6 +21,8 @@ class Table:
         Row -> its line in the file, counted from 1, or None.
     faults : dict
         Row -> what is wrong there.
+    dates_in : str, optional
+        Unit of the time stamps where they are dates or durations, whatever the head says.
     """
 
     heads: tuple[str, ...]
@@ -28,3 +30,4 @@ class Table:
     n_rows: int
     line_of: Callable[[int], int | None]
     faults: dict[int, str] = field(default_factory=dict)
+    dates_in: str | None = None

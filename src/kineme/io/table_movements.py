@@ -52,6 +52,8 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     if roles.time is None:
         return np.zeros(table.n_rows), layout.units or 1.0, "given"
     stamps, head = table.columns[roles.time], table.heads[roles.time]
+    if table.dates_in is not None:
+        return in_seconds(stamps, table.dates_in), table.dates_in, "dates"
     if layout.units is not None:
         return in_seconds(stamps, layout.units), layout.units, "given"
     named = unit_in_head(head)

@@ -12,6 +12,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
+from kineme.io.dates import seconds_of_dates
 from kineme.io.dialect import COMMENTS, Dialect, detect_dialect, is_skipped
 from kineme.io.layout import Layout
 from kineme.io.slow_table import read_slowly
@@ -33,7 +34,8 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     encoding = _encoding(data)
     dialect = detect_dialect(_lines(data, encoding))
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
-    texts = {k for k in (*roles.movement, roles.label, *roles.ignored) if k is not None}
+    dated = roles.time is not None and dialect.kinds[roles.time] == "date"
+    texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
     dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
     faults: dict[int, str] = {}
     rows = _read_fast(data, encoding, dialect, dtype)
@@ -48,7 +50,13 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         return int(lines()[row])
 
     columns = [rows[name] for name in dtype.names or ()]
-    return Table(dialect.heads, columns, len(rows), line_of, faults), roles
+    if dated and roles.time is not None:
+        columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
+        head = dialect.heads[roles.time]
+        faults = {
+            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
+        } | faults
+    return Table(dialect.heads, columns, len(rows), line_of, faults, "s" if dated else None), roles
 
 
 def _encoding(data: bytes) -> str:
