@@ -160,5 +160,5 @@ def test_what_cannot_be_grounded():
         ground(WAVE, primitives[[]])
     with pytest.raises(kineme.SpecificationError, match=r"expected by to be one of \['medoid', 'mean'\], got 'best'"):
         ground(WAVE, primitives, by="best")
-    with pytest.raises(kineme.DataError, match="expected a grounding, a mapping .* got 'list'"):
+    with pytest.raises(kineme.DataError, match=r"expected a grounding, a mapping .* got 'list'"):
         primitive_from([])

@@ -73,7 +73,7 @@ def test_pictures_of_other_movements():
     proposals = propose(demos)
     with pytest.raises(kineme.SpecificationError, match="at least 5, got 3"):
         draw_proposal(demos[:3], proposals[0])
-    with pytest.raises(kineme.SpecificationError, match="expected the 9 movements .* got 8"):
+    with pytest.raises(kineme.SpecificationError, match=r"expected the 9 movements .* got 8"):
         draw_proposals(demos[:8], proposals)
     with pytest.raises(kineme.SpecificationError, match="expected 2 prototypes, one per symbol, got 3"):
         draw_map(conceptual_space("ab", demos[:2]), demos[:3])

@@ -54,7 +54,8 @@ def test_a_morph_lies_between_its_ends(seed, share):
     space = conceptual_space([*"abcdef", "between"], movements)
     (first, *_) = space.between("a", "b", eps=0.5)
     assert first.symbol == "between"
-    assert first.excess < 0.25
+    # Shapes of one size lie on a sphere: half way between opposite ones the detour is that of two sides of a square.
+    assert first.excess < np.sqrt(2) - 1 + 0.05
     backwards = space.between("b", "a", eps=0.5)
     assert [one.symbol for one in backwards] == [one.symbol for one in space.between("a", "b", eps=0.5)]
     assert backwards[0].share == pytest.approx(1 - first.share)
