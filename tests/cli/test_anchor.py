@@ -1,0 +1,176 @@
+"""``kineme anchor``: scripted, and as a person at a terminal uses it."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import subprocess
+import sys
+import time
+
+import pytest
+
+import kineme
+
+KINDS = ["CShape", "GShape", "NShape", "Sine"]
+
+
+def run(*arguments, **options):
+    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+def answer(*arguments, **options):
+    done = run(*arguments, "--json", **options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Movements without labels."""
+    demos = kineme.load_lasa(KINDS)
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, [None] * len(demos))
+    return tmp_path / "actions"
+
+
+def test_without_a_choice_it_only_lists(folder, tmp_path):
+    data = answer("anchor", "-l", folder, "--pictures", tmp_path / "pictures")
+    assert sorted(len(one["movements"]) for one in data["proposals"]) == [7] * 4
+    assert (data["left_over"], data["accepted"], data["rejected"]) == ([], {}, [])
+    drawn = sorted(path.name for path in (tmp_path / "pictures").iterdir())
+    assert drawn == ["all.png", "kind-0.png", "kind-1.png", "kind-2.png", "kind-3.png"]
+    assert [os.path.basename(path) for path in data["pictures"]] == drawn
+    assert len(answer("library", "history", "-l", folder)) == 1
+
+
+def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
+    (tmp_path / "names.json").write_text('{"0": "first/../kind", "2": "third"}')
+    data = answer(
+        "anchor", "-l", folder, "--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p"
+    )
+    assert sorted(data["accepted"]) == ["first/../kind", "kind 1", "kind 2", "third"]
+    listed = answer("library", "list", "-l", folder)
+    assert listed["unlabeled"] == 0
+    truth = {i + 1: label for i, label in enumerate(kineme.load_lasa(KINDS).labels.tolist())}
+    for one in listed["symbols"]:
+        members = [each["id"] for each in answer("library", "show", one["id"], "-l", folder)["members"]]
+        assert len({truth[i] for i in members}) == 1
+        assert one["prototype"] in members
+
+
+def test_what_is_rejected_is_not_proposed_again(folder, tmp_path):
+    first = answer("anchor", "-l", folder, "--reject", "1", "--pictures", tmp_path / "p")
+    gone = first["proposals"][1]["movements"]
+    again = answer("anchor", "-l", folder, "--pictures", tmp_path / "p")
+    assert len(again["proposals"]) == 3
+    assert set(gone) <= set(again["left_over"])
+    assert not (tmp_path / "p" / "kind-3.png").exists()  # a picture of a number that there is no more
+
+
+def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
+    demos = kineme.load_lasa(["CShape", "Angle"])
+    with kineme.ActionLibrary(folder) as library:
+        library.assign(range(1, 8), "C")  # the Cs, by hand
+        library.assign(range(8, 15), "G")
+        library.learn([2 * one.positions + 5 for one in demos])
+    data = answer("anchor", "-l", folder, "--accept", "all", "--pictures", tmp_path / "p")
+    assert data["joined"] == {"C": 7}
+    assert sorted(len(one["movements"]) for one in data["proposals"]) == [7, 7, 7]  # N, sine, angle
+    actions = [one["action"] for one in answer("library", "history", "-l", folder)]
+    assert actions[:4] == ["learn", "assign", "assign", "learn"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["--accept", "9"], 2, "there are 4 proposals, counted from 0, got 9"),
+        (["--accept", "x"], 2, "expected numbers of proposals separated by commas, or all, got 'x'"),
+        (["--accept", "0", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
+        (["--clusters", "3", "--method", "hdbscan"], 1, "expected no n_clusters with method='hdbscan'"),
+    ],
+)
+def test_wrong_choices_change_nothing(folder, tmp_path, arguments, status, message):
+    (tmp_path / "bad.json").write_text("[1, 2]")
+    done = run("anchor", "-l", folder, *arguments, cwd=tmp_path)
+    assert done.returncode == status
+    assert message in done.stderr
+    assert len(answer("library", "history", "-l", folder)) == 1
+
+
+class Terminal:
+    """A person at a pseudo-terminal."""
+
+    def __init__(self, *arguments, cwd):
+        self.master, slave = pty.openpty()
+        command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
+        self.process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, cwd=cwd, close_fds=True)
+        os.close(slave)
+        self.seen = ""
+
+    def until(self, text, seconds=60):
+        """Read until the text has come since the last answer; all that came."""
+        deadline = time.monotonic() + seconds
+        while text not in self.seen:
+            assert time.monotonic() < deadline, f"waited for {text!r}, got {self.seen!r}"
+            if select.select([self.master], [], [], 0.2)[0]:
+                try:
+                    self.seen += os.read(self.master, 65536).decode()
+                except OSError:  # the other end is closed
+                    assert text in self.seen, f"waited for {text!r}, got {self.seen!r}"
+        return self.seen
+
+    def answer(self, line, then):
+        """Type a line, and wait for what follows."""
+        self.seen = ""
+        os.write(self.master, (line + "\n").encode())
+        return self.until(then)
+
+    def close(self):
+        """The exit status."""
+        status = self.process.wait(30)
+        os.close(self.master)
+        return status
+
+
+def test_a_person_names_splits_rejects_and_quits(folder, tmp_path):
+    person = Terminal("anchor", "-l", folder, "--clusters", 2, "--pictures", "pictures", cwd=tmp_path)
+    shown = person.until("name:")
+    assert "2 proposals" in shown
+    assert "kind-0.png" in shown
+    assert "/reject" in person.answer("/help", "name:")
+    assert "CShape" in person.answer("/members", "name:") + person.answer("", "name:") + person.answer(
+        "/members", "name:"
+    )
+    assert "expected a name or one of /split" in person.answer("/nonsense", "name:")
+    person.answer("/quit", "without one")
+    assert person.close() == 0
+    assert len(answer("library", "history", "-l", folder)) == 1
+
+    person = Terminal("anchor", "-l", folder, "--clusters", 2, "--pictures", "pictures", cwd=tmp_path)
+    first = person.until("name:")
+    assert "movements" in first
+    parts = person.answer("/split", "name:")
+    assert "0a:" in parts
+    assert "0b:" in person.answer("wave 'em; rm -rf /", "0b:")
+    person.answer("wave 'em; rm -rf /", "join")  # the same name again: asked whether to join
+    person.answer("n", "name:")
+    person.answer("/name /etc/passwd", "name:")
+    person.answer("/reject", "without one")
+    assert person.close() == 0
+    names = [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]]
+    assert sorted(names) == ["/etc/passwd", "wave 'em; rm -rf /"]
+    assert answer("library", "history", "-l", folder)[-1]["action"] == "reject"
+
+
+def test_the_end_of_the_input_ends_the_dialogue(folder, tmp_path):
+    person = Terminal("anchor", "-l", folder, "--pictures", "pictures", cwd=tmp_path)
+    person.until("name:")
+    person.answer("kept", "name:")
+    os.write(person.master, b"\x04")  # end of the input
+    person.until("without one")
+    assert person.close() == 0
+    assert [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]] == ["kept"]

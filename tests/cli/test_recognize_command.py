@@ -1,0 +1,150 @@
+"""``kineme recognize``, and what symbols mean: a library of real recordings, asked from the shell."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.anchoring.regain import grounding_schema, primitive_from
+from kineme.io.movements import write_movement
+from kineme.io.recordings import read_recording
+
+
+def run(*arguments, **options):
+    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+
+
+def answer(*arguments, **options):
+    done = run(*arguments, "--json", **options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("library") / "actions"
+    with kineme.ActionLibrary(path, create=True) as library:
+        library.learn(kineme.load_lasa(["CShape", "GShape", "NShape", "Angle", "Sine"]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory):
+    """A C done elsewhere, smaller, turned and faster; and a shape that the library does not know."""
+    path = tmp_path_factory.mktemp("asked")
+    c, strange = kineme.load_lasa(["CShape"])[3], kineme.load_lasa(["Sshape"])[2]
+    turn = np.array([[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]])
+    write_movement(path / "c.csv", {"times": 0.8 * c.times, "positions": 3 + 0.5 * c.positions @ turn.T})
+    write_movement(path / "strange.csv", {"times": strange.times, "positions": strange.positions})
+    (path / "bad.csv").write_text("time,x,y\n0,1\n")
+    return path
+
+
+def test_known_and_unknown_in_one_folder(folder, asked):
+    data = answer("recognize", asked, "-l", folder)
+    known, strange = data["movements"]
+    assert (known["recording"], known["symbol"]) == ("c.csv", "CShape")
+    assert known["like"][0]["name"] == "CShape 4"
+    change = known["transform"]
+    assert change["scale"][0] == pytest.approx(0.5, rel=1e-3)
+    assert change["angle"] == pytest.approx(0.4, abs=1e-3)
+    assert change["duration_ratio"] == pytest.approx(0.8, rel=1e-6)
+    assert (strange["recording"], strange["symbol"], strange["id"]) == ("strange.csv", None, None)
+    assert len(data["problems"]) == 1
+    assert data["problems"][0].startswith("bad.csv, line 2")
+    text = run("recognize", asked, "-l", folder).stdout
+    assert "×0.5, +23°, 0.8 × as long" in text
+    assert "unknown" in text
+    assert "not read: bad.csv, line 2" in text
+
+
+def test_the_answer_is_that_of_python(folder, asked):
+    data = answer("recognize", asked / "c.csv", "-l", folder, "--top", 5)["movements"][0]
+    with kineme.ActionLibrary(folder, read_only=True) as library:
+        expected = library.recognize(read_recording(asked / "c.csv"))
+    assert data["confidence"] == expected.confidence
+    assert {one["symbol"]: one["p_value"] for one in data["ranked"]} == dict(expected.p_values)
+
+
+def test_a_recording_may_come_through_a_pipe(folder, asked):
+    data = answer("recognize", "-", "-l", folder, input=(asked / "c.csv").read_text())
+    assert data["movements"][0]["symbol"] == "CShape"
+
+
+def test_a_library_without_symbols_cannot_say(tmp_path, asked):
+    with kineme.ActionLibrary(tmp_path / "empty", create=True) as library:
+        library.learn([one.positions for one in kineme.load_lasa(["CShape"])])
+    done = run("recognize", asked / "c.csv", "-l", tmp_path / "empty")
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "symbol" in done.stderr
+
+
+def test_a_symbol_moves_again(folder, tmp_path):
+    done = run(
+        "generate", "GShape", "-l", folder, "--goal", "4,2", "--duration", 2, "--settle", 0.01, "-o", tmp_path / "g.csv"
+    )
+    assert done.returncode == 0, done.stderr
+    made = read_recording(tmp_path / "g.csv")
+    np.testing.assert_allclose(made.positions[-1, :2], [4, 2], atol=0.01)
+    again = json.loads(run("generate", "GShape", "-l", folder, "--json", "--rate", 50).stdout)
+    with kineme.ActionLibrary(folder, read_only=True) as library:
+        start = np.array([one.positions[0] for one in library.movements("GShape")])
+    assert np.abs(start - again["positions"][0]).sum(axis=1).min() < 1e-4  # one of its demonstrations
+    missing = run("generate", "HShape", "-l", folder)
+    assert missing.returncode == 1
+    assert "'HShape'" in missing.stderr
+
+
+def test_a_symbol_for_a_planner(folder, tmp_path):
+    from jsonschema import Draft202012Validator
+
+    done = run("library", "ground", "GShape", "-l", folder, "--units", "mm", "-o", tmp_path / "g.json")
+    assert done.returncode == 0, done.stderr
+    grounding = json.loads((tmp_path / "g.json").read_text())
+    Draft202012Validator(grounding_schema()).validate(grounding)
+    assert json.loads(run("library", "schema").stdout) == grounding_schema()
+    assert grounding["symbol"]["name"] == "GShape"
+    path = primitive_from(grounding).rollout(goal=grounding["demonstrated"]["goal"]["median"])
+    np.testing.assert_allclose(path.positions[0, -1], grounding["demonstrated"]["goal"]["median"], atol=1.0)
+
+
+def test_what_is_near_and_between(folder, tmp_path):
+    near = answer("library", "nearest", "GShape", "-k", 2, "-l", folder)
+    assert near[0]["symbol"] == "CShape"
+    assert near[0]["distance"] < near[1]["distance"]
+    found = answer("library", "between", "GShape", "Angle", "-l", folder)
+    assert all(0 <= one["share"] <= 1 and one["excess"] <= 0.25 for one in found)
+    assert run("library", "map", tmp_path / "map.png", "-l", folder).returncode == 0
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("kineme rec", "recognize"), ("kineme library na", None), ("kineme library li", "list")],
+)
+def test_the_shell_completes_commands(words, expected):
+    assert _completed(words) == ([expected] if expected else [])
+
+
+def test_the_shell_completes_symbols_of_the_library_on_the_line(folder):
+    assert _completed(f"kineme library show -l {folder} N") == ["NShape"]
+    assert _completed(f"kineme generate -l {folder} G") == ["GShape"]
+    assert _completed("kineme library show -l nowhere N") == []
+
+
+def _completed(words):
+    """What bash would offer for the last word."""
+    environment = {"_KINEME_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    code = "from kineme.cli import main; main(prog_name='kineme')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={"PATH": "", **environment}
+    )
+    return [line.partition(",")[2] for line in done.stdout.splitlines() if line]
