@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 from kineme import Demonstrations, Resample, Smooth, preprocess
+from kineme.trajectories.arc_length import arc_length_phase, resample_by_arc_length, resample_by_phase
 from kineme.trajectories.resample import relative_rows
 from kineme.trajectories.smooth import smooth_rows
 from kineme.trajectories.spline import spline_matrix, spline_rows
@@ -86,6 +87,19 @@ def test_movements_too_long_to_be_worked_on_side_by_side_are_the_same(compiled, 
     after = relative_rows(demos, 0, 6, 33), smooth_rows(demos, 0, 6, 8.0, 33), Smooth(8.0).apply(demos).positions
     for one, other in zip(before, after, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+@given(seed=st.integers(0, 10**6), n_dims=st.integers(1, 4))
+def test_arc_length_is_the_same_compiled_through_pauses_and_at_rest(share, seed, n_dims):
+    rng = np.random.default_rng(seed)
+    paths = np.cumsum(rng.normal(size=(3, n_dims, 70)), axis=2)
+    paths[0, :, 20:40] = paths[0, :, 20:21]
+    paths[1] = 7.0
+    expected = resample_by_phase(paths, arc_length_phase(paths, share), 31)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KINEME_COMPILED", "always")
+        np.testing.assert_allclose(resample_by_arc_length(paths, 31, share), expected, atol=1e-9)
 
 
 @given(seed=st.integers(0, 10**6), nearness=st.sampled_from([1e-5, 1e-7]))

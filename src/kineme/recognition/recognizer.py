@@ -14,7 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.parallel import for_tiles
+from kineme.parallel import for_tiles, single_threaded_blas
 from kineme.recognition.choice import CANDIDATES, chosen_weights, given_weights, suffices
 from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
@@ -122,7 +122,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.labels_ = labels[order]
         self.first_ = first  # of each class, in the order of the demonstrations
         per_class = np.diff(first, append=len(labels))
-        self._choose_representations(per_class)
+        with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
+            self._choose_representations(per_class)
         self.classifier_: Classifier = choose(self.classifier, per_class)
         self.classifier_.fit(self)
         self.calibration_: Calibration | None = None  # these two are made when first asked for

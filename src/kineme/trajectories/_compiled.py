@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.compiled import jit
+from kineme.trajectories._locate import locate
 
 
 @jit
@@ -36,25 +37,30 @@ def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
     """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
     n, n_dims, n_samples = paths.shape
     n_points = rows.shape[2]
-    phase = np.empty(n_samples)
+    phase, interval, weight = np.zeros(n_samples), np.empty(n_points, np.int64), np.empty(n_points)
     for i in range(n):
-        phase[0] = 0.0
+        phase[:] = 0.0
+        for k in range(n_dims):
+            path = paths[i, k]
+            for t in range(n_samples - 1):
+                step = path[t + 1] - path[t]
+                phase[t + 1] += step * step
+        for t in range(n_samples):
+            phase[t] = np.sqrt(phase[t])
         for t in range(1, n_samples):
-            square = 0.0
-            for k in range(n_dims):
-                step = paths[i, k, t] - paths[i, k, t - 1]
-                square += step * step
-            phase[t] = phase[t - 1] + np.sqrt(square)
+            phase[t] += phase[t - 1]
         total = phase[n_samples - 1]
         share = a if total > 0.0 else 0.0
         per_length = share / total if total > 0.0 else 0.0
+        per_sample = (1.0 - share) / (n_samples - 1)
         for t in range(n_samples):
-            phase[t] = per_length * phase[t] + (1.0 - share) * t / (n_samples - 1)
-        j = 0
+            phase[t] = per_length * phase[t] + per_sample * t
+        locate(phase, interval)
         for p in range(n_points):
-            target = p / (n_points - 1)
-            while j < n_samples - 2 and phase[j + 1] <= target:
-                j += 1
-            weight = min(1.0, (target - phase[j]) / (phase[j + 1] - phase[j]))
-            for k in range(n_dims):
-                rows[i, k, p] = paths[i, k, j] + weight * (paths[i, k, j + 1] - paths[i, k, j])
+            j = interval[p]
+            weight[p] = min(1.0, (p / (n_points - 1) - phase[j]) / (phase[j + 1] - phase[j]))
+        for k in range(n_dims):
+            path, row = paths[i, k], rows[i, k]
+            for p in range(n_points):
+                j = interval[p]
+                row[p] = path[j] + weight[p] * (path[j + 1] - path[j])

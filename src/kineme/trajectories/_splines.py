@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.compiled import jit
+from kineme.trajectories._locate import locate
 
 _LANES = 32  # fewer leave the processor waiting, more do not fit its cache
 _FAR = 1e200  # gap behind the last sample
@@ -61,7 +62,7 @@ def _fill_rows(parameter, positions, offsets, scales, smooth, rows):  # type: ig
             i, k = divmod(first + lane, n_dims)
             if lane == 0 or k == 0:
                 # Written to memory: stamps count seconds since 1970 here and there, and sums must not be reordered.
-                _locate(parameter[offsets[i] : offsets[i + 1]] - parameter[offsets[i]], scales[i], interval, weights)
+                _weigh(parameter[offsets[i] : offsets[i + 1]] - parameter[offsets[i]], scales[i], interval, weights)
             _evaluate(knots, lane, interval, weights, rows[i, k])
 
 
@@ -200,23 +201,12 @@ def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _locate(u, scale, interval, weights):  # type: ignore[no-untyped-def]
-    """For each even target, its knot interval, and the weights there of both knots' positions and derivatives.
-
-    The parameter u starts at 0. Counting the knots at or below each target, then adding up, has no branch to
-    mispredict: on irregular stamps it is several times faster than walking along the knots.
-    """
-    n_points, last = len(interval), len(u) - 1
-    step = u[last] / (n_points - 1)
-    per_step = 1.0 / step
-    interval[:] = 0
-    for j in range(1, last):
-        target = int(np.ceil(u[j] * per_step))
-        interval[min(target, n_points - 1)] += 1
-    j = 0
-    for p in range(n_points):
-        j += interval[p]
-        interval[p] = j
+def _weigh(u, scale, interval, weights):  # type: ignore[no-untyped-def]
+    """For each even target, its knot interval, and the weights there of both knots' positions and derivatives."""
+    step = u[len(u) - 1] / (len(interval) - 1)
+    locate(u, interval)
+    for p in range(len(interval)):
+        j = interval[p]
         gap = u[j + 1] - u[j]
         s = (p * step - u[j]) / gap
         r, square = 1.0 - s, (gap * scale) ** 2 / 6.0
