@@ -199,11 +199,13 @@ def test_movements_of_a_long_table_may_be_interleaved_and_share_their_number_bet
         np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
 
 
-def test_labels_alone_begin_a_movement_where_they_change():
-    rows = [(label, *row) for label in ("wave", "rest", "wave") for row in SIX]
+def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
+    rows = [(label, *row) for label in ("wave", "wave", "rest", "wave") for row in SIX]
+    rows += [("nod", 100 + row[0], *row[1:]) for row in SIX]
     found = read(lines(rows, "label,time,x,y"))
-    assert found.labels == ("wave", "rest", "wave")
-    assert [one.place for one in found.sources] == ["0", "1", "2"]
+    assert found.labels == ("wave", "wave", "rest", "wave", "nod")
+    assert [one.place for one in found.sources] == ["0", "1", "2", "3", "4"]
+    assert found.demonstrations.lengths.tolist() == [6] * 5
 
 
 def test_names_are_text_whatever_they_look_like():

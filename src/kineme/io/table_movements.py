@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,19 @@ from kineme.io.found import Block, Detected, Found
 from kineme.io.layout import Layout
 from kineme.io.table import Table
 from kineme.io.time_units import in_seconds, unit_by_size, unit_in_head
+from kineme.validation import Array
 
 
 def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Found:
     """The movements of a table.
 
     With columns that tell movements apart, rows of equal texts in them, and of equal label, are one movement, wherever
-    they stand. With a column of labels alone, a new movement begins where the label changes. Else the table is one.
+    they stand. With a column of labels alone, a new movement begins where the label changes or time begins anew. Else
+    the table is one.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
-    codes, keys, labels = _split(table, roles)
+    codes, keys, labels = _split(table, roles, times)
     n = len(keys)
     rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
     if rows is not None:
@@ -61,14 +64,15 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     return in_seconds(stamps, units), units, known
 
 
-def _split(table: Table, roles: Roles) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
+def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
     """Per row the number of its movement; per movement its place and its label."""
     n_rows, label = table.n_rows, roles.label
     if label is None and not roles.movement:
         return np.zeros(n_rows, np.intp), [""], [None]
     labels = [None] * n_rows if label is None else table.columns[label].tolist()
     if not roles.movement:
-        codes = np.cumsum([k > 0 and labels[k] != labels[k - 1] for k in range(n_rows)], dtype=np.intp)
+        changes = np.array([before != label for before, label in pairwise(labels)], dtype=bool)
+        codes = np.append(0, np.cumsum(changes | (times[1:] < times[:-1])))
         firsts = np.flatnonzero(np.diff(codes, prepend=-1))
         return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
     columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
