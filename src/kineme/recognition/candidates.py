@@ -19,10 +19,10 @@ from kineme.validation import Array
 
 Single = NDArray[np.float32]
 
-N_CODES = 12  # per representation and dimension: on handwriting, the best of 200,000 is then the first or second
+N_CODES = 8  # per representation and dimension: on handwriting, few of 200,000 are then in doubt
 _TILE_ROWS = 16_384  # codes at a time: what is computed of them stays in a core's cache
 _ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
-_NEWTON_STEPS = 4  # each brings the bound in space closer, and none below what it bounds
+_NEWTON_STEPS = 6  # each brings the bound in space closer, and none below what it bounds
 
 
 class Code(NamedTuple):
@@ -52,7 +52,7 @@ def fit_bases(views: tuple[NDArray[Any], ...], n_dims: int, n_codes: int = N_COD
     views : tuple of R ndarrays of shape (n, d * S)
         As from `views.view`.
     n_dims : int
-    n_codes : int, default 12
+    n_codes : int, default 8
         k, or S where that is smaller.
     """
     bases = []
@@ -84,30 +84,27 @@ def log_bounds(similarity: AveragedSimilarity, asked: tuple[Code, ...], stored: 
     """
     n, m = len(asked[0].values), len(stored[0].values)
     bounds = np.empty((n, m), dtype=np.float32)
+    average: Any = LOG_MEANS[similarity.mean]  # keeps single precision
     louder = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
+    # What does not depend on the stored code is multiplied by 1 / sigma^2 beforehand.
+    scaled = [
+        Code(*(np.asarray(one / width**2, dtype=np.float32) for one in code))
+        for code, width in zip(asked, similarity.widths, strict=True)
+    ]
 
     def fill(start: int, stop: int) -> None:
         logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
         for r, code in enumerate(stored):
-            rows = code.take(slice(start, stop))
-            logs[r] = _kernel_bounds(similarity.procrustes, float(similarity.widths[r]), asked[r], rows)
-            logs[r] += np.float32(louder[r])
-        average: Any = LOG_MEANS[similarity.mean]  # keeps single precision
+            half = np.float32(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
+            most = _alignments(similarity.procrustes, scaled[r].values, code.values[start:stop])
+            most += code.rests[start:stop, None] * scaled[r].rests
+            most -= half * code.squares[start:stop, None]
+            most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(louder[r])
+            np.minimum(most, np.float32(louder[r]), out=logs[r])
         bounds[:, start:stop] = average(logs).T
 
     for_tiles(fill, m, max(1, _TILE_ROWS // n))
     return bounds
-
-
-def _kernel_bounds(procrustes: Procrustes, width: float, asked: Code, stored: Code) -> Single:
-    """Bounds (m, n) of the logarithms of one representation's kernel."""
-    twice = _alignments(procrustes, asked.values, stored.values)
-    twice += stored.rests[:, None] * asked.rests
-    twice *= np.float32(2.0)
-    twice -= np.float32(1.0 - _ROUNDING) * stored.squares[:, None]
-    twice -= np.float32(1.0 - _ROUNDING) * asked.squares
-    twice *= np.float32(0.5 / width**2)
-    return np.minimum(twice, np.float32(0.0), out=twice)
 
 
 def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
@@ -116,9 +113,8 @@ def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
     if procrustes.max_angle == 0 or d == 1:
         return np.asarray(B @ A.T)
     if d == 2:
-        x, y = np.split(A, 2, axis=1)
-        product = B @ np.block([[x, y], [y, -x]]).T  # real and imaginary parts of sum_t a_t conj(b_t)
-        return _within(product[:, :n], product[:, n:], procrustes.max_angle)
+        x, y = np.split(A, 2, axis=1)  # with a = x + i y: real and imaginary part of sum_t a_t conj(b_t)
+        return _within(B @ A.T, B @ np.concatenate((y, -x), axis=1).T, procrustes.max_angle)
     k = A.shape[1] // 3
     C = (B.reshape(-1, k) @ A.reshape(-1, k).T).reshape(len(B), 3, n, 3)
     return _over_rotations(C.transpose(1, 3, 0, 2), np.linalg.norm(A, axis=1) * np.linalg.norm(B, axis=1)[:, None])
@@ -127,8 +123,12 @@ def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
 def _within(re: Single, im: Single, max_angle: float) -> Single:
     """Largest real part of ``(re + i im) exp(-i angle)`` within the angle, without an arc tangent."""
     c, s = np.float32(math.cos(max_angle)), np.float32(math.sin(max_angle))
-    im = np.abs(im)
-    return np.where(s * re >= c * im, np.sqrt(re * re + im * im), c * re + s * im)
+    size = np.sqrt(re * re + im * im)
+    inside = re >= c * size
+    re *= c
+    re += s * np.abs(im)
+    np.copyto(re, size, where=inside)
+    return re
 
 
 def _over_rotations(C: NDArray[Any], most: Single) -> Single:

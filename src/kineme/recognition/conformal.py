@@ -75,10 +75,13 @@ class Calibration:
         """P-values (n, C), from as few classes as suffice to reach `error_rate`."""
         scores = self.scores(nearest)
         result = np.exp(-0.25 * math.pi * scores**2)
+        ordered: dict[int, Array] = {}  # classes share what is pooled
         for c, choices in enumerate(zip(self.own, self.pooled, strict=True)):
             enough = [one for one in choices if (len(one) + 1) * error_rate > 1 - 1e-12]
             if enough:
-                calibrating = np.sort(enough[0])
+                if id(enough[0]) not in ordered:
+                    ordered[id(enough[0])] = np.sort(enough[0])
+                calibrating = ordered[id(enough[0])]
                 above = len(calibrating) - np.searchsorted(calibrating, scores[:, c])
                 result[:, c] = (1.0 + above) / (len(calibrating) + 1.0)
         return result
