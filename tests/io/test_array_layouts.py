@@ -68,6 +68,12 @@ def test_whole_milliseconds_are_recognized_and_a_given_unit_wins():
     assert read({"times": T * 1000, "positions": X}, units="s").demonstrations.durations.tolist() == [400]
 
 
+def test_dates_and_durations_keep_their_unit():
+    dates = np.datetime64("2024-05-06T07:08:09", "ms") + np.arange(5) * 100
+    assert read({"times": dates, "positions": X}).demonstrations.times[0] == 1714979289
+    np.testing.assert_allclose(read({"times": dates - dates[0], "positions": X}).demonstrations.times, T)
+
+
 @pytest.mark.parametrize(
     ("arrays", "words"),
     [
@@ -77,7 +83,10 @@ def test_whole_milliseconds_are_recognized_and_a_given_unit_wins():
         ({"positions": np.zeros((2, 2, 5, 3)), "times": T}, r"of shape \(T, d\) or \(n, T, d\), got \(2, 2, 5, 3\)"),
         ({"positions": np.stack((X, X)), "times": T[:4]}, r"times of shape \(5,\) or \(2, 5\), got \(4,\)"),
         ({"positions": np.stack((X, X)), "labels": ["a"]}, r"one label for each of the 2 movements, .* \(1,\)"),
-        ({"x_0": X, "x_1": X[:, :2]}, r"movements of the same dimensions, got \[2, 3\]"),
+        ({"x_0": X, "x_1": X[:, :2]}, r"movements of the same dimensions, at least one, got \[2, 3\]"),
+        ({"positions": np.zeros((3, 5, 0))}, r"at least one, got \[0\]"),
+        ({"positions": np.zeros((0, 5, 2))}, r"at least one, got \[\]"),
+        ({"positions": X * 1j, "times": T}, "expected real numbers, got complex128"),
         ({"x_0": X, "t_0": T, "x_1": X}, "times for each of the 2 movements, got no entry 't_1'"),
         ({"x_0": X, "t_0": T[:3]}, "expected one time stamp per sample, got 3 for 5 in movement 0"),
         ({"x_0": np.zeros((2, 2, 2))}, r"positions of shape \(T, d\), got \(2, 2, 2\)"),

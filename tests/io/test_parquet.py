@@ -76,3 +76,9 @@ def test_without_the_package_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(kineme.DataError, match=r"pip install 'kineme\[parquet\]'"):
         read_recordings_from_bytes(b"PAR1", "a.parquet", Layout())
+
+
+@pytest.mark.parametrize("columns", [("time", "x"), ("label", "time", "x"), ("demo", "time", "x")])
+def test_a_table_without_rows_is_refused(columns):
+    with pytest.raises(kineme.DataError, match="expected samples, got a table without rows"):
+        read({name: pa.array([], pa.float64()) for name in columns})

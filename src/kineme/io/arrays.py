@@ -38,7 +38,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Fo
     arrays = _axes_joined(arrays)
     key = _named(arrays, POSITIONS)
     if key is not None:
-        xs, ts, how = _of_one(arrays, np.asarray(arrays[key], dtype=np.float64), layout)
+        xs, ts, how = _of_one(arrays, _numbers(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
     return join(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
@@ -53,8 +53,9 @@ def join(
 ) -> Found:
     """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Found`."""
     labels, time = named
-    if not xs or len({x.shape[1] for x in xs}) != 1:
-        raise DataError(f"expected movements of the same dimensions, got {sorted({x.shape[1] for x in xs}) or 'none'}")
+    dims = sorted({x.shape[1] for x in xs})
+    if len(dims) != 1 or dims == [0]:
+        raise DataError(f"expected movements of the same dimensions, at least one, got {dims}")
     if ts is not None and [len(t) for t in ts] != [len(x) for x in xs]:
         odd = next(i for i, (t, x) in enumerate(zip(ts, xs, strict=True)) if len(t) != len(x))
         raise DataError(f"expected one time stamp per sample, got {len(ts[odd])} for {len(xs[odd])} in movement {odd}")
@@ -82,7 +83,17 @@ def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
         return arrays
     others = {name: value for name, value in arrays.items() if name not in axes}
-    return {**others, "positions": np.column_stack([np.asarray(arrays[name], dtype=np.float64) for name in axes])}
+    return {**others, "positions": np.column_stack([_numbers(arrays[name]) for name in axes])}
+
+
+def _numbers(values: Any) -> Array:
+    """As float64; dates and durations count in nanoseconds."""
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise DataError(f"expected real numbers, got {array.dtype}; save both parts as columns")
+    if array.dtype.kind in "mM":
+        array = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64)
+    return array.astype(np.float64, copy=False)
 
 
 def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
@@ -91,7 +102,7 @@ def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = _named(arrays, TIMES)
-    t = None if key is None else np.asarray(arrays[key], dtype=np.float64)
+    t = None if key is None else _numbers(arrays[key])
     if x.ndim == 3:
         if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
             raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
@@ -118,7 +129,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if prefix is None:
         raise DataError(f"expected arrays times and positions, got no entry 'positions' but {list(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
-    xs = [np.asarray(arrays[f"{prefix}_{k}"], dtype=np.float64) for k in range(count)]
+    xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     if odd := [x.shape for x in xs if x.ndim != 2]:
         raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
@@ -126,7 +137,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if clock is None:
         return xs, None, "numbered"
     try:
-        return xs, [np.asarray(arrays[f"{clock}_{k}"], dtype=np.float64).ravel() for k in range(count)], "numbered"
+        return xs, [_numbers(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
     except KeyError as error:
         raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
 

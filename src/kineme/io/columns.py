@@ -148,7 +148,7 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 def _says_nothing_new(heads: Sequence[str], k: int) -> bool:
     """A counter of samples, or the velocity or acceleration of another column."""
     words = words_of(heads[k])
-    if not words or (words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+    if not heads[k].strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(heads[k]))
     return derived is not None and (derived[1] or derived[2]) in {_plain(head) for head in heads}

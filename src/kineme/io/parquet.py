@@ -43,6 +43,8 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         if isinstance(error, DataError):
             raise
         raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
+    if table.num_rows == 0:
+        raise DataError("expected samples, got a table without rows")
     columns = [read.get(k) for k in range(len(heads))]
     dated = roles.time is not None and kinds[roles.time] == "date"
     return Table(heads, columns, table.num_rows, _no_lines, dates_in="ns" if dated else None), roles
