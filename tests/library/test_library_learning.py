@@ -242,3 +242,13 @@ def test_the_specification_is_kept_with_the_library(tmp_path):
         }
         assert library.primitives().dmp == dmp
         np.testing.assert_allclose(library.features()[:, 0], draw_movements(4).positions[::40, 0], rtol=1e-6)
+
+
+def test_an_empty_library_says_so(library):
+    assert len(library) == len(library.unlabeled()) == library.version == 0
+    assert library.n_dims is None
+    assert library.symbols() == library.history() == ()
+    assert library.verify() == []
+    for read in (library.movements, library.features, library.primitives):
+        with pytest.raises(kineme.SpecificationError, match=r"expected at least one movement, got none: the library"):
+            read()

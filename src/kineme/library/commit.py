@@ -35,12 +35,8 @@ def describe(store: Store, demos: Demonstrations, batch: Batch, new: list[int]) 
 
 def commit(store: Store, batch: Batch) -> Committed:
     """Store what is new, and let labels make and join symbols; where nothing changes, no version is made."""
-    with store.reading() as connection:
-        known = look_up(connection, batch)
-        found = [known.id_of(batch, i) for i in range(len(batch.digests))]
-        ids = np.array([key for key in found if key is not None], dtype=np.int64)
-        if len(ids) == len(found) and not _without_symbol(connection, batch, ids.tolist()):
-            return Committed(0, (), ids)
+    if not batch.packed_rows and (ids := _all_known(store, batch)) is not None:
+        return Committed(0, (), ids)
     detail: dict[str, Any] = {}
     with store.writing("learn", detail) as change:
         known = look_up(change.connection, batch)  # again: another writer may have been first
@@ -53,6 +49,17 @@ def commit(store: Store, batch: Batch) -> Committed:
         made = _join(change, batch, keys)
         detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(made)}
     return Committed(len(new), made, np.array(keys, dtype=np.int64))
+
+
+def _all_known(store: Store, batch: Batch) -> NDArray[np.int64] | None:
+    """The ids, if every movement is there and has a symbol if it should: then there is nothing to store."""
+    with store.reading() as connection:
+        known = look_up(connection, batch)
+        found = [known.id_of(batch, i) for i in range(len(batch.digests))]
+        ids = [key for key in found if key is not None]
+        if len(ids) < len(found) or _without_symbol(connection, batch, ids):
+            return None
+        return np.array(ids, dtype=np.int64)
 
 
 def _keys(change: Change, batch: Batch, known: Known) -> tuple[list[int], dict[int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
 
 Ids = NDArray[np.int64]
 
@@ -85,74 +87,84 @@ def as_ids(store: Store, ids: Any) -> Ids:
 
 def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
     """Rows of the table `movement`, as dictionaries, in the order of `ids`."""
-    found: dict[int, Row] = {}
-    for rows in _chunks(store, "movement", "id", ids):
-        found.update((row[0], row) for row in rows)
-    return [dict(zip(COLUMNS["movement"], found[key], strict=True)) for key in ids.tolist()]
+    wanted, order = _sorted(ids)
+    rows = [row for chunk in _chunks(store, "movement", "id", wanted) for row in chunk]
+    return [dict(zip(COLUMNS["movement"], rows[i], strict=True)) for i in order.tolist()]
 
 
 def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstrations:
     """The recordings, in the order of `ids`."""
-    about = records(store, ids)
+    wanted, order = _sorted(ids)
+    about = records(store, wanted)
     lengths = np.array([one["n_samples"] for one in about])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
     t0, durations = (np.array([one[name] for one in about]) for name in ("t0", "duration"))
-    place = _places(ids)
     positions = np.empty((offsets[-1], store.n_dims or 0))
-    u = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
-    times = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * u
-    even = True
-    for rows in _chunks(store, "raw", "movement", ids):
-        for key, start, relative, stamps in rows:
-            for i in place[key]:
-                part = slice(offsets[i], offsets[i + 1])
-                positions[part] = np.frombuffer(relative, np.float32).reshape(lengths[i], -1) + np.frombuffer(start)
-                if stamps is not None:
-                    even = False
-                    kind = np.float32 if len(stamps) == 4 * lengths[i] else np.float64
-                    times[part] = t0[i] + np.frombuffer(stamps, kind)
-    block = Movements(
-        positions,
-        offsets,
-        durations,
-        None if even and not t0.any() else times,
-        np.array(labels) if all(label is not None for label in labels) else None,
-        tuple(one["name"] or f"movement {one['id']}" for one in about),
-    )
-    return Demonstrations.of_movements(block)
+    stamps: dict[int, bytes] = {}
+    done = 0
+    for rows in _chunks(store, "raw", "movement", wanted):
+        part = slice(done, done + len(rows))
+        starts = np.frombuffer(b"".join(row[1] for row in rows)).reshape(len(rows), -1)
+        relative = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, starts.shape[1])
+        np.add(relative, np.repeat(starts, lengths[part], axis=0), out=positions[offsets[done] : offsets[part.stop]])
+        stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
+        done = part.stop
+    times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
+    block = Movements(positions, offsets, durations, times, None, _names(about))
+    if not np.array_equal(wanted, ids):
+        block = block.take(order)
+    return Demonstrations.of_movements(replace(block, labels=_labels(labels)))
+
+
+def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
+    """Time stamps of all samples: the stored ones, and even ones where none were stored."""
+    lengths = np.diff(offsets)
+    k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
+    times: Array = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * k
+    for i, blob in stamps.items():
+        kind = np.float32 if len(blob) == 4 * lengths[i] else np.float64
+        times[offsets[i] : offsets[i + 1]] = t0[i] + np.frombuffer(blob, kind)
+    return times
 
 
 def features(store: Store, ids: Ids) -> NDArray[np.float32]:
     """Rows of all representations, one after the other, shape (k, sum of d * S)."""
-    width = sum(store.specification.widths(store.n_dims or 0))
-    place, found = _places(ids), np.empty((len(ids), width), dtype=np.float32)
-    for rows in _chunks(store, "feature", "movement", ids):
-        at, which = _scatter([key for key, _ in rows], place)
-        block = np.frombuffer(b"".join(row for _, row in rows), np.float32).reshape(-1, width)
-        found[at] = block[which]
-    return found
+    wanted, order = _sorted(ids)
+    width, done = sum(store.specification.widths(store.n_dims or 0)), 0
+    found = np.empty((len(wanted), width), dtype=np.float32)
+    for rows in _chunks(store, "feature", "movement", wanted):
+        found[done : done + len(rows)] = np.frombuffer(b"".join(row[1] for row in rows), np.float32).reshape(-1, width)
+        done += len(rows)
+    return found if np.array_equal(wanted, ids) else found[order]
 
 
 def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitives:
     """The primitives, in the order of `ids`."""
-    dmp, n, d = store.specification.dmp, len(ids), store.n_dims or 0
-    about, place = records(store, ids), _places(ids)
-    boundary, weights = np.empty((n, 4, d)), np.empty((n, d, dmp.n_basis))
-    for rows in _chunks(store, "primitive", "movement", ids):
-        at, which = _scatter([row[0] for row in rows], place)
-        boundary[at] = np.frombuffer(b"".join(row[1] for row in rows)).reshape(-1, 4, d)[which]
-        weights[at] = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d, dmp.n_basis)[which]
+    wanted, order = _sorted(ids)
+    dmp, d = store.specification.dmp, store.n_dims or 0
+    about = records(store, ids)
+    rows = [row for chunk in _chunks(store, "primitive", "movement", wanted) for row in chunk]
+    boundary = np.frombuffer(b"".join(row[1] for row in rows)).reshape(-1, 4, d)[order]
+    weights = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d, dmp.n_basis)[order]
     return Primitives(
         dmp,
-        scaled_weights=weights,
+        scaled_weights=weights.astype(np.float64),
         starts=boundary[:, 0],
         goals=boundary[:, 1],
         velocities=boundary[:, 2],
         durations=np.array([one["duration"] for one in about]),
         extents=boundary[:, 3],
-        labels=np.array(labels) if all(label is not None for label in labels) else None,
-        names=tuple(one["name"] or f"movement {one['id']}" for one in about),
+        labels=_labels(labels),
+        names=_names(about),
     )
+
+
+def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:
+    return np.array(labels) if all(label is not None for label in labels) else None
+
+
+def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    return tuple(one["name"] or f"movement {one['id']}" for one in about)
 
 
 def names_of(store: Store, ids: Ids) -> list[str | None]:
@@ -167,9 +179,8 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
     return [found.get(key) for key in ids.tolist()]
 
 
-def _chunks(store: Store, table: str, column: str, ids: Ids) -> Iterator[list[Row]]:
-    """Rows of a table with those keys, in ascending order, some at a time."""
-    wanted = np.unique(ids)
+def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:
+    """Rows of a table with those keys, which ascend, some at a time."""
     for k in range(0, len(wanted), _ROWS):
         with store.reading() as connection:
             rows = select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
@@ -179,15 +190,9 @@ def _chunks(store: Store, table: str, column: str, ids: Ids) -> Iterator[list[Ro
         yield rows
 
 
-def _places(ids: Ids) -> dict[int, list[int]]:
-    """Id -> where in `ids` it stands."""
-    found: dict[int, list[int]] = {}
-    for i, key in enumerate(ids.tolist()):
-        found.setdefault(key, []).append(i)
-    return found
-
-
-def _scatter(keys: list[int], place: dict[int, list[int]]) -> tuple[list[int], list[int]]:
-    """Rows of the result, and for each of them the row of the chunk that belongs there."""
-    pairs = [(i, k) for k, key in enumerate(keys) for i in place[key]]
-    return [i for i, _ in pairs], [k for _, k in pairs]
+def _sorted(ids: Ids) -> tuple[Ids, NDArray[np.intp]]:
+    """The ids ascending, each once, and where each of `ids` stands among them."""
+    if not len(ids):
+        raise SpecificationError("expected at least one movement, got none: the library or the symbol has none yet")
+    wanted, order = np.unique(ids, return_inverse=True)
+    return wanted, order

@@ -13,6 +13,8 @@ from kineme.library.schema import BLOBS, COLUMNS
 
 Row = tuple[Any, ...]
 
+_PARAMETERS = 999  # of one statement, in every build of SQLite
+
 #: A row at version :v.
 ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
 
@@ -31,10 +33,19 @@ def _seal_blobs(row: Row) -> int:
     return crc
 
 
-def insert(connection: sqlite3.Connection, table: str, rows: Iterable[Row]) -> None:
-    """Add rows, in the order of `COLUMNS`, each with its seal."""
-    marks = ", ".join("?" * (len(COLUMNS[table]) + 1))
-    connection.executemany(f"INSERT INTO {table} VALUES ({marks})", [(*row, seal(table, row)) for row in rows])
+def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> None:
+    """Add rows, in the order of `COLUMNS`, each with its seal.
+
+    Many rows to a statement: between two statements Python's lock changes hands, and a writing thread that asks for it
+    once a row waits for the one that describes the next movements most of the time.
+    """
+    width = len(COLUMNS[table]) + 1
+    step = _PARAMETERS // width
+    mark = f"({', '.join('?' * width)})"
+    for k in range(0, len(rows), step):
+        some = rows[k : k + step]
+        values = [value for row in some for value in (*row, seal(table, row))]
+        connection.execute(f"INSERT INTO {table} VALUES {', '.join([mark] * len(some))}", values)
 
 
 def select(
