@@ -19,7 +19,7 @@ from kineme.validation import Array
 
 Single = NDArray[np.float32]
 
-N_CODES = 8  # per representation and dimension: on handwriting, few of 200,000 are then in doubt
+N_CODES = 12  # per representation and dimension: on handwriting, hardly any of 200,000 is then in doubt
 _TILE_ROWS = 16_384  # codes at a time: what is computed of them stays in a core's cache
 _ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
 _NEWTON_STEPS = 6  # each brings the bound in space closer, and none below what it bounds
@@ -52,7 +52,7 @@ def fit_bases(views: tuple[NDArray[Any], ...], n_dims: int, n_codes: int = N_COD
     views : tuple of R ndarrays of shape (n, d * S)
         As from `views.view`.
     n_dims : int
-    n_codes : int, default 8
+    n_codes : int, default 12
         k, or S where that is smaller.
     """
     bases = []

@@ -24,7 +24,8 @@ Rows = NDArray[np.intp]
 
 _BEST = 48  # movements compared first whatever they are
 _CLASSES = 64  # classes that an answer speaks of
-_MOST = 4096  # movements compared afterwards, where bounds leave doubt
+_MOST = 4096  # movements compared afterwards, where bounds leave doubt about the nearest of all
+_OF_CLASSES = 256  # and about the nearest of each class
 _ASKED = 16  # questions whose bounds are computed in one matrix product
 
 
@@ -84,9 +85,10 @@ class Shortlist:
     """A recognizer of which only the comparison is in memory.
 
     `recognizer` is fitted, to a sample: it holds widths, weights and calibration of all classes (`classes` in order).
-    The label is that of an exhaustive search, and so are p-values, as long as the doubtful movements, those whose bound
-    is above the similarity to the nearest one known, are at most 4096. P-values are given for the 64 classes whose
-    could be largest.
+    The best-ranked class is that of an exhaustive search as long as no more than 4096 movements are in doubt, their
+    bound above the similarity to the nearest one known. P-values are given for the 64 classes whose could be largest;
+    they are exact as long as no more than 256 others could be the nearest of their class, else not too small for
+    the nearest classes, and possibly too small for those far away.
     """
 
     recognizer: Recognizer
@@ -135,8 +137,10 @@ class Shortlist:
         doubtful = bounds > np.repeat(near, self.stored.counts)
         doubtful[places] = False
         more = np.flatnonzero(doubtful)
-        if len(more) > _MOST:
-            more = np.sort(more[np.argpartition(-bounds[more], _MOST)[:_MOST]])
+        decisive = np.count_nonzero(bounds[more] > logs.max())
+        n_more = min(decisive, _MOST) + _OF_CLASSES
+        if len(more) > n_more:
+            more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
         if not len(more):
             return places, logs, views
         others, other_logs = self._exact(one, more)
