@@ -59,7 +59,10 @@ def _kind(pa: Any, kind: Any) -> str:
 
 def _column(column: Any, is_text: bool, head: str) -> Any:
     if is_text:
-        return np.array(["" if one is None else str(one) for one in column.to_pylist()], dtype=object)
+        known = column.unique().to_pylist()  # names are few, rows many
+        texts = np.array(["" if one is None else str(one) for one in known], dtype=object)
+        codes = {one: k for k, one in enumerate(known)}
+        return texts[np.fromiter((codes[one] for one in column.to_pylist()), np.intp, len(column))]
     values = column.to_numpy()
     if values.dtype.kind in "Mm":
         counts = values.astype(f"{values.dtype.kind}8[ns]")
