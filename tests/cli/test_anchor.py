@@ -77,8 +77,12 @@ def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
         library.assign(range(1, 8), "C")  # the Cs, by hand
         library.assign(range(8, 15), "G")
         library.learn([2 * one.positions + 5 for one in demos])
+    assert run("anchor", "-l", folder, "--accept", "7", "--pictures", tmp_path / "p").returncode == 2
+    listed = answer("anchor", "-l", folder, "--pictures", tmp_path / "p")  # nothing has joined yet
     data = answer("anchor", "-l", folder, "--accept", "all", "--pictures", tmp_path / "p")
-    assert data["joined"] == {"C": 7}
+    assert (listed["would_join"], listed["joined"]) == ({"C": 7}, {})
+    assert (data["would_join"], data["joined"]) == ({}, {"C": 7})
+    assert listed["proposals"] == data["proposals"]  # a number means the same when listed and when accepted
     assert sorted(len(one["movements"]) for one in data["proposals"]) == [7, 7, 7]  # N, sine, angle
     actions = [one["action"] for one in answer("library", "history", "-l", folder)]
     assert actions[:4] == ["learn", "assign", "assign", "learn"]

@@ -46,11 +46,13 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
 def anchor(folder: Path, **options: Any) -> None:
     """Propose kinds among the movements without a name, and turn them into symbols.
 
-    On a terminal it asks for each; with --accept or --reject it does not; with neither it lists them.
+    On a terminal it asks for each; with --accept or --reject it does not; else it changes nothing, and lists them under
+    the numbers that --accept will know them by.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     from kineme.cli.anchor_session import Session
+    from kineme.library.anchor import join, joinable, propose_kinds
     from kineme.library.library import ActionLibrary
 
     scripted = options["accept"] is not None or options["reject"] is not None
@@ -58,18 +60,27 @@ def anchor(folder: Path, **options: Any) -> None:
     names = _names(options["names"])
     writes = scripted or interactive
     with ActionLibrary(folder, read_only=not writes) as library:
-        joined = library.join() if writes and options["join"] and library.symbols() else {}
-        proposals = library.propose(
-            method=options["method"], n_clusters=options["clusters"], min_members=options["min_members"]
+        # What joins is left out whether it is written or not: a number means the same when listed and when accepted.
+        joining = joinable(library) if options["join"] else {}
+        members = [one for ids in joining.values() for one in ids.tolist()]
+        proposals = propose_kinds(
+            library, None, options["method"], options["clusters"], options["min_members"], members
         )
+        accepted = _chosen(proposals, options["accept"], "--accept")
+        rejected = _chosen(proposals, options["reject"], "--reject")
         pictures = _draw(library, proposals, options["pictures"])
-        data = {"joined": joined, **_as_data(proposals), "pictures": [str(path) for path in pictures]}
+        data = {
+            "joined": join(library, joining) if writes else {},
+            "would_join": {} if writes else {name: len(ids) for name, ids in joining.items()},
+            **_as_data(proposals),
+            "pictures": [str(path) for path in pictures],
+        }
         if interactive:
             click.echo(_text(data))
             Session(library, proposals, pictures[1:]).run()
             return
-        data["accepted"] = _accept(library, proposals, options["accept"], names)
-        data["rejected"] = _reject(library, proposals, options["reject"])
+        data["accepted"] = _accept(library, proposals, accepted, names)
+        data["rejected"] = _reject(library, proposals, rejected)
     say(options["as_json"], data, lambda: _text(data))
 
 
@@ -121,9 +132,9 @@ def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
     return list(dict.fromkeys(numbers))
 
 
-def _accept(library: Any, proposals: Any, choice: Any, names: dict[int, str]) -> dict[str, int]:
+def _accept(library: Any, proposals: Any, chosen: list[int], names: dict[int, str]) -> dict[str, int]:
     done = {}
-    for k in _chosen(proposals, choice, "--accept"):
+    for k in chosen:
         name = names.get(k) or _free_name(library)
         library.accept(proposals[k], name)
         done[name] = len(proposals[k])
@@ -135,8 +146,7 @@ def _free_name(library: Any) -> str:
     return next(name for k in range(1, len(taken) + 2) if (name := f"kind {k}") not in taken)
 
 
-def _reject(library: Any, proposals: Any, choice: Any) -> list[int]:
-    chosen = _chosen(proposals, choice, "--reject")
+def _reject(library: Any, proposals: Any, chosen: list[int]) -> list[int]:
     for k in chosen:
         library.reject(proposals[k])
     return chosen
@@ -163,6 +173,7 @@ def _text(data: dict[str, Any]) -> str:
     from kineme.table import Table, to_text
 
     lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
+    lines += [f"{count(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
     found = data["proposals"]
     rows = [
         (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.anchoring.place import place
 from kineme.anchoring.proposals import Proposal, Proposals
@@ -68,9 +69,14 @@ def propose_kinds(
     method: str | None = None,
     n_clusters: int | None = None,
     min_members: int = 3,
+    leave: ArrayLike = (),
 ) -> LibraryProposals:
-    """Kinds among the movements without a symbol, or among `ids`; see `ActionLibrary.propose`."""
-    chosen = library.unlabeled() if ids is None else np.unique(np.asarray(ids, dtype=np.int64))
+    """Kinds among the movements without a symbol but those to `leave`, or among `ids`; see `ActionLibrary.propose`."""
+    chosen = (
+        np.setdiff1d(library.unlabeled(), np.asarray(leave, dtype=np.int64))
+        if ids is None
+        else np.unique(np.asarray(ids, dtype=np.int64))
+    )
     if len(chosen) < 3:
         return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
     if ids is None and method is None and n_clusters is None and library.symbols():
@@ -82,18 +88,28 @@ def propose_kinds(
     return LibraryProposals(chosen, _without(found, _rejected_before(library, chosen)) if ids is None else found)
 
 
-def join_symbols(library: ActionLibrary, error_rate: float = 0.05) -> dict[str, int]:
-    """Let movements without a symbol join those that they are recognized as; see `ActionLibrary.join`."""
+def joinable(library: ActionLibrary, error_rate: float = 0.05) -> dict[str, Ids]:
+    """Name of a symbol -> the movements without one that are recognized as it."""
     waiting = library.unlabeled()
     if not len(waiting) or not any(map(len, library.symbols())):
         return {}
     names = known_recognizer(library).predict_known(library.movements(ids=waiting), error_rate)
-    joined = {}
-    for name in dict.fromkeys(name for name in names if name is not None):
-        members = waiting[np.array([one == name for one in names])]
+    return {
+        str(name): waiting[np.array([one == name for one in names])]
+        for name in dict.fromkeys(name for name in names if name is not None)
+    }
+
+
+def join_symbols(library: ActionLibrary, error_rate: float = 0.05) -> dict[str, int]:
+    """Let movements without a symbol join those that they are recognized as; see `ActionLibrary.join`."""
+    return join(library, joinable(library, error_rate))
+
+
+def join(library: ActionLibrary, found: Mapping[str, Ids]) -> dict[str, int]:
+    """Let movements join symbols, as `joinable` has found them; how many joined each."""
+    for name, members in found.items():
         library.assign(members, name, "recognized")
-        joined[str(name)] = len(members)
-    return joined
+    return {name: len(members) for name, members in found.items()}
 
 
 def known_recognizer(library: ActionLibrary) -> Recognizer:
