@@ -10,7 +10,7 @@ from typing import Any as _Any
 __version__ = "0.1.0"
 
 if _TYPE_CHECKING:
-    from kineme import control, datasets, kernels, orientation, styles
+    from kineme import anchoring, control, datasets, kernels, orientation, styles
     from kineme.datasets.lasa import load_lasa
     from kineme.errors import (
         DataError,
@@ -58,6 +58,7 @@ _HOME = {
     "Recognizer": "kineme.recognition.recognizer",
     "ActionLibrary": "kineme.library.library",
     "kernels": "kineme",
+    "anchoring": "kineme",
     "styles": "kineme",
     "orientation": "kineme",
     "KinemeError": "kineme.errors",
@@ -72,7 +73,7 @@ __all__ = [  # noqa: RUF022 - in the order of the flow
     "Trajectory", "Demonstrations", "segment", "preprocess", "TrimRest", "Smooth", "Resample", "datasets", "load_lasa",
     "read_recordings",
     "DMP", "Primitives", "control", "RhythmicDMP", "RhythmicPrimitives", "orientation", "styles",
-    "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer", "ActionLibrary",
+    "DMPFeatures", "RhythmicFeatures", "kernels", "Recognizer", "anchoring", "ActionLibrary",
     "KinemeError", "TrajectoryError", "DegenerateMovementError", "SpecificationError", "DataError",
     "DegenerateMovementWarning",
 ]  # fmt: skip

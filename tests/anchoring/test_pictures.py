@@ -8,6 +8,7 @@ from matplotlib import image
 from unlabeled_samples import draw_kinds
 
 import kineme
+import kineme.anchoring
 from kineme.anchoring.align import paths_of
 from kineme.anchoring.drawing import flat, principal_axes
 from kineme.anchoring.map_figure import draw_map
@@ -77,3 +78,10 @@ def test_pictures_of_other_movements():
         draw_proposals(demos[:8], proposals)
     with pytest.raises(kineme.SpecificationError, match="expected 2 prototypes, one per symbol, got 3"):
         draw_map(conceptual_space("ab", demos[:2]), demos[:3])
+
+
+def test_every_public_name_leads_somewhere():
+    for name in kineme.anchoring.__all__:
+        assert getattr(kineme.anchoring, name).__doc__
+    with pytest.raises(AttributeError, match=r"'kineme\.anchoring' has no attribute 'draw'; it has ConceptualSpace, "):
+        _ = kineme.anchoring.draw

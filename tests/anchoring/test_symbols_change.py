@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -60,6 +62,15 @@ def test_too_few_that_agree_stay_unknown():
     assert [len(one) for one in placement.proposals.proposals] == [5]
     assert len(place(new[[8, 9]], known).proposals) == 0
     assert place(new[[8, 9]], known).unknown.tolist() == [0, 1]
+
+
+def test_many_unknown_are_gathered_through_a_sample(monkeypatch):
+    monkeypatch.setattr(import_module("kineme.anchoring.place"), "largest_clustered", lambda n_dims: 40)
+    demos = draw_kinds([6, 6, 6, 40, 60], 2, 0, spread=0.03)
+    placement = place(demos[18:], demos[:18])
+    found = [demos.labels[18 + one.members] for one in placement.proposals.proposals]
+    assert [set(labels.tolist()) for labels in found] == [{"kind 04"}, {"kind 03"}]
+    assert sum(map(len, found)) > 90
 
 
 def test_new_kinds_of_handwriting():

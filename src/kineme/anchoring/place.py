@@ -14,6 +14,7 @@ from kineme.anchoring.propose import own_order
 from kineme.anchoring.resampling import Clusters, stabilities
 from kineme.anchoring.seen import Seen
 from kineme.anchoring.similarities import compare
+from kineme.anchoring.spread import assign, largest_clustered, spread_sample
 from kineme.anchoring.tree import average_linkage, cut_at
 from kineme.recognition.answer import known_labels
 from kineme.recognition.conformal import distances as in_widths
@@ -87,11 +88,22 @@ def place(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members
 
 
 def _among_unknown(known: Recognizer, demos: Demonstrations, unknown: NDArray[np.intp], min_members: int) -> Proposals:
-    clusters = np.full(len(demos), -1, dtype=np.intp)
-    K = np.eye(len(unknown))
-    if len(unknown) < min_members:
-        return _at(unknown, describe_clusters(K, clusters[: len(unknown)], np.empty(0), known.widths_), len(demos))
+    """Kinds among the unknown; where they are many, among a spread sample, which the others join by their nearest."""
+    n = len(unknown)
+    if n < min_members:
+        none = np.full(n, -1, dtype=np.intp)
+        return _at(unknown, describe_clusters(np.eye(n), none, np.empty(0), known.widths_), len(demos))
     seen = Seen(known.procrustes_, known.look_at(demos[unknown]), known.mean)
+    limit, similarity = largest_clustered(demos.n_dims), known.similarity_
+    if n <= limit:
+        return _at(unknown, _that_agree(known, seen, min_members)[1], len(demos))
+    sample, _ = spread_sample(seen, limit)
+    K, found = _that_agree(known, seen.take(sample), min_members)
+    return _at(unknown, assign(seen, sample, K, found, similarity), len(demos))
+
+
+def _that_agree(known: Recognizer, seen: Seen, min_members: int) -> tuple[Array, Proposals]:
+    """Similarities, and clusters by average linkage up to where movements of one symbol agree."""
     K = compare(known.similarity_, seen, seen)
     np.fill_diagonal(K, 1.0)
     order, height = own_order(K), 1.0 - agreement(known)
@@ -101,10 +113,9 @@ def _among_unknown(known: Recognizer, demos: Demonstrations, unknown: NDArray[np
 
     distances = 1.0 - 0.5 * (K + K.T)[np.ix_(order, order)]
     found = without_small(cut(distances), min_members)
-    ordered = np.empty(len(unknown), dtype=np.intp)
-    ordered[order] = found
-    proposals = describe_clusters(K, ordered, stabilities(distances, found, cut, _REPEATS), known.widths_)
-    return _at(unknown, proposals, len(demos))
+    clusters = np.empty(len(seen), dtype=np.intp)
+    clusters[order] = found
+    return K, describe_clusters(K, clusters, stabilities(distances, found, cut, _REPEATS), known.widths_)
 
 
 def agreement(known: Recognizer) -> float:
