@@ -17,6 +17,7 @@ SUBJECTS = (
     "rhythm",
     "control",
     "recognize",
+    "library",
     "binning",
 )
 
