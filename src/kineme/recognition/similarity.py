@@ -14,6 +14,7 @@ from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.validation import Array
 
 _WIDTH = 0.35  # of the median distance to the nearest movement of another class
+_LEAST = 0.01  # of the typical size: movements closer than that are the same, as recordings go
 _WIDTH_ROWS = 500  # movements that the width is estimated from, at most
 
 
@@ -87,6 +88,7 @@ def impostor_widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels:
 
     At 0.35 of it a movement as far as an impostor counts exp(-4), under two in a hundred: what is closer than the
     nearest impostor decides, the rest does not. Where there is one class, any other movement is the impostor.
+    Where classes coincide, as N and Z do under any rotation, the width is at least a hundredth of the movements' size.
     Estimated from at most 500 evenly spaced movements, so that its cost does not grow.
 
     Returns
@@ -113,5 +115,6 @@ def impostor_widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels:
             raise SpecificationError(
                 "expected training movements that differ, got one movement or all the same; add demonstrations"
             )
-        widths.append(_WIDTH * float(np.median(nearest)))
+        least = _LEAST * float(np.sqrt(np.median(some.squares)))
+        widths.append(max(_WIDTH * float(np.median(nearest)), least))
     return np.array(widths)
