@@ -105,6 +105,14 @@ def test_gaps_and_odd_rates_are_noticed():
     assert "1 (to 6 s)" in as_words(found)
 
 
+def test_guesses_that_differ_between_files_are_noticed(tmp_path):
+    for name, step in (("a", 4), ("b", 6)):
+        (tmp_path / f"{name}.csv").write_text("time,x\n" + "".join(f"{k * step},{k}\n" for k in range(9)))
+    found = inspect(read_recordings(tmp_path))
+    assert "time counts in ms here, in s there, to judge by its size; give --units" in found.notes
+    assert inspect(read_recordings(tmp_path, units="ms")).notes == ()
+
+
 def test_long_lists_are_cut_in_words_only(tmp_path, make_movement):
     recordings(tmp_path, make_movement)
     for k in range(30):

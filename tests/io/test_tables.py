@@ -95,9 +95,9 @@ def test_encodings(data):
         ("time/ms", 1e3, ("ms", "head")),
         ("seconds", 1, ("s", "head")),
         ("time", 1, ("s", "assumed")),
-        ("time", 1e3, ("ms", "steps of 10")),
-        ("time", 1e6, ("us", "steps of 1e+04")),
-        ("time", 1e9, ("ns", "steps of 1e+07")),
+        ("time", 1e3, ("ms", "by its steps")),
+        ("time", 1e6, ("us", "by its steps")),
+        ("time", 1e9, ("ns", "by its steps")),
     ],
 )
 def test_units_of_time_are_told_by_head_or_by_size(head, scale, units):
@@ -113,7 +113,7 @@ def test_units_of_time_are_told_by_head_or_by_size(head, scale, units):
 def test_stamps_since_1970_tell_their_unit_whatever_the_rate(scale, units):
     times = 1.7e9 + np.arange(8) / 4
     found = read(lines([(f"{t * scale:.2f}", 1, k) for k, t in enumerate(times)], "stamp,x,y"))
-    assert found.detected[0][0][4:6] == (units, "counted from 1970")
+    assert found.detected[0][0][4:6] == (units, "since 1970")
     np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15)
 
 

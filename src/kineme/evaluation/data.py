@@ -42,7 +42,10 @@ def load_data(data: str) -> DataSet:
     if not Path(data).exists():
         raise DataError(f"expected {', '.join(PACKAGED)} or a folder, found no folder {data!r}")
     read = read_recordings(data)
-    left_out = {problem.file: problem.what for problem in read.problems}
+    left_out: dict[str, str] = {}
+    for problem in read.problems:
+        before = left_out.get(problem.file)
+        left_out[problem.file] = f"{before}; {problem.what}" if before else problem.what
     sizes = Counter(label for label in read.labels if label is not None)
     kept = [label is not None and sizes[label] > 1 for label in read.labels]
     for name, label, keep in zip(read.demonstrations.names or (), read.labels, kept, strict=True):

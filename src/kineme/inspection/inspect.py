@@ -11,6 +11,7 @@ from kineme.inspection.duplicates import duplicates_among
 from kineme.inspection.sampling import Sampling, sampling_of
 from kineme.io.found import Detected, Problem
 from kineme.io.join_files import Recordings
+from kineme.io.time_units import GUESSED
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -130,6 +131,9 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     rate = float(np.median(sampling.rates))
     if not _RATES[0] <= rate <= _RATES[1]:
         notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")
+    guessed = sorted({str(how.units) for how, _ in recordings.detected if how.units_from in GUESSED})
+    if len(guessed) > 1:
+        notes.append(f"time counts in {' here, in '.join(guessed)} there, to judge by its size; give --units")
     if any(how.units_from.startswith("no times") for how, _ in recordings.detected):
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
     single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]

@@ -50,7 +50,8 @@ class Detected(NamedTuple):
     units : str or float
         Their unit.
     units_from : str
-        How that is known: ``"given"``, ``"head"``, ``"assumed"``, or what their size says.
+        How that is known: ``"given"``, ``"head"``, ``"dates"``; or guessed: ``"since 1970"``, ``"by its steps"``, see
+        `kineme.io.time_units.unit_by_size`, or ``"assumed"``.
     movement, label, ignored : tuple of str
         Columns that tell movements apart, that name the action, and that are left aside.
     """

@@ -31,6 +31,10 @@ _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds s
 _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
 
 
+#: How a unit is known where it is a guess.
+GUESSED = ("since 1970", "by its steps", "assumed")
+
+
 def words_of(head: str) -> list[str]:
     """The words in a column's head, in lower case: ``"timeStamp [ms]"`` is time, stamp, ms."""
     return [word.lower() for word in _WORDS.findall(head)]
@@ -53,12 +57,12 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
         return "s", "assumed"
     for unit, per_second in UNITS.items():
         if _UNIX[0] <= finite[0] / per_second <= _UNIX[1]:
-            return unit, "counted from 1970"
+            return unit, "since 1970"
     steps = np.abs(np.diff(finite))
     steps = steps[steps > 0]
     step = float(np.median(steps)) if len(steps) else 0.0
     found = next((unit for unit, least in _STEPS if step >= least), None)
-    return (found, f"steps of {step:.3g}") if found else ("s", "assumed")
+    return (found, "by its steps") if found else ("s", "assumed")
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
