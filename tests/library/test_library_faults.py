@@ -228,7 +228,7 @@ def test_an_earlier_library_is_brought_up_to_date_in_one_step(folder, monkeypatc
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda path: None, r"expected a library in .*, found no library\.sqlite there; pass create=True"),
+        (lambda path: None, r"expected a library in .*, found no library\.sqlite there; make one by learning"),
         (lambda path: path.write_bytes(b"PK\x03\x04" * 500), r"to be a library, got a file that is no database"),
         (lambda path: path.write_bytes(b""), r"to be a library of kineme, got another program's database"),
         (lambda path: sqlite3.connect(path).execute("CREATE TABLE t (a)").connection.close(), r"another program's"),
@@ -342,3 +342,39 @@ def test_wherever_a_byte_is_flipped_what_is_read_is_right_or_refused(folder):
         (folder / FILE).write_bytes(whole)
     assert refused > 100
     assert harmless + refused == 150
+
+
+@pytest.mark.parametrize(
+    ("table", "read", "message"),
+    [
+        ("movement", lambda library: library.ids(), r"12 ids of 12 movements, each once, got 11 of 11: damaged"),
+        ("movement", lambda library: library.unlabeled(), r"0 ids of 12 movements, each once, got 0 of 11: damaged"),
+        ("member", lambda library: library.unlabeled(), r"0 ids of 12 movements, each once, got 1 of 12: damaged"),
+        ("member", lambda library: library["wave"], r"12 members of symbols, got 11: damaged"),
+        ("symbol_state", lambda library: library.symbols(), r"3 symbols, got 2: damaged"),
+        ("raw", lambda library: library.movements(), r"the samples of movement 2 as it was stored, got damaged"),
+        ("primitive", lambda library: library.primitives(), r"the primitive of movement 2 as it was stored"),
+        ("feature", lambda library: library.features(), r"the features of movement 2 as it was stored"),
+    ],
+)
+def test_a_row_that_damage_hides_is_missed(folder, table, read, message):
+    with closing(_raw(folder)) as other:
+        other.execute(f"DELETE FROM {table} WHERE rowid = 2")
+    with ActionLibrary(folder) as library, pytest.raises(DataError, match=message):
+        read(library)
+
+
+def test_verify_names_what_is_missing_or_refers_to_nothing(folder):
+    with closing(_raw(folder)) as other:
+        other.execute("DELETE FROM feature WHERE movement = 2")
+        other.execute("DELETE FROM symbol WHERE key = 3")
+        other.execute("UPDATE raw SET positions = zeroblob(12) WHERE movement = 5")
+    with ActionLibrary(folder) as library:
+        found = {str(problem) for problem in library.verify()}
+    assert found == {
+        "the features of movement 2: not there",
+        "the samples of movement 5: damaged bytes",
+        "the samples of movement 5: of the wrong size",
+        *(f"row {k} of table member: refers to a row of table symbol that is not there" for k in (3, 6, 9, 12)),
+        "row 3 of table symbol_state: refers to a row of table symbol that is not there",
+    }

@@ -16,7 +16,8 @@ from kineme.primitives.primitives import Primitives
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
-_DRAWING = 0.042  # of the map's width: half the largest size of a drawing
+_INCHES = 6.9  # width of a map
+_HEIGHTS = (3.0, 8.0)  # of a map, at least and at most, in inches
 
 
 def classical_scaling(distances: Array) -> tuple[Array, float]:
@@ -58,25 +59,39 @@ def draw_map(space: ConceptualSpace, prototypes: Any) -> Figure:
     if len(demos) != len(space.symbols):
         raise SpecificationError(f"expected {len(space.symbols)} prototypes, one per symbol, got {len(demos)}")
     places, kept = classical_scaling(space.distances)
-    width = float(np.ptp(places, axis=0).max()) or 1.0
-    places = apart(places / width, 3.0 * _DRAWING)
-    figure = new_figure(6.9, 6.0)
+    half = _half_size(len(places))
+    places = apart(places / (float(np.ptp(places, axis=0).max()) or 1.0), 3.0 * half)
+    figure = new_figure(_INCHES, _height(places, half))
     axes = figure.subplots()
     for name, place, path in zip(space.symbols, places, paths_of(demos), strict=True):
-        drawn = _fitted(flat(path[None], path)[0]) + place[:, None]
+        drawn = _fitted(flat(path[None], path)[0], half) + place[:, None]
         plot_paths(axes, drawn[None], BLUE, linewidth=1.3)
-        mark_start(axes, drawn[None], ORANGE, 3.0)
-        axes.text(place[0], drawn[1].min() - 0.15 * _DRAWING, str(name), ha="center", va="top", fontsize=6, color=GRAY)
+        mark_start(axes, drawn[None], ORANGE, 3.5)
+        axes.annotate(
+            str(name).replace("$", r"\$"), (place[0], drawn[1].min()), (0, -4), textcoords="offset points",
+            ha="center", va="top", fontsize=6.5, color=GRAY, annotation_clip=False,
+        )  # fmt: skip
     bare(axes, 2)
     axes.set_title(f"{len(places)} symbols; the plane holds {100 * kept:.0f} % of their squared distances")
     return figure
 
 
-def _fitted(drawn: Array) -> Array:
+def _half_size(n: int) -> float:
+    """Half the largest size of a drawing, in widths of the map: what n drawings have room for."""
+    return min(0.08, 0.21 / np.sqrt(n))
+
+
+def _height(places: Array, half: float) -> float:
+    """Inches, so that the map is as high as its symbols need."""
+    width, height = np.ptp(places, axis=0) + 2.5 * half
+    return float(np.clip(_INCHES * height / width + 0.4, *_HEIGHTS))
+
+
+def _fitted(drawn: Array, half: float) -> Array:
     """A path (2, T) about the origin, as large as a drawing on the map may be."""
     size = np.ptp(drawn, axis=1, keepdims=True)
     centered = drawn - drawn.min(axis=1, keepdims=True) - 0.5 * size
-    return np.asarray(2.0 * _DRAWING * centered / (float(size.max()) or 1.0))
+    return np.asarray(2.0 * half * centered / (float(size.max()) or 1.0))
 
 
 def apart(places: Array, least: float, rounds: int = 200) -> Array:

@@ -38,6 +38,7 @@ def _draw_path(figure: SubFigure, demonstrated: Array, generated: Array, obstacl
     axes.plot(*generated[-1], "*", color=BLUE, markersize=9, label="end")
     if obstacles is not None:
         axes.plot(*obstacles.T, "X", color=ORANGE, markersize=8, linestyle="none", label="obstacle")
-    axes.set(xlabel="x", ylabel="y", aspect="equal")
+    axes.set(xlabel="x", ylabel="y")
+    axes.set_aspect("equal", adjustable="datalim")  # a flat movement leaves no hole between the legend and itself
     axes.margins(0.1)
-    figure.legend(loc="outside upper center", ncols=3)
+    figure.legend(loc="outside upper center", ncols=2)

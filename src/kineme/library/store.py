@@ -16,7 +16,7 @@ from typing import Any
 from kineme.errors import DataError, SpecificationError
 from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
-from kineme.library.rows import Row, damaged, insert, retire, select
+from kineme.library.rows import Row, damage, damaged, insert, retire, select
 from kineme.library.schema import COUNTED, SCHEMA_VERSION
 from kineme.library.specification import Specification
 
@@ -106,7 +106,7 @@ class Store:
         if specification is None or self.read_only:
             raise DataError(
                 f"expected a library in {self.path.parent}, found no {self.path.name} there; "
-                "pass create=True to make one, or correct the path"
+                "make one by learning (in Python, with create=True), or correct the path"
             )
         create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
 
@@ -131,7 +131,7 @@ class Store:
         except sqlite3.OperationalError as error:
             if "no such" not in str(error):  # table or column
                 raise
-        raise damaged("sqlite_master", ("of definitions",))
+        raise damage(f"the definitions of tables in {self.path} as they were stored", "damaged bytes")
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
