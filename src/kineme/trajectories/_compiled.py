@@ -37,7 +37,7 @@ def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
     """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
     n, n_dims, n_samples = paths.shape
     n_points = rows.shape[2]
-    phase, interval, weight = np.zeros(n_samples), np.empty(n_points, np.int64), np.empty(n_points)
+    phase, interval, local = np.zeros(n_samples), np.empty(n_points, np.int64), np.empty(n_points)
     for i in range(n):
         phase[:] = 0.0
         for k in range(n_dims):
@@ -55,12 +55,12 @@ def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
         per_sample = (1.0 - share) / (n_samples - 1)
         for t in range(n_samples):
             phase[t] = per_length * phase[t] + per_sample * t
-        locate(phase, interval)
+        locate(phase, interval, local)
         for p in range(n_points):
             j = interval[p]
-            weight[p] = min(1.0, (p / (n_points - 1) - phase[j]) / (phase[j + 1] - phase[j]))
+            local[p] = min(1.0, local[p] / (phase[j + 1] - phase[j]))
         for k in range(n_dims):
             path, row = paths[i, k], rows[i, k]
             for p in range(n_points):
                 j = interval[p]
-                row[p] = path[j] + weight[p] * (path[j + 1] - path[j])
+                row[p] = path[j] + local[p] * (path[j + 1] - path[j])

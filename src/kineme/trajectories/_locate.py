@@ -8,14 +8,15 @@ from kineme.compiled import jit
 
 
 @jit
-def locate(u, interval):  # type: ignore[no-untyped-def]
-    """For each of the even targets from 0 to the end of u, which starts at 0, the knot interval it lies in.
+def locate(u, interval, local):  # type: ignore[no-untyped-def]
+    """For each of the even targets from 0 to the end of u, which starts at 0, its interval and place behind its knot.
 
     Counting the knots at or below each target, then adding up, has no branch to mispredict: on irregular stamps it is
     several times faster than walking along the knots.
     """
     n_points, last = len(interval), len(u) - 1
-    per_step = (n_points - 1) / u[last]
+    step = u[last] / (n_points - 1)
+    per_step = 1.0 / step
     interval[:] = 0
     for j in range(1, last):
         target = int(np.ceil(u[j] * per_step))
@@ -24,3 +25,4 @@ def locate(u, interval):  # type: ignore[no-untyped-def]
     for p in range(n_points):
         j += interval[p]
         interval[p] = j
+        local[p] = p * step - u[j]

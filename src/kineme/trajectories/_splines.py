@@ -17,7 +17,7 @@ _LANES = 32  # fewer leave the processor waiting, more do not fit its cache
 _FAR = 1e200  # gap behind the last sample
 _BEFORE, _BEHIND = 1, 3  # empty knots that the equations of the outer ones refer to
 
-_FIELDS = ("gap", "inverse", "x", "m", "below", "diagonal", "above")  # gap to the next knot; second derivative m
+_FIELDS = ("gap", "inverse", "x", "m", "above", "pivot")  # gap to the next knot; second derivative m
 _KNOT = np.dtype([(name, np.float64, (_LANES,)) for name in _FIELDS])
 
 
@@ -51,19 +51,22 @@ def fill_smoothed(times, positions, offsets, scales, smoothed):  # type: ignore[
 def _fill_rows(parameter, positions, offsets, scales, smooth, rows):  # type: ignore[no-untyped-def]
     n, n_dims, n_points = rows.shape
     knots = _empty_knots(offsets)
-    interval, weights = np.empty(n_points, np.int64), np.empty((n_points, 4))
+    interval, local = np.empty(n_points, np.int64), np.empty(n_points)
     for first in range(0, n * n_dims, _LANES):
         length = _load(parameter, positions, offsets, scales, first, knots)
         if smooth:
             _smooth(knots, length)
         else:
             _interpolate(knots, length, offsets, first, n_dims)
+        _expand(knots, length)
         for lane in range(min(_LANES, n * n_dims - first)):
             i, k = divmod(first + lane, n_dims)
             if lane == 0 or k == 0:
                 # Written to memory: stamps count seconds since 1970 here and there, and sums must not be reordered.
-                _weigh(parameter[offsets[i] : offsets[i + 1]] - parameter[offsets[i]], scales[i], interval, weights)
-            _evaluate(knots, lane, interval, weights, rows[i, k])
+                u = parameter[offsets[i] : offsets[i + 1]] - parameter[offsets[i]]
+                locate(u, interval, local)
+                local *= scales[i]
+            _evaluate(knots, lane, interval, local, rows[i, k])
 
 
 @jit
@@ -104,21 +107,22 @@ def _smooth(knots, length):  # type: ignore[no-untyped-def]
     """Reinsch's smoothing spline in the time in which the penalty is 1: second derivatives m, and x smoothed.
 
     With Q the second divided differences and R the Gram matrix of hat functions, both banded, ``(R + Q'Q) m = Q'x``,
-    and the smoothed positions are ``x - Q m``. The factors are L D L'; `diagonal` holds 1 / D, `above` the first
+    and the smoothed positions are ``x - Q m``. The factors are L D L'; `pivot` holds 1 / D, `above` the first
     off-diagonal of L D, whose second one is the product of two neighboring inverse gaps.
     """
     for lane in range(_LANES):
         knots[1].inverse[lane], knots[2].inverse[lane] = 1.0 / knots[1].gap[lane], 1.0 / knots[2].gap[lane]
+        knots[1].pivot[lane] = knots[1].above[lane] = knots[1].m[lane] = 0.0
     for j in range(length):  # knot j + 1, in record j + 2
         for lane in range(_LANES):
             a, b, c = knots[j + 1].inverse[lane], knots[j + 2].inverse[lane], 1.0 / knots[j + 3].gap[lane]
             knots[j + 3].inverse[lane] = c
-            e, r = knots[j + 1].above[lane], knots[j + 1].diagonal[lane]
+            e, r = knots[j + 1].above[lane], knots[j + 1].pivot[lane]
             second = knots[j].inverse[lane] * a
-            factor_1, factor_2 = e * r, second * knots[j].diagonal[lane]
+            factor_1, factor_2 = e * r, second * knots[j].pivot[lane]
             gaps = knots[j + 1].gap[lane] + knots[j + 2].gap[lane]
             row = gaps * (1.0 / 3.0) + (a * a + b * b + (a + b) * (a + b))
-            knots[j + 2].diagonal[lane] = 1.0 / (row - factor_1 * e - factor_2 * second)
+            knots[j + 2].pivot[lane] = 1.0 / (row - factor_1 * e - factor_2 * second)
             knots[j + 2].above[lane] = knots[j + 2].gap[lane] * (1.0 / 6.0) - b * (a + 2.0 * b + c) - factor_1 * (a * b)
             left = (knots[j + 2].x[lane] - knots[j + 1].x[lane]) * a
             right = (knots[j + 3].x[lane] - knots[j + 2].x[lane]) * b
@@ -129,7 +133,7 @@ def _smooth(knots, length):  # type: ignore[no-untyped-def]
         for lane in range(_LANES):
             e, second = knots[j + 2].above[lane], knots[j + 2].inverse[lane] * knots[j + 3].inverse[lane]
             rest = knots[j + 2].m[lane] - e * knots[j + 3].m[lane] - second * knots[j + 4].m[lane]
-            knots[j + 2].m[lane] = rest * knots[j + 2].diagonal[lane]
+            knots[j + 2].m[lane] = rest * knots[j + 2].pivot[lane]
     for j in range(length):
         for lane in range(_LANES):
             left = (knots[j + 1].m[lane] - knots[j].m[lane]) * knots[j].inverse[lane]
@@ -143,28 +147,26 @@ def _interpolate(knots, length, offsets, first, n_dims):  # type: ignore[no-unty
 
     Continuity of the slope at the inner knots is ``h[j-1] m[j-1] + 2 (h[j-1] + h[j]) m[j] + h[j] m[j+1] =
     6 (slope[j] - slope[j-1])``. The not-a-knot conditions put the outer second derivatives into the first and last of
-    these rows.
+    these rows; the last one is another in every lane, and done again where the elimination has passed it.
     """
     for lane in range(_LANES):
-        knots[1].inverse[lane] = 1.0 / knots[1].gap[lane]
-    for j in range(length):  # knot j + 1, in record j + 2
+        knots[1].inverse[lane], knots[2].inverse[lane] = 1.0 / knots[1].gap[lane], 1.0 / knots[2].gap[lane]
+        h, behind = knots[1].gap[lane], knots[2].gap[lane]
+        q = h * h * knots[2].inverse[lane]
+        pivot = 1.0 / (3.0 * h + 2.0 * behind + q)
+        knots[2].above[lane] = (behind - q) * pivot
+        knots[2].m[lane] = _bend(knots[1], knots[2], knots[3], lane) * pivot
+    for j in range(length - 1):  # knot j + 2, in record j + 3
         for lane in range(_LANES):
-            before, behind = knots[j + 1].gap[lane], knots[j + 2].gap[lane]
-            knots[j + 2].inverse[lane] = 1.0 / behind
-            left = (knots[j + 2].x[lane] - knots[j + 1].x[lane]) * knots[j + 1].inverse[lane]
-            right = (knots[j + 3].x[lane] - knots[j + 2].x[lane]) / behind
-            knots[j + 2].below[lane] = before
-            knots[j + 2].diagonal[lane] = 2.0 * (before + behind)
-            knots[j + 2].above[lane] = behind
-            knots[j + 2].m[lane] = 6.0 * (right - left)
+            before, behind = knots[j + 2].gap[lane], knots[j + 3].gap[lane]
+            knots[j + 3].inverse[lane] = 1.0 / behind
+            pivot = 1.0 / (2.0 * (before + behind) - before * knots[j + 2].above[lane])
+            knots[j + 3].above[lane] = behind * pivot
+            left = (knots[j + 3].x[lane] - knots[j + 2].x[lane]) * knots[j + 2].inverse[lane]
+            right = (knots[j + 4].x[lane] - knots[j + 3].x[lane]) * knots[j + 3].inverse[lane]
+            knots[j + 3].m[lane] = (6.0 * (right - left) - before * knots[j + 2].m[lane]) * pivot
     for lane in range(_LANES):
         _close(knots, _last(offsets, first + lane, n_dims), lane)
-    for j in range(length):
-        for lane in range(_LANES):
-            below = knots[j + 2].below[lane]
-            pivot = 1.0 / (knots[j + 2].diagonal[lane] - below * knots[j + 1].above[lane])
-            knots[j + 2].above[lane] *= pivot
-            knots[j + 2].m[lane] = (knots[j + 2].m[lane] - below * knots[j + 1].m[lane]) * pivot
     for j in range(length - 1, -1, -1):
         for lane in range(_LANES):
             knots[j + 2].m[lane] -= knots[j + 2].above[lane] * knots[j + 3].m[lane]
@@ -180,20 +182,27 @@ def _last(offsets, row, n_dims):  # type: ignore[no-untyped-def]
 
 
 @jit
+def _bend(before, knot, behind, lane):  # type: ignore[no-untyped-def]
+    """Right-hand side at one knot of one lane."""
+    left, right = (knot.x[lane] - before.x[lane]) / before.gap[lane], (behind.x[lane] - knot.x[lane]) / knot.gap[lane]
+    return 6.0 * (right - left)
+
+
+@jit
 def _close(knots, last, lane):  # type: ignore[no-untyped-def]
-    """The first and the last row of the equations, which contain the not-a-knot conditions."""
-    h, behind = knots[1].gap[lane], knots[2].gap[lane]
-    q = h * h * knots[2].inverse[lane]
-    knots[2].below[lane], knots[2].diagonal[lane], knots[2].above[lane] = 0.0, 3.0 * h + 2.0 * behind + q, behind - q
+    """The last row of one lane, which contains the not-a-knot condition of its end."""
     before, h = knots[last - 1].gap[lane], knots[last].gap[lane]
     q = h * h * knots[last - 1].inverse[lane]
-    knots[last].below[lane], knots[last].diagonal[lane] = before - q, 2.0 * before + 3.0 * h + q
+    below = before - q
+    pivot = 1.0 / (2.0 * before + 3.0 * h + q - below * knots[last - 1].above[lane])
+    bend = _bend(knots[last - 1], knots[last], knots[last + 1], lane)
+    knots[last].m[lane] = (bend - below * knots[last - 1].m[lane]) * pivot
     knots[last].above[lane] = 0.0
 
 
 @jit
 def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
-    """Second derivatives at both ends: the outer two cubics are one."""
+    """Second derivatives at both ends of one lane: the outer two cubics are one."""
     step = knots[3].m[lane] - knots[2].m[lane]
     knots[1].m[lane] = knots[2].m[lane] - knots[1].gap[lane] * knots[2].inverse[lane] * step
     step = knots[last].m[lane] - knots[last - 1].m[lane]
@@ -201,23 +210,20 @@ def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _weigh(u, scale, interval, weights):  # type: ignore[no-untyped-def]
-    """For each even target, its knot interval, and the weights there of both knots' positions and derivatives."""
-    step = u[len(u) - 1] / (len(interval) - 1)
-    locate(u, interval)
-    for p in range(len(interval)):
-        j = interval[p]
-        gap = u[j + 1] - u[j]
-        s = (p * step - u[j]) / gap
-        r, square = 1.0 - s, (gap * scale) ** 2 / 6.0
-        weights[p, 0], weights[p, 1] = r, s
-        weights[p, 2], weights[p, 3] = square * (r * r * r - r), square * (s * s * s - s)
+def _expand(knots, length):  # type: ignore[no-untyped-def]
+    """The cubic behind each knot by its Taylor coefficients: x, slope in `above`, half of m in m, third in `pivot`."""
+    for j in range(length):
+        for lane in range(_LANES):
+            m, behind, inverse = knots[j + 1].m[lane], knots[j + 2].m[lane], knots[j + 1].inverse[lane]
+            chord = (knots[j + 2].x[lane] - knots[j + 1].x[lane]) * inverse
+            knots[j + 1].above[lane] = chord - knots[j + 1].gap[lane] * (2.0 * m + behind) * (1.0 / 6.0)
+            knots[j + 1].pivot[lane] = (behind - m) * inverse * (1.0 / 6.0)
+            knots[j + 1].m[lane] = 0.5 * m
 
 
 @jit
-def _evaluate(knots, lane, interval, weights, row):  # type: ignore[no-untyped-def]
+def _evaluate(knots, lane, interval, local, row):  # type: ignore[no-untyped-def]
     """The cubics of one lane at the located targets."""
     for p in range(len(row)):
-        left, right = knots[interval[p] + _BEFORE], knots[interval[p] + _BEFORE + 1]
-        positions = weights[p, 0] * left.x[lane] + weights[p, 1] * right.x[lane]
-        row[p] = positions + weights[p, 2] * left.m[lane] + weights[p, 3] * right.m[lane]
+        knot, v = knots[interval[p] + _BEFORE], local[p]
+        row[p] = knot.x[lane] + v * (knot.above[lane] + v * (knot.m[lane] + v * knot.pivot[lane]))
