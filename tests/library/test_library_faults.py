@@ -298,7 +298,7 @@ def test_flipped_bytes_are_named_and_never_read_as_numbers(folder, query, named,
         (problem,) = library.verify()
         assert str(problem) == f"{named}: damaged bytes"
         assert problem.key == 7
-        with pytest.raises(DataError, match=rf"expected {named} as it was stored, got damaged bytes; .*verify"):
+        with pytest.raises(DataError, match=rf"expected {named} as stored, got damaged bytes; .*verify"):
             getattr(library, read)(ids=[6, 7, 8])
         assert len(getattr(library, read)(ids=[6, 8])) == 2
 
@@ -315,7 +315,7 @@ def test_flipped_text_is_noticed_too(folder, query, table, read):
     _flip(folder / FILE, _stored_bytes(folder, query) - 4, 0x01)
     with ActionLibrary(folder, read_only=True) as library:
         assert any(re.match(rf"row \d+ of table {table}: damaged bytes", str(one)) for one in library.verify())
-        with pytest.raises(DataError, match=rf"row \d+ of table {table} as it was stored, got damaged bytes"):
+        with pytest.raises(DataError, match=rf"row \d+ of table {table} as stored, got damaged bytes"):
             read(library)
 
 
@@ -352,9 +352,9 @@ def test_wherever_a_byte_is_flipped_what_is_read_is_right_or_refused(folder):
         ("member", lambda library: library.unlabeled(), r"0 ids of 12 movements, each once, got 1 of 12: damaged"),
         ("member", lambda library: library["wave"], r"12 members of symbols, got 11: damaged"),
         ("symbol_state", lambda library: library.symbols(), r"3 symbols, got 2: damaged"),
-        ("raw", lambda library: library.movements(), r"the samples of movement 2 as it was stored, got damaged"),
-        ("primitive", lambda library: library.primitives(), r"the primitive of movement 2 as it was stored"),
-        ("feature", lambda library: library.features(), r"the features of movement 2 as it was stored"),
+        ("raw", lambda library: library.movements(), r"the samples of movement 2 as stored, got damaged"),
+        ("primitive", lambda library: library.primitives(), r"the primitive of movement 2 as stored"),
+        ("feature", lambda library: library.features(), r"the features of movement 2 as stored"),
     ],
 )
 def test_a_row_that_damage_hides_is_missed(folder, table, read, message):

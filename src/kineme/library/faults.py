@@ -34,7 +34,7 @@ _WORDS = {
     ),
     sqlite3.SQLITE_CANTOPEN: (
         "expected to open {path}, got {error}; check that the folder exists and that you may read and write in it, or "
-        "open it with read_only=True"
+        "open it with read_only=True; where a crash has left a log (-wal) beside it, reading needs to write once"
     ),
     sqlite3.SQLITE_CORRUPT: _DAMAGED,
     sqlite3.SQLITE_NOTADB: "expected {path} to be a library, got a file that is no database ({error})",

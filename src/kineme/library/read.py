@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, damaged, listed, select
+from kineme.library.rows import ALIVE, Row, among, damage, damaged, listed, select
 from kineme.library.schema import COLUMNS
 from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
@@ -52,7 +52,7 @@ def _column(connection: sqlite3.Connection, query: str, version: int, expected: 
     found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
     last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
     if len(found) != expected or last != n or (np.diff(found) <= 0).any():
-        raise damaged("movement", (f"(expected {expected} of {last}, got {len(found)} of {n})",))
+        raise damage(f"{expected} ids of {last} movements, each once", f"{len(found)} of {n}: damaged bytes")
     return found
 
 

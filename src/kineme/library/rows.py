@@ -69,9 +69,14 @@ def select(
 
 def damaged(table: str, row: Row) -> DataError:
     """The error for a row whose seal does not fit."""
+    return damage(f"{row_name(table, row[0])} as stored", "damaged bytes")
+
+
+def damage(expected: str, got: str) -> DataError:
+    """The error for anything that is not as stored."""
     return DataError(
-        f"expected {row_name(table, row[0])} as it was stored, got damaged bytes; "
-        "kineme library verify names all that is damaged: take the file from a backup or an export"
+        f"expected {expected}, got {got}; kineme library verify names all that is damaged: "
+        "take the file from a backup or an export"
     )
 
 

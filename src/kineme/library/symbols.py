@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, damaged, listed, next_key, select
+from kineme.library.rows import ALIVE, Row, among, damage, damaged, listed, next_key, select
 from kineme.library.schema import COLUMNS
 from kineme.library.store import Change, Moment, Store
 
@@ -66,7 +66,7 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
         moment = store.moment(connection)
         states = select(connection, "symbol_state", ALIVE, {"v": moment.version})
         if len(states) != moment.symbols:
-            raise damaged("symbol_state", (f"(expected {moment.symbols} rows, got {len(states)})",))
+            raise damage(f"{moment.symbols} symbols", f"{len(states)}: damaged bytes")
         return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
@@ -136,7 +136,7 @@ def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) ->
     rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
     n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
     if n != moment.members:
-        raise damaged("member", (f"(expected {moment.members} rows, got {n})",))
+        raise damage(f"{moment.members} members of symbols", f"{n}: damaged bytes")
     table = np.array([(row[2], row[1]) for row in rows], dtype=np.int64).reshape(-1, 2)
     table = table[np.lexsort((table[:, 1], table[:, 0]))]
     table.setflags(write=False)
