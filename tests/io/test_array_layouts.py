@@ -132,6 +132,12 @@ def test_json_nested_without_end_is_a_problem():
         read_recordings_from_bytes(b"[" * 10**6, "a.json", Layout())
 
 
+def test_a_reason_is_one_line():
+    with pytest.raises(kineme.DataError, match=r"got no entry 'positions' but \['a b', 'c\\nd'\]$") as caught:
+        read_recordings_from_bytes(b'{"a b": 1, "c\\nd": 2}', "a.json", Layout())
+    assert "\n" not in str(caught.value)
+
+
 def matlab(path, content):
     savemat(path, content)
     return path

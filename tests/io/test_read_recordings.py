@@ -81,6 +81,7 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
     bare = read_recordings(tmp_path / "wave").without_labels()
     assert bare.labels == (None,)
     assert bare.demonstrations.labels is None
+    assert repr(read).endswith(" samples each), 2 files, 0 problems)")
 
 
 @pytest.mark.parametrize("ending", [".bag", ".db3", ".mcap"])

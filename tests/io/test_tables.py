@@ -52,6 +52,21 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
     np.testing.assert_array_equal(found.times, np.arange(len(values)))
 
 
+@given(
+    text=st.text("time,xy;\t 01.5e-+#%\"'\n\r\u00e4nalbeld", max_size=200) | st.text(max_size=80),
+    skip=st.sampled_from(["movement", "sample"]),
+)
+@settings(max_examples=400)
+def test_any_text_is_a_table_or_an_error(text, skip):
+    try:
+        found = read(text.encode("utf-8", "replace"), skip=skip)
+    except kineme.DataError as error:
+        assert "a.csv" in str(error)  # noqa: PT017 - both ends are right
+    else:
+        assert np.isfinite(found.demonstrations.positions).all()
+        assert (found.demonstrations.lengths >= 4).all()
+
+
 @pytest.mark.parametrize(
     "write",
     [
@@ -336,3 +351,10 @@ def test_decimal_commas_between_blanks():
     )
     named = read("t x\n0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
     np.testing.assert_array_equal(named.positions, found.positions)
+
+
+def test_a_line_that_numbers_the_columns_is_no_sample():
+    rows = [(k / 10, 1.5 * k, k) for k in range(5)]
+    np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)
+    whole = [(k, k + 1, k + 2) for k in range(5)]
+    assert read("\n".join(",".join(map(str, row)) for row in whole)).demonstrations.lengths.tolist() == [5]

@@ -59,7 +59,9 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     comma = separator != "," and any(_COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
     named = not _is_sample(cells, comma)
     heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
-    body = cells[named:]
+    numbered = not named and _counts_columns(cells)
+    first += numbered
+    body = cells[named or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
     if heads:
         return Dialect(separator, comma, tuple(heads), True, first, kinds)
@@ -82,6 +84,11 @@ def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
     """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
     counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
     return counts[0] > 0 and counts[0] >= counts[-1]
+
+
+def _counts_columns(cells: Sequence[list[str]]) -> bool:
+    """Whether the first line only numbers the columns, 0, 1, 2, above fractions, as data frames without heads do."""
+    return cells[0] == [str(k) for k in range(len(cells[0]))] and any("." in cell for cell in cells[-1])
 
 
 def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:

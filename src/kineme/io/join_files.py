@@ -71,6 +71,10 @@ class Recordings:
         """The label of each movement, also where others have none."""
         return tuple(source.label for source in self.sources)
 
+    def __repr__(self) -> str:
+        n_files = len({source.path for source in self.sources})
+        return f"Recordings({self.demonstrations!r}, {n_files} files, {len(self.problems)} problems)"
+
     def without_labels(self) -> Recordings:
         """The same movements, with no label on any."""
         plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))

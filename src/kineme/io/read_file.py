@@ -95,6 +95,11 @@ def format_of(path: Path) -> Format:
 
 
 def _plainly(error: BaseException) -> str:
+    """What went wrong, on one line, whatever other libraries write."""
+    return " ".join(_reason(error).splitlines())
+
+
+def _reason(error: BaseException) -> str:
     if isinstance(error, KinemeError):
         return str(error)
     if isinstance(error, OSError):
