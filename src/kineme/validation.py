@@ -9,7 +9,7 @@ import math
 import operator
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 Array = NDArray[np.float64]
 
 MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
+_FLOAT64 = np.dtype(np.float64)
 
 
 def describe(index: int, names: Sequence[str | None] | None) -> str:
@@ -27,9 +28,14 @@ def describe(index: int, names: Sequence[str | None] | None) -> str:
     return f"trajectory {index}" + (f" ({name!r})" if name else "")
 
 
+def _is_float64(values: Any) -> TypeGuard[Array]:
+    """Whether this is an array that needs no conversion: the usual case, asked once per movement."""
+    return type(values) is np.ndarray and values.dtype is _FLOAT64
+
+
 def refuse_lossy(values: Any, who: str) -> None:
     """Refuse what NumPy would turn into plain numbers silently: masked samples and imaginary parts would be lost."""
-    if type(values) is np.ndarray and values.dtype.kind == "f":  # the usual case, called once per movement
+    if type(values) is np.ndarray and values.dtype.kind == "f":
         return
     n_masked = int(values.mask.sum()) if isinstance(values, np.ma.MaskedArray) else 0
     if n_masked:
@@ -43,6 +49,8 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
 
     A 1-D array is one degree of freedom. Finiteness is checked by `check_finite`, for all movements at once.
     """
+    if _is_float64(positions) and positions.ndim == 2 and len(positions) >= MIN_SAMPLES and positions.shape[1]:
+        return positions
     refuse_lossy(positions, who)
     try:
         x = np.asarray(positions, dtype=np.float64)
@@ -98,6 +106,8 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:
     """Check that one movement's time stamps are (n_samples,) numbers."""
+    if _is_float64(times) and times.shape == (n_samples,):
+        return times
     if getattr(times, "dtype", np.float64) != np.float64 and np.asarray(times).dtype.kind in "Mm":
         raise TrajectoryError(
             f"{who}: expected times in seconds, got {times.dtype}, which counts in a unit of its own; "  # type: ignore[union-attr]
