@@ -61,6 +61,7 @@ def learn(
     progress: Progress | None = None,
 ) -> LearnReport:
     """Store movements that are not there yet; see `ActionLibrary.learn`."""
+    store.check_writable()
     demos = Demonstrations.of(movements)
     _check_dimensions(store, demos)
     check(demos)

@@ -185,12 +185,9 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        if self.read_only:
-            raise DataError(
-                f"expected to write to {self.path}, but it is open for reading only; open it again to write"
-            )
+        self.check_writable()
         with self._turn, in_plain_words(self.path, self.wait):
-            self._check_that_it_is_there()
+            self.check_writable()  # again: waiting for the turn may have taken long
             if self._writer is None:
                 self._writer = connect(self.path, "rw", self.wait)
             with transaction(self._writer):
@@ -203,8 +200,15 @@ class Store:
                 text = json.dumps(detail, ensure_ascii=False)
                 insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
 
-    def _check_that_it_is_there(self) -> None:
-        """A deleted file can still be written to, and would take the writes with it."""
+    def check_writable(self) -> None:
+        """Refuse to write where it was opened for reading, or where the file is no longer the one that was opened.
+
+        A deleted file can still be written to, and would take the writes with it.
+        """
+        if self.read_only:
+            raise DataError(
+                f"expected to write to {self.path}, but it is open for reading only; open it again to write"
+            )
         try:
             there = self.path.stat().st_ino == self._file
         except OSError:
