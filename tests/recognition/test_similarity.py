@@ -58,7 +58,7 @@ def test_classes_that_coincide_do_not_make_the_kernels_blind():
     """N and Z are one under any rotation; another N, drawn a little differently, is still like both."""
     corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1.0]])
     N = np.column_stack([np.interp(np.linspace(0, 3, 100), range(4), corners[:, k]) for k in (0, 1)])
-    Z = N @ np.array([[0.0, 1.0], [-1.0, 0.0]]) + 1e-4 * np.cos(np.linspace(0, 7, 100))[:, None]
+    Z = N @ np.array([[0.0, 1.0], [-1.0, 0.0]]) + 2e-3 * np.cos(np.linspace(0, 7, 100))[:, None]
     recognizer = Recognizer(max_angle=np.pi).fit([N, Z], ["N", "Z"])
-    other = N + 0.002 * np.sin(np.linspace(0, 9, 100))[:, None]
+    other = N + 0.003 * np.sin(np.linspace(0, 9, 100))[:, None]
     assert recognizer.log_similarity([other]).min() > -1
