@@ -205,7 +205,7 @@ class ActionLibrary:
     def recognize(self, movements: Any, error_rate: float = 0.05) -> Any:
         """What each movement is, or that it is unknown; labels are names of symbols.
 
-        Up to 2000 movements that show a symbol, all are compared as `kineme.Recognizer` does. Above, few are, chosen by
+        Up to 1000 movements that show a symbol, all are compared as `kineme.Recognizer` does. Above, few are, chosen by
         short codes of all: the label is the same, and p-values are given for the 64 symbols that come closest. The
         first answer after a change takes longer; what it prepares is kept beside the database unless `read_only`.
 
