@@ -12,9 +12,11 @@ from sklearn.cluster import AgglomerativeClustering
 from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
 import kineme
+from kineme.anchoring.proposals import describe_clusters
 from kineme.anchoring.propose import propose
 from kineme.anchoring.seen import see, see_rows
-from kineme.anchoring.similarities import similarities
+from kineme.anchoring.similarities import averaged, similarities
+from kineme.anchoring.spread import assign
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
@@ -145,6 +147,20 @@ def test_more_movements_than_are_compared_at_once(d):
     for k, one in enumerate(sampled.proposals):
         assert one.medoid in one.members
         assert np.array_equal(one.members, np.flatnonzero(sampled.clusters == k))
+
+
+def test_what_was_not_sampled_joins_its_kind_or_none():
+    demos = draw_kinds([12, 10, 1, 1], 2, 3, spread=0.03)
+    seen, sample = see(demos), np.r_[0:8, 12:19]
+    some = seen.take(sample)
+    similarity = averaged(some)
+    K = similarities(some, widths=similarity.widths)
+    clusters = np.repeat([0, 1], [8, 7])
+    found = describe_clusters(K, clusters, np.ones(2), similarity.widths)
+    joined = assign(seen, sample, K, found, similarity)
+    assert joined.clusters.tolist() == [0] * 12 + [1] * 10 + [-1, -1]
+    assert [len(one) for one in joined.proposals] == [12, 10]
+    assert [one.nearest for one in joined.proposals] == [1, 0]
 
 
 def test_the_averaged_kernel_is_the_recognizers():
