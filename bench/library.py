@@ -35,7 +35,7 @@ def measure(quick: bool) -> list[Row]:
         return rows[:0]
     if quick:
         return _measure(5_000, 2, 50)
-    return _measure(200_000, 2, 500) + _measure(50_000, 3, 40)
+    return _measure(200_000, 2, 500) + _measure(20_000, 3, 40)
 
 
 def _measure(n: int, n_dims: int, n_questions: int) -> list[Row]:

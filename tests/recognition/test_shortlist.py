@@ -70,7 +70,7 @@ def test_where_everything_is_compared_the_answer_is_the_ordinary_one(d, seed, n_
 def test_a_few_comparisons_give_the_label_and_the_p_values_of_all(d, n_classes, seed):
     recognizer = Recognizer(classifier="nearest", weights="equal").fit(draw_shapes([6] * n_classes, d, seed))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shortlist, "_BEST", 4)
+        patch.setattr(shortlist, "_BEST", 3)
         patch.setattr(shortlist, "_CLASSES", n_classes // 4)
         two, fetched = _two_stages(recognizer, blocks=3)
         asked = draw_shapes([1] * n_classes, d, seed, spread=0.25)[:8]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Rows = NDArray[np.intp]
 
-_BEST = 48  # movements compared first whatever they are
+_LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
 _CLASSES = 64  # classes that an answer speaks of
 _MOST = 4096  # movements compared afterwards, where bounds leave doubt about the nearest of all
 _OF_CLASSES = 256  # and about the nearest of each class
@@ -152,14 +152,18 @@ class Shortlist:
         return np.concatenate((places, more))[order], np.concatenate((logs, other_logs))[order], joined
 
     def _promising(self, bounds: Single) -> Rows:
-        first, n_best = self.stored.first, min(_BEST, len(bounds))
-        best = np.argpartition(-bounds, n_best - 1)[:n_best]
-        scores = distances(np.maximum.reduceat(bounds, first)) / self.recognizer.calibration().scales
+        first, counts = self.stored.first, self.stored.counts
+        tops = np.maximum.reduceat(bounds, first)
+        best = []
+        for c in np.argsort(-tops, kind="stable")[:_LEADING]:
+            of_class = bounds[first[c] : first[c] + counts[c]]
+            n_best = min(_BEST, len(of_class))
+            best.append(first[c] + np.argpartition(-of_class, n_best - 1)[:n_best])
+        scores = distances(tops) / self.recognizer.calibration().scales
         n_classes = min(_CLASSES, len(first))
         classes = np.argpartition(scores, n_classes - 1)[:n_classes]
-        counts = self.stored.counts
-        of_class = [first[c] + int(bounds[first[c] : first[c] + counts[c]].argmax()) for c in classes]
-        return np.union1d(best, of_class)
+        top = [first[c] + int(bounds[first[c] : first[c] + counts[c]].argmax()) for c in classes]
+        return np.unique(np.concatenate([*best, top]))
 
     def _exact(self, one: tuple[Prepared, ...], places: Rows) -> tuple[tuple[Prepared, ...], Array]:
         prepare = self.recognizer.procrustes_.prepare
