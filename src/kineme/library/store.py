@@ -185,12 +185,12 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        self.check_writable()
         with self._turn, in_plain_words(self.path, self.wait):
-            self.check_writable()  # again: waiting for the turn may have taken long
+            self.check_writable()
             if self._writer is None:
                 self._writer = connect(self.path, "rw", self.wait)
             with transaction(self._writer):
+                self.check_writable()  # again: waiting for the turn may have taken long
                 last = self.moment(self._writer)
                 change = Change(
                     self._writer, last.version + 1, {name: getattr(last, name) for name in COUNTED.values()}
