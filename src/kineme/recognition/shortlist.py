@@ -137,7 +137,7 @@ class Shortlist:
         doubtful = bounds > np.repeat(near, self.stored.counts)
         doubtful[places] = False
         more = np.flatnonzero(doubtful)
-        decisive = np.count_nonzero(bounds[more] > logs.max())
+        decisive = int(np.count_nonzero(bounds[more] > logs.max()))
         n_more = min(decisive, _MOST) + _OF_CLASSES
         if len(more) > n_more:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
