@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from kineme import DMP, Demonstrations, Smooth, SpecificationError, Trajectory, TrimRest, parallel
+from kineme import DMP, Demonstrations, Smooth, SpecificationError, Trajectory, TrimRest, compiled, parallel
 from kineme.primitives import encode
 
 
@@ -31,6 +32,18 @@ def test_an_unknown_choice_of_compiled_code_is_refused(monkeypatch, ragged):
     monkeypatch.setenv("KINEME_COMPILED", "yes")
     with pytest.raises(SpecificationError, match=r"KINEME_COMPILED to be one of .*'always', 'never'.* got 'yes'"):
         DMP().learn(ragged)
+
+
+def test_numba_is_loaded_for_a_large_job_or_after_many_small_ones(monkeypatch):
+    monkeypatch.delenv("KINEME_COMPILED", raising=False)
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    monkeypatch.setattr(compiled, "_REPAYS_IMPORT", 1000)
+    monkeypatch.setattr(compiled, "_spent", 0)
+    assert [compiled.use_compiled(n) for n in (999, 1000)] == [False, True]
+    monkeypatch.setattr(compiled, "_spent", 0)
+    assert [compiled.use_compiled(300) for _ in range(4)] == [False, False, False, True]
+    monkeypatch.setattr(compiled, "_spent", 0)
+    assert [compiled.use_compiled(900, 10) for _ in range(100)] == [False] * 99 + [True]
 
 
 def test_one_thread_and_two_learn_and_move_the_same(monkeypatch, ragged):

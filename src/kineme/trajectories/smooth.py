@@ -15,7 +15,7 @@ from kineme.trajectories.smoothing_spline import even_rows_of_spline, smoothing_
 from kineme.trajectories.spline import fits_lanes
 from kineme.validation import Array, check_number
 
-_OPERATIONS_PER_SAMPLE = 30  # elementary operations that the banded solution costs per sample and dimension
+_OPERATIONS_PER_SAMPLE = 40  # elementary operations that the banded system costs per sample and dimension
 _TILE_MOVEMENTS = 256
 
 
