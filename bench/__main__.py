@@ -19,6 +19,7 @@ SUBJECTS = (
     "recognize",
     "library",
     "binning",
+    "anchoring",
 )
 
 

@@ -109,6 +109,47 @@ def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> N
 
 
 @library.command()
+@click.argument("symbol", type=SymbolName())
+@click.option("--movement", "movements", type=int, multiple=True, required=True, help="Goes over; may be repeated.")
+@click.option("--into", required=True, help="Name of the new symbol.")
+@library_option
+@json_option
+def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
+    """Make a new symbol of some movements of another one."""
+    with opened(folder, read_only=False) as actions:
+        actions.split(symbol, list(movements), into)
+        data = {**_brief(actions[into]), "version": actions.version}
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+
+
+@library.command()
+@library_option
+@json_option
+def review(folder: Path, as_json: bool) -> None:
+    """Find symbols that could be one, and symbols that are of two kinds."""
+    with opened(folder) as actions:
+        found = actions.review()
+    data = {
+        "merges": [one._asdict() for one in found.merges],
+        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in found.splits],
+    }
+
+    def text() -> str:
+        lines = [
+            f"{printable(one.first)} and {printable(one.second)} could be one: they overlap by {one.overlap:.2f}"
+            for one in found.merges
+        ]
+        lines += [
+            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
+            + ", ".join(map(str, one.parts[1].tolist()))
+            for one in found.splits
+        ]
+        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
+
+    say(as_json, data, text)
+
+
+@library.command()
 @click.argument("symbol", type=SymbolName(), required=False)
 @click.option("--movement", "movements", type=int, multiple=True, help="Delete this movement; may be repeated.")
 @click.option("--yes", "-y", is_flag=True, help="Do not ask.")

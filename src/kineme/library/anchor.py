@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring.place import place
 from kineme.anchoring.proposals import Proposal, Proposals
 from kineme.anchoring.propose import propose
+from kineme.anchoring.revise import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.seen import see_rows
 from kineme.errors import SpecificationError
 from kineme.recognition.recognizer import Recognizer
@@ -114,11 +115,8 @@ def join(library: ActionLibrary, found: Mapping[str, Ids]) -> dict[str, int]:
 
 def known_recognizer(library: ActionLibrary) -> Recognizer:
     """A recognizer of the symbols, fitted to at most 3000 of their movements, evenly many of each symbol."""
-    symbols = [symbol for symbol in library.symbols() if len(symbol)]
-    share = max(1, _KNOWN // max(1, len(symbols)))
-    some = [one.members[np.unique(np.linspace(0, len(one) - 1, share).astype(int))] for one in symbols]
-    labels = np.repeat([one.name for one in symbols], [len(members) for members in some])
-    return library.specification.recognizer().fit(library.movements(ids=np.concatenate(some)), labels)
+    ids, labels = some_of_each(library)
+    return library.specification.recognizer().fit(library.movements(ids=ids), labels)
 
 
 def accept(library: ActionLibrary, proposal: Proposal, name: str, description: str | None = None) -> None:
@@ -163,3 +161,42 @@ def _without(found: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
         for one in (found.proposals[k] for k in kept)
     )
     return Proposals(proposals, number[found.clusters], found.widths)
+
+
+@dataclass(frozen=True)
+class Review:
+    """Symbols that could be one, and symbols that are of two kinds.
+
+    Attributes
+    ----------
+    merges : tuple of Merge
+        See `kineme.anchoring.suggest_merges`.
+    splits : tuple of Split
+        See `kineme.anchoring.suggest_splits`; the parts are ids of movements.
+    """
+
+    merges: tuple[Merge, ...]
+    splits: tuple[Split, ...]
+
+
+def review_symbols(library: ActionLibrary) -> Review:
+    """Look at the symbols again, at most 3000 movements of them; see `ActionLibrary.review`."""
+    ids, labels = some_of_each(library)
+    if len(np.unique(labels)) < 2:
+        return Review((), ())
+    like = library.specification.recognizer()
+    seen = see_rows(library.features(ids), library.n_dims or 0, like)
+    splits = suggest_splits(seen, labels, like=like)
+    return Review(
+        suggest_merges(seen, labels, like=like),
+        tuple(one._replace(parts=(ids[one.parts[0]], ids[one.parts[1]])) for one in splits),
+    )
+
+
+def some_of_each(library: ActionLibrary) -> tuple[Ids, NDArray[Any]]:
+    """At most 3000 movements that show a symbol, evenly many of each, and the names of their symbols."""
+    symbols = [symbol for symbol in library.symbols() if len(symbol)]
+    share = max(1, _KNOWN // max(1, len(symbols)))
+    some = [one.members[np.unique(np.linspace(0, len(one) - 1, share).astype(int))] for one in symbols]
+    labels = np.repeat([one.name for one in symbols], [len(members) for members in some])
+    return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

@@ -19,7 +19,7 @@ from kineme.library.store import Store
 if TYPE_CHECKING:
     from kineme.anchoring.proposals import Proposal
     from kineme.anchoring.space import Between, Near
-    from kineme.library.anchor import LibraryProposals
+    from kineme.library.anchor import LibraryProposals, Review
     from kineme.library.history import Version
     from kineme.library.learn import LearnReport
     from kineme.library.serving import Serving
@@ -382,3 +382,12 @@ class ActionLibrary:
         from kineme.library.grounding import morph_symbols
 
         return morph_symbols(self, a, b, shares)
+
+    def review(self) -> Review:
+        """Symbols whose movements are hard to tell apart, and symbols whose movements are of two kinds.
+
+        Advice for `merge` and `split`; nothing is changed.
+        """
+        from kineme.library.anchor import review_symbols
+
+        return review_symbols(self)

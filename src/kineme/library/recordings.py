@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from pathlib import PurePosixPath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from kineme.io.join_files import Recordings
@@ -21,6 +21,7 @@ def learn_recordings(
     options: Mapping[str, Any] | None = None,
     labels: Sequence[str | None] | None = None,
     progress: Progress | None = None,
+    root: str | PurePath = "",
 ) -> LearnReport:
     """Store what `kineme.io.recordings.read_recordings` has read.
 
@@ -34,11 +35,20 @@ def learn_recordings(
         Names of symbols; by default each movement's own label.
     progress : callable, optional
         As for `ActionLibrary.learn`.
+    root : str or Path, optional
+        Folder that was read: where the files come from is kept with it before their names.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     told = {name: value for name, value in (options or {}).items() if value is not None}
     files = {
-        one.path: Source(one.path, one.sha256, one.size, PurePosixPath(one.path).suffix.lower().lstrip("."), told, now)
+        one.path: Source(
+            (PurePath(root) / one.path).as_posix(),
+            one.sha256,
+            one.size,
+            PurePath(one.path).suffix.lower().lstrip("."),
+            told,
+            now,
+        )
         for one in recordings.sources
     }
     return library.learn(

@@ -1,0 +1,58 @@
+"""Symbols looked at again: which could be one, which are two."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import kineme
+
+MIXED = {"CShape": "round", "GShape": "gee", "NShape": "mixed", "Sine": "mixed"}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """One shape under two names, and two shapes under one name."""
+    demos = kineme.load_lasa(list(MIXED))
+    labels = [MIXED[label] for label in demos.labels.tolist()]
+    labels[:3] = ["also round"] * 3
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, labels)
+    return tmp_path / "actions"
+
+
+def test_review_names_what_is_one_and_what_is_two(folder):
+    with kineme.ActionLibrary(folder) as library:
+        found = library.review()
+        assert [(one.first, one.second) for one in found.merges] == [("also round", "round")]
+        assert [one.symbol for one in found.splits] == ["mixed"]
+        parts = sorted(sorted(part.tolist()) for part in found.splits[0].parts)
+        assert parts == [list(range(15, 22)), list(range(22, 29))]
+        library.merge(["also round", "round"], "round")
+        library.split("mixed", parts[1], "sine")
+        assert library.review().merges == library.review().splits == ()
+
+
+def test_the_shell_reviews_and_splits(folder):
+    def run(*arguments):
+        command = [sys.executable, "-W", "error", "-m", "kineme", "library", *map(str, arguments), "-l", str(folder)]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    text = run("review")
+    assert "also round and round could be one" in text
+    assert "mixed is of two kinds: 7 movements, and " in text
+    part = json.loads(run("review", "--json"))["splits"][0]["parts"][1]
+    made = json.loads(run("split", "mixed", "--into", "other", "--json", *(f"--movement={i}" for i in part)))
+    assert (made["name"], made["movements"]) == ("other", 7)
+    run("merge", "also round", "round", "--into", "round")
+    assert run("review") == "the symbols are well apart, and each is of one kind\n"
+
+
+def test_one_symbol_has_nothing_to_be_compared_with(tmp_path):
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        assert library.review().merges == ()
+        library.learn(kineme.load_lasa(["CShape"]))
+        assert library.review().splits == ()
