@@ -126,7 +126,9 @@ def test_a_damaged_cache_is_made_again(tmp_path_factory, name, damage, where):
         whole = (folder / name).read_bytes()
         DAMAGES[damage](folder / name, where)
         _same(_plain(Serving(library.store, exhaustive=0).recognize(asked)), before)
-        assert len((folder / name).read_bytes()) == len(whole)
+        again = (folder / name).read_bytes()
+        assert len(again) == len(whole)
+        assert again == whole or name == calibrated.FILE  # whose archive holds the time of day
         assert not list(folder.glob(".*cache*"))
 
 

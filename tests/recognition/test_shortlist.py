@@ -98,6 +98,22 @@ def test_the_nearest_movement_is_always_compared(seed):
             assert logs[places // 5 == c].max() == pytest.approx(nearest[c], abs=1e-4)
 
 
+@given(seed=st.integers(0, 1000))
+def test_whoever_could_be_nearer_is_compared_too(seed):
+    """However little the codes say, and however few are compared first."""
+    recognizer = Recognizer(classifier="nearest", weights="equal").fit(draw_shapes([5] * 30, 2, seed, spread=0.3))
+    asked = draw_shapes([1] * 30, 2, seed, spread=0.3)
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("_LEADING", "_BEST", "_CLASSES"):
+            patch.setattr(shortlist, name, 1)
+        answers = _two_stages(recognizer, n_codes=2)[0].recognize(asked)
+    nearest = recognizer.log_similarity(asked).argmax(axis=1)
+    assert [one.nearest[0].index for one in answers if one.label == one.ranked[0]] == [
+        k for k, one in zip(nearest, answers, strict=True) if one.label == one.ranked[0]
+    ]
+    assert [one.ranked[0] for one in answers] == recognizer.labels_[nearest].tolist()
+
+
 def test_the_order_of_questions_and_of_stored_movements_does_not_matter():
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([6] * 12, 2, 3))
     asked = draw_shapes([2] * 12, 2, 3, spread=0.3)
