@@ -197,7 +197,6 @@ def _close(knots, last, lane):  # type: ignore[no-untyped-def]
     pivot = 1.0 / (2.0 * before + 3.0 * h + q - below * knots[last - 1].above[lane])
     bend = _bend(knots[last - 1], knots[last], knots[last + 1], lane)
     knots[last].m[lane] = (bend - below * knots[last - 1].m[lane]) * pivot
-    knots[last].above[lane] = 0.0
 
 
 @jit
