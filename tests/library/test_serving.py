@@ -91,12 +91,12 @@ def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
 
 def test_large_classes_keep_the_error_rate(make):
     """New members of classes larger than what is sampled of them are unknown about as often as was asked for."""
-    kinds = _kinds([150] * 4, seed=7, spread=0.1)
+    kinds = _kinds([200] * 4, seed=7, spread=0.1)
     rng = np.random.default_rng(0)
     known = rng.permutation(len(kinds))
-    library = make(kinds[known[:400]])
-    answers = Serving(library.store, exhaustive=0).recognize(kinds[known[400:]], error_rate=0.1)
-    labels = kinds.labels[known[400:]]
+    library = make(kinds[known[:640]])
+    answers = Serving(library.store, exhaustive=0).recognize(kinds[known[640:]], error_rate=0.1)
+    labels = kinds.labels[known[640:]]
     assert np.mean([a.label in {None, name} for a, name in zip(answers, labels, strict=True)]) == 1
     assert 0.03 < np.mean([a.label is None for a in answers]) < 0.2
 

@@ -74,11 +74,22 @@ def _measured(
             np.fill_diagonal(away, np.inf)
             rest = away[:, k:].min(axis=1, initial=np.inf)
             if more.size:
-                found = distances(recognizer.similarity_.log_average(asked, others)).reshape(k, k, -1)
-                rest = np.minimum(rest, found[np.arange(k), np.arange(k)].min(axis=1))
+                rest = np.minimum(rest, _to_own(recognizer, asked, others))
             places = np.arange(k)
             whole = np.column_stack((away[:, :k], rest)) if len(rows) > k else away
             yield int(c), ClassDistances(away, places), ClassDistances(whole, places)
+
+
+def _to_own(recognizer: Recognizer, asked: tuple[Prepared, ...], others: tuple[Prepared, ...]) -> Array:
+    """Distance of each movement to the nearest of its own four others; a few movements in one product."""
+    nearest = np.empty(len(asked[0].rows))
+    for start in range(0, len(nearest), _NEAREST):
+        some = tuple(one.take(slice(start, start + _NEAREST)) for one in asked)
+        theirs = tuple(one.take(slice(_NEAREST * start, _NEAREST * (start + _NEAREST))) for one in others)
+        k = np.arange(len(some[0].rows))
+        away = distances(recognizer.similarity_.log_average(some, theirs)).reshape(len(k), len(k), _NEAREST)
+        nearest[start : start + _NEAREST] = away[k, k].min(axis=1)
+    return nearest
 
 
 def _rows(stored: Stored, c: int) -> Rows:
