@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.figure import Figure
+from PIL import Image
+from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
 from kineme.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
 from kineme.styles.figure import draw_morph
 
+_COLORS = 128  # of a picture of the tutorial
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
 LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
 
@@ -102,11 +107,24 @@ FIGURES = {
 }
 
 
+def library_pictures(folder: Path) -> None:
+    """Those of the tutorial, drawn by its own commands, in few colors so that they are small."""
+    page = Path(__file__).parent / "action-library.md"
+    with TemporaryDirectory() as place:
+        for _ in walk(page, Path(place)):
+            pass
+        for name in re.findall(r"\]\(images/library-(.+?)\.png\)", page.read_text(encoding="utf-8")):
+            with Image.open(next(Path(place).rglob(f"{name}.png"))) as picture:
+                few = picture.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
+                few.save(folder / f"library-{name}.png", optimize=True)
+
+
 def main(folder: Path) -> None:
     """Write every figure as PNG."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
         (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
+    library_pictures(folder)
 
 
 if __name__ == "__main__":

@@ -52,6 +52,14 @@ def test_a_folder_of_folders_becomes_symbols(recordings, demos, tmp_path):
         np.testing.assert_allclose(again.times, one.times, atol=1e-6)
 
 
+def test_a_movement_tells_the_file_that_it_comes_from(recordings, tmp_path):
+    answer("learn", "recordings/GShape/7.csv", "recordings", "--label", "g", "-l", "actions", cwd=tmp_path)
+    shown = answer("library", "show", "g", "-l", "actions", cwd=tmp_path)["members"]
+    assert {one["source"] for one in shown} == {
+        path.relative_to(tmp_path).as_posix() for path in recordings.rglob("*.csv")
+    }
+
+
 def test_learning_again_adds_nothing_also_from_another_place(recordings, tmp_path):
     library = tmp_path / "actions"
     answer("learn", recordings, "-l", library)
@@ -80,6 +88,8 @@ def test_labels_can_be_given_or_left_out(recordings, tmp_path):
     assert [(one["name"], one["movements"]) for one in listed["symbols"]] == [("gee/../", 7)]
     labeled_later = answer("learn", recordings, "-l", library)
     assert (labeled_later["added"], labeled_later["symbols"]) == (0, ["CShape"])
+    assert (labeled_later["known"], labeled_later["joined"]) == (14, 7)  # those that had a symbol keep it
+    assert answer("learn", recordings, "-l", library)["joined"] == 0
     both = run("learn", recordings, "--label", "x", "--no-labels", "-l", library)
     assert both.returncode == 2
 

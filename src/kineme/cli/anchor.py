@@ -12,6 +12,8 @@ import click
 from kineme.cli.options import json_option, library_option
 from kineme.cli.output import count, printable, say
 
+_SHOWN = 5  # movements left over, written out
+
 
 class Choice(click.ParamType):  # type: ignore[type-arg]
     """Numbers of proposals separated by commas, or all."""
@@ -75,13 +77,23 @@ def anchor(folder: Path, **options: Any) -> None:
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
         }
+        alone = _named(library, proposals.left_over)
         if interactive:
-            click.echo(_text(data))
+            click.echo(_text(data, alone))
             Session(library, proposals, pictures[1:]).run()
             return
         data["accepted"] = _accept(library, proposals, accepted, names)
         data["rejected"] = _reject(library, proposals, rejected)
-    say(options["as_json"], data, lambda: _text(data))
+    say(options["as_json"], data, lambda: _text(data, alone))
+
+
+def _named(library: Any, ids: Any) -> str:
+    """The first movements by name, for a person."""
+    if not len(ids):
+        return ""
+    names = library.movements(ids=ids[:_SHOWN]).names or ()
+    shown = [printable(name or key) for name, key in zip(names, ids.tolist(), strict=False)]
+    return ": " + ", ".join([*shown, *(["..."] if len(ids) > _SHOWN else [])])
 
 
 def _names(path: Path | None) -> dict[int, str]:
@@ -169,7 +181,7 @@ def _as_data(proposals: Any) -> dict[str, Any]:
     }
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text(data: dict[str, Any], alone: str) -> str:
     from kineme.table import Table, to_text
 
     lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
@@ -180,7 +192,7 @@ def _text(data: dict[str, Any]) -> str:
          "" if one["nearest"] is None else str(one["nearest"]))
         for one in found
     ]  # fmt: skip
-    title = f"{count(len(found), 'proposal')}, {count(len(data['left_over']), 'movement')} left over"
+    title = f"{count(len(found), 'proposal')}, {count(len(data['left_over']), 'movement')} left over{alone}"
     lines.append(
         to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
     )

@@ -38,11 +38,16 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         raise click.UsageError("expected --label or --no-labels, not both")
     found, problems = _read_all(recordings, options)
     with ActionLibrary(folder, create=True) as library:
-        reports = [_learn(library, one, options, label, no_labels) for one in found]
+        before = library.version
+        reports = [
+            _learn(library, root, one, options, [None if no_labels else label or each for each in one.labels])
+            for root, one in found
+        ]
         data = {
             "library": str(folder),
             "added": sum(one.added for one in reports),
             "known": sum(one.known for one in reports),
+            "joined": _joined(library, before) if any(one.known for one in reports) else 0,
             "symbols": [name for one in reports for name in one.symbols],
             "movements": len(library),
             "version": library.version,
@@ -51,17 +56,18 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     say(as_json, data, lambda: _text(data))
 
 
-def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[Any], list[str]]:
-    """What could be read, and what could not; an error if that is everything."""
+def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
+    """What could be read, with its folder, and what could not; an error if that is everything."""
     from kineme.errors import DataError
 
-    found: list[Any] = []
+    found: list[tuple[Path, Any]] = []
     problems: list[str] = []
     first: DataError | None = None
     for path in paths:
         try:
-            found.append(read(path, options))
-            problems += map(str, found[-1].problems)
+            one = read(path, options)
+            found.append((path if path.is_dir() else path.parent, one))
+            problems += map(str, one.problems)
         except DataError as error:
             first = first or error
             problems.append(str(error))
@@ -70,12 +76,18 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[An
     return found, problems
 
 
-def _learn(library: Any, recordings: Any, options: dict[str, Any], label: str | None, no_labels: bool) -> Any:
+def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[str | None]) -> Any:
     from kineme.library.recordings import learn_recordings
 
-    labels = [None if no_labels else label or one for one in recordings.labels]
     with _progress(len(recordings)) as progress:
-        return learn_recordings(library, recordings, options, labels, progress)
+        return learn_recordings(library, recordings, options, labels, progress, root)
+
+
+def _joined(library: Any, before: int) -> int:
+    """Movements that had no symbol and show one now: a label came with what was known."""
+    import numpy as np
+
+    return len(np.setdiff1d(library.at(before).unlabeled(), library.unlabeled()))
 
 
 @contextmanager
@@ -89,7 +101,8 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
 
 def _text(data: dict[str, Any]) -> str:
     new = f", {count(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
-    known = f", {data['known']:,} known already" if data["known"] else ""
+    joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
+    known = f", {data['known']:,} known already{joined}" if data["known"] else ""
     held = f"{printable(data['library'])} holds {count(data['movements'], 'movement')}"
     problems = data["problems"]
     lines = [f"learned {count(data['added'], 'movement')}{known}{new}; {held}"]

@@ -8,6 +8,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from kineme.io.join_files import Recordings
+from kineme.io.join_files import Source as File
 from kineme.library.learn import LearnReport, Progress
 from kineme.library.source import Source
 
@@ -40,17 +41,7 @@ def learn_recordings(
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     told = {name: value for name, value in (options or {}).items() if value is not None}
-    files = {
-        one.path: Source(
-            (PurePath(root) / one.path).as_posix(),
-            one.sha256,
-            one.size,
-            PurePath(one.path).suffix.lower().lstrip("."),
-            told,
-            now,
-        )
-        for one in recordings.sources
-    }
+    files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
     return library.learn(
         recordings.demonstrations,
         list(recordings.labels) if labels is None else labels,
@@ -58,3 +49,7 @@ def learn_recordings(
         places=[one.place for one in recordings.sources],
         progress=progress,
     )
+
+
+def _source(one: File, path: PurePath, told: Mapping[str, Any], now: str) -> Source:
+    return Source(path.as_posix(), one.sha256, one.size, path.suffix.lower().lstrip("."), told, now)
