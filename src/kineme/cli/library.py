@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
 from kineme.cli.options import SymbolName, json_option, library_option
-from kineme.cli.output import count, printable, say
-
-_LISTED = 12  # of a change's symbols or movements, written out
+from kineme.cli.output import count, in_words, printable, say
 
 
 @click.group()
@@ -185,7 +182,7 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
         from kineme.table import Table, to_text
 
         rows = [
-            (str(one.id), one.at[:19].replace("T", " "), one.action, printable(_told(one.detail)))
+            (str(one.id), one.at[:19].replace("T", " "), one.action, printable(in_words(one.detail)))
             for one in versions[-limit:]
         ]
         return to_text(Table(count(len(versions), "version"), ("version", "at (UTC)", "action", "what"), rows))
@@ -230,18 +227,6 @@ def import_(path: Path, folder: Path, as_json: bool) -> None:
     with ActionLibrary.import_(path, folder) as actions:
         data: dict[str, Any] = {"library": str(folder), "movements": len(actions), "symbols": len(actions.symbols())}
     say(as_json, data, lambda: f"{printable(folder)}: {count(data['movements'], 'movement')}")
-
-
-def _told(detail: Mapping[str, Any]) -> str:
-    """What there is to say about a version; nothing of what is empty, and the number of a long list."""
-    parts = []
-    for key, value in detail.items():
-        items = value if isinstance(value, list) else [value]
-        if len(items) > _LISTED:
-            parts.append(f"{len(items)} {key}")
-        elif items and value not in ("", None):
-            parts.append(f"{key} {', '.join(map(str, items))}")
-    return "; ".join(parts)
 
 
 def _brief(symbol: Any) -> dict[str, Any]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
+
+_LISTED = 12  # items of a list, written out
 
 
 def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
@@ -22,3 +24,15 @@ def printable(name: Any) -> str:
 def count(number: int, what: str) -> str:
     """A number and its noun: ``1 movement``, ``2 movements``."""
     return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
+def in_words(detail: Mapping[str, Any]) -> str:
+    """Keys with their values, ``added 30; symbols nod, wave``: nothing of what is empty, the number of a long list."""
+    parts = []
+    for key, value in detail.items():
+        items = value if isinstance(value, list) else [value]
+        if len(items) > _LISTED:
+            parts.append(f"{len(items)} {key}")
+        elif items and value not in ("", None):
+            parts.append(f"{key} {', '.join(map(str, items))}")
+    return "; ".join(parts)
