@@ -30,7 +30,7 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
 
 
-@click.command()
+@click.command(short_help="Turn movements without a name into symbols.")
 @library_option
 @click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
               help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip

@@ -15,7 +15,7 @@ METHOD_NAMES = (
 _QUICK_SPLITS = 2
 
 
-@click.command()
+@click.command(short_help="Compare recognizers on a data set.")
 @click.argument("data")
 @click.option("--protocol", "protocols", multiple=True, type=click.Choice(PROTOCOL_NAMES),
               help="What to ask; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip

@@ -12,7 +12,7 @@ from kineme.cli.options import Numbers, SymbolName, json_option, library_option_
 from kineme.cli.output import printable
 
 
-@click.command()
+@click.command(short_help="Move again: a symbol or a recording, to a new goal.")
 @click.argument("source", type=SymbolName())
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
 @click.option("--start", type=Numbers(), help="Where to start.  [default: as demonstrated]")

@@ -12,7 +12,7 @@ from kineme.cli.output import printable, say
 from kineme.cli.reading import layout_options, read
 
 
-@click.command()
+@click.command(short_help="Show what a set of recordings holds.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @layout_options
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")

@@ -16,7 +16,7 @@ from kineme.cli.reading import layout_options, read
 _SHOWN = 10  # problems written out
 
 
-@click.command()
+@click.command(short_help="Store recordings in an action library.")
 @click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
 @library_option
 @click.option("--label", help="Name of the symbol of all of them.  [default: the label in the file, or its folder]")

@@ -13,7 +13,7 @@ from kineme.cli.output import printable, say
 from kineme.cli.reading import layout_options, read
 
 
-@click.command()
+@click.command(short_help="Say which symbol a recording shows, if any.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @library_option
 @click.option(

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 
-@click.command()
+@click.command(short_help="Repeat the paper's tables and figures.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for report.html, results.json, tables.txt and the figures.")  # fmt: skip
 @click.option("--draws", type=click.IntRange(1), default=None,
