@@ -53,7 +53,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     say(as_json, data, text)
 
 
-@library.command()
+@library.command(short_help="Show one symbol and its movements.")
 @click.argument("symbol", type=SymbolName())
 @library_option
 @json_option
@@ -146,7 +146,7 @@ def review(folder: Path, as_json: bool) -> None:
     say(as_json, data, text)
 
 
-@library.command()
+@library.command(short_help="Delete a symbol or movements; earlier versions keep them.")
 @click.argument("symbol", type=SymbolName(), required=False)
 @click.option("--movement", "movements", type=int, multiple=True, help="Delete this movement; may be repeated.")
 @click.option("--yes", "-y", is_flag=True, help="Do not ask.")
@@ -190,7 +190,7 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     say(as_json, data, text)
 
 
-@library.command()
+@library.command(short_help="Check every byte of a library.")
 @library_option
 @json_option
 @click.pass_context

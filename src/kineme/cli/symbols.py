@@ -13,7 +13,7 @@ from kineme.cli.options import SymbolName, json_option, library_option
 from kineme.cli.output import count, printable, say
 
 
-@click.command()
+@click.command(short_help="Write a symbol for a planner, as JSON.")
 @click.argument("symbol", type=SymbolName())
 @library_option
 @click.option("--by", type=click.Choice(["medoid", "mean"]), default="medoid", show_default=True,
@@ -51,7 +51,7 @@ def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: "\n".join(f"{one['distance']:.3f}  {printable(one['symbol'])}" for one in data))
 
 
-@click.command()
+@click.command(short_help="List the symbols that lie between two.")
 @click.argument("first", type=SymbolName())
 @click.argument("second", type=SymbolName())
 @library_option
@@ -63,7 +63,7 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: "\n".join(map(_lies, data)) or "none")
 
 
-@click.command("map")
+@click.command("map", short_help="Draw the symbols on a map, like near like.")
 @click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
 @library_option
 def draw(path: Path, folder: Path) -> None:
