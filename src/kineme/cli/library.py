@@ -37,7 +37,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
             "unlabeled": unlabeled,
             "dimensions": shown.n_dims,
             "version": shown.version,
-            "symbols": [_brief(symbol) for symbol in symbols],
+            "symbols": [brief(symbol) for symbol in symbols],
         }
 
     def text() -> str:
@@ -75,7 +75,7 @@ def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
     """Give a symbol another NAME; its id stays."""
     with opened(folder, read_only=False) as actions:
         actions.rename(symbol, name)
-        data = {**_brief(actions[name]), "was": symbol, "version": actions.version}
+        data = {**brief(actions[name]), "was": symbol, "version": actions.version}
     say(as_json, data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})")
 
 
@@ -88,62 +88,8 @@ def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
     """Write down what a symbol means."""
     with opened(folder, read_only=False) as actions:
         actions.describe(symbol, text)
-        data = {**_brief(actions[symbol]), "version": actions.version}
+        data = {**brief(actions[symbol]), "version": actions.version}
     say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
-
-
-@library.command()
-@click.argument("symbols", type=SymbolName(), nargs=-1, required=True)
-@click.option("--into", required=True, help="Name of the symbol that holds them all afterwards.")
-@library_option
-@json_option
-def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
-    """Make one symbol of several."""
-    with opened(folder, read_only=False) as actions:
-        actions.merge(symbols, into)
-        data = {**_brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
-
-
-@library.command()
-@click.argument("symbol", type=SymbolName())
-@click.option("--movement", "movements", type=int, multiple=True, required=True, help="Goes over; may be repeated.")
-@click.option("--into", required=True, help="Name of the new symbol.")
-@library_option
-@json_option
-def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
-    """Make a new symbol of some movements of another one."""
-    with opened(folder, read_only=False) as actions:
-        actions.split(symbol, list(movements), into)
-        data = {**_brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
-
-
-@library.command()
-@library_option
-@json_option
-def review(folder: Path, as_json: bool) -> None:
-    """Find symbols that could be one, and symbols that are of two kinds."""
-    with opened(folder) as actions:
-        found = actions.review()
-    data = {
-        "merges": [one._asdict() for one in found.merges],
-        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in found.splits],
-    }
-
-    def text() -> str:
-        lines = [
-            f"{printable(one.first)} and {printable(one.second)} could be one: they overlap by {one.overlap:.2f}"
-            for one in found.merges
-        ]
-        lines += [
-            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
-            + ", ".join(map(str, one.parts[1].tolist()))
-            for one in found.splits
-        ]
-        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
-
-    say(as_json, data, text)
 
 
 @library.command(short_help="Delete a symbol or movements; earlier versions keep them.")
@@ -229,7 +175,8 @@ def import_(path: Path, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: f"{printable(folder)}: {count(data['movements'], 'movement')}")
 
 
-def _brief(symbol: Any) -> dict[str, Any]:
+def brief(symbol: Any) -> dict[str, Any]:
+    """A symbol as plain data."""
     return {
         "name": symbol.name,
         "id": symbol.id,

@@ -15,7 +15,8 @@ from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
-from kineme.cli.symbols import COMMANDS
+from kineme.cli.revise import COMMANDS as REVISING
+from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 
 
@@ -42,7 +43,7 @@ main.add_command(generate)
 main.add_command(inspect)
 main.add_command(learn)
 main.add_command(library)
-for command in COMMANDS:
+for command in (*REVISING, *MEANING):
     library.add_command(command)
 main.add_command(recognize)
 main.add_command(reproduce)

@@ -66,7 +66,8 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
 @click.command("map", short_help="Draw the symbols on a map, like near like.")
 @click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
 @library_option
-def draw(path: Path, folder: Path) -> None:
+@json_option
+def draw(path: Path, folder: Path, as_json: bool) -> None:
     """Draw the symbols on a map, those that are alike near each other: a .png, .svg or .pdf file."""
     from kineme.anchoring.map_figure import draw_map
     from kineme.figures import save_figure
@@ -76,7 +77,8 @@ def draw(path: Path, folder: Path) -> None:
         space = space_of(actions)
         typical = [prototype_of(actions, actions[name]) for name in space.symbols]
         save_figure(draw_map(space, actions.movements(ids=typical)), path)
-    click.echo(f"wrote {printable(path)}: {count(len(space.symbols), 'symbol')}")
+        data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
+    say(as_json, data, lambda: f"wrote {printable(path)}: {count(len(data['symbols']), 'symbol')}")
 
 
 def _lies(one: dict[str, Any]) -> str:

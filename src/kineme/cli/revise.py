@@ -1,0 +1,69 @@
+"""``kineme library`` merge, split, review: symbols that turn out to be one, or two."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kineme.cli.library import brief, opened
+from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.output import count, printable, say
+
+
+@click.command()
+@click.argument("symbols", type=SymbolName(), nargs=-1, required=True)
+@click.option("--into", required=True, help="Name of the symbol that holds them all afterwards.")
+@library_option
+@json_option
+def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
+    """Make one symbol of several."""
+    with opened(folder, read_only=False) as actions:
+        actions.merge(symbols, into)
+        data = {**brief(actions[into]), "version": actions.version}
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+
+
+@click.command()
+@click.argument("symbol", type=SymbolName())
+@click.option("--movement", "movements", type=int, multiple=True, required=True, help="Goes over; may be repeated.")
+@click.option("--into", required=True, help="Name of the new symbol.")
+@library_option
+@json_option
+def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
+    """Make a new symbol of some movements of another one."""
+    with opened(folder, read_only=False) as actions:
+        actions.split(symbol, list(movements), into)
+        data = {**brief(actions[into]), "version": actions.version}
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+
+
+@click.command()
+@library_option
+@json_option
+def review(folder: Path, as_json: bool) -> None:
+    """Find symbols that could be one, and symbols that are of two kinds."""
+    with opened(folder) as actions:
+        found = actions.review()
+    data = {
+        "merges": [one._asdict() for one in found.merges],
+        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in found.splits],
+    }
+
+    def text() -> str:
+        lines = [
+            f"{printable(one.first)} and {printable(one.second)} could be one: they overlap by {one.overlap:.2f}"
+            for one in found.merges
+        ]
+        lines += [
+            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
+            + ", ".join(map(str, one.parts[1].tolist()))
+            for one in found.splits
+        ]
+        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
+
+    say(as_json, data, text)
+
+
+#: For the group ``kineme library``.
+COMMANDS = (merge, split, review)
