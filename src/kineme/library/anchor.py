@@ -57,7 +57,8 @@ class LibraryProposals:
         return self.ids[self.found.left_over]
 
     def __repr__(self) -> str:
-        return f"LibraryProposals({len(self)} kinds of {len(self.ids)} movements, {len(self.left_over)} left over)"
+        kinds = "1 kind" if len(self) == 1 else f"{len(self)} kinds"
+        return f"LibraryProposals({kinds} of {len(self.ids)} movements, {len(self.left_over)} left over)"
 
     def movements(self, library: ActionLibrary) -> Demonstrations:
         """The recordings, for the pictures."""
