@@ -96,6 +96,7 @@ class Procrustes:
         return _turned_back(_best_rotations(C), self.max_angle)
 
 
+_FEW = 8  # rows below which vectors are multiplied one by one
 _MANY = 16  # rows from which on the complex product pays
 
 
@@ -111,7 +112,9 @@ def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(A.conj() @ B.T)
     real = B.real.dtype
     twice = np.concatenate((A, 1j * A)).astype(A.dtype)
-    parts = np.ascontiguousarray(twice).view(real) @ np.ascontiguousarray(B).view(real).T
+    a, b = np.ascontiguousarray(twice).view(real), np.ascontiguousarray(B).view(real)
+    # A product with few rows copies all of B first; with one vector after the other it only reads it.
+    parts = a @ b.T if len(A) >= _FEW else np.stack([b @ row for row in a])
     return np.asarray(parts[: len(A)] + 1j * parts[len(A) :])
 
 
