@@ -221,7 +221,7 @@ def test_a_library_with_one_symbol_knows_it_from_others(make):
 def test_what_cannot_be_answered_says_why(make):
     library = make()
     library.learn(_kinds([2]), labels=[None, None])
-    with pytest.raises(SpecificationError, match=r"that show a symbol, got none among 2 movements; learn some with"):
+    with pytest.raises(SpecificationError, match=r"that show a symbol, got none among its 2; learn some with"):
         library.recognize(_questions([1]))
     with pytest.raises(SpecificationError, match=r"expected training movements that differ, got one movement"):
         make(_kinds([1]), "one").recognize(_questions([1]))

@@ -56,7 +56,10 @@ def space_of(library: ActionLibrary) -> ConceptualSpace:
     """The symbols at distances, by the movements that stand for them; needs two symbols with movements."""
     symbols = [symbol for symbol in library.symbols() if len(symbol)]
     if len(symbols) < 2:
-        raise SpecificationError(f"expected two symbols with movements or more, got {len(symbols)}; see symbols()")
+        raise SpecificationError(
+            f"expected two symbols with movements or more, got {len(symbols)}; learn recordings with labels, or name "
+            "proposals"
+        )
     like = library.specification.recognizer()
     rows = library.features([prototype_of(library, symbol) for symbol in symbols])
     return conceptual_space([one.name for one in symbols], see_rows(rows, library.n_dims or 0, like), like)

@@ -109,7 +109,7 @@ def members_of(store: Store) -> Members:
         pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
         if not len(pairs):
             raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among {read.count(store)} movements; "
+                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
                 "learn some with labels, or name a proposal"
             )
         keys, which = np.unique(pairs[:, 1], return_inverse=True)
