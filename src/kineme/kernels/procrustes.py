@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.parallel import single_threaded_blas
 from kineme.validation import Array, check_number
 
 
@@ -113,8 +114,13 @@ def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
     real = B.real.dtype
     twice = np.concatenate((A, 1j * A)).astype(A.dtype)
     a, b = np.ascontiguousarray(twice).view(real), np.ascontiguousarray(B).view(real)
-    # A product with few rows copies all of B first; with one vector after the other it only reads it.
-    parts = a @ b.T if len(A) >= _FEW else np.stack([b @ row for row in a])
+    if len(A) >= _FEW:
+        parts = a @ b.T
+    else:
+        # A product with few rows copies all of B first; with one vector after the other it only reads it. In one
+        # thread: two that wait for each other take twenty times as long where something else runs on the machine.
+        with single_threaded_blas():
+            parts = np.stack([b @ row for row in a])
     return np.asarray(parts[: len(A)] + 1j * parts[len(A) :])
 
 
