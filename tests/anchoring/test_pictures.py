@@ -15,7 +15,7 @@ from kineme.anchoring.map_figure import draw_map
 from kineme.anchoring.proposal_figure import draw_proposal
 from kineme.anchoring.propose import propose
 from kineme.anchoring.sheet_figure import draw_proposals
-from kineme.anchoring.space import conceptual_space
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.figures import save_figure
 from kineme.recognition.perturbations import Perturbation
 
@@ -57,6 +57,21 @@ def test_a_sheet_counts():
     titles = [axes.get_title() for axes in draw_proposals(demos, proposals).axes if axes.get_title()]
     assert [title.partition(" ×")[0] for title in titles[:-1]] == ["0:  6", "1:  5", "2:  4"]
     assert titles[-1] == "left over: 1"
+
+
+@pytest.mark.parametrize("n", [2, 7, 26])
+def test_drawings_on_a_map_do_not_overlap(n):
+    rng = np.random.default_rng(n)
+    demos = draw_kinds([1] * n, 2, n)
+    distances = np.linalg.norm(rng.normal(size=(n, 1, 2)) * np.arange(1, n + 1)[:, None, None] ** -1.0, axis=2)
+    space = ConceptualSpace(tuple(range(n)), np.abs(distances - distances.T))  # most of them in nearly one place
+    figure = draw_map(space, demos)
+    paths = np.array([line.get_data() for line in figure.axes[0].lines[::2]])  # every other one is a start
+    low, high = paths.min(axis=2), paths.max(axis=2)
+    assert np.isclose((high - low).max(axis=1), (high - low).max()).all()  # all of one size
+    over = ((low[:, None] < high[None]) & (low[None] < high[:, None])).all(axis=2)
+    assert over.sum() == n  # each with itself only
+    assert figure.get_size_inches()[1] <= 8.0
 
 
 def test_in_space_the_widest_view_is_shown():
