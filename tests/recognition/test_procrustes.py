@@ -113,3 +113,16 @@ def test_few_rows_are_compared_as_many_are(seed):
     procrustes = Procrustes(2, 0.5)
     many = _distances(procrustes, A, B)
     np.testing.assert_allclose(np.vstack([_distances(procrustes, a[None], B) for a in A]), many, rtol=1e-10)
+
+
+@pytest.mark.parametrize("choice", ["always", "never"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("n", [1, 2, 15, 16, 40])
+def test_few_and_many_movements_in_the_plane_are_compared_alike(n, dtype, choice, monkeypatch):
+    """By vectors one by one, compiled or not, or by one complex product: the same alignments."""
+    monkeypatch.setenv("KINEME_COMPILED", choice)
+    rng, procrustes = np.random.default_rng(n), Procrustes(2, np.pi)
+    A, B = (rng.normal(size=(m, 60)).astype(dtype) for m in (n, 37))
+    a, b = (rows[:, :30] + 1j * rows[:, 30:] for rows in (A.astype(float), B.astype(float)))
+    found = procrustes.alignment(procrustes.prepare(A), procrustes.prepare(B))
+    np.testing.assert_allclose(found, np.abs(a.conj() @ b.T), rtol=2e-5 if dtype is np.float32 else 1e-12, atol=1e-5)

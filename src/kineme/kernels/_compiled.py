@@ -108,3 +108,15 @@ def user_sums(d: Callable[..., Any], g: Callable[..., Any]) -> Callable[[Rows, R
         _sum(term, A, B, c, sums)
 
     return sums_of_tile
+
+
+@jit
+def fill_products(few: Rows, many: Rows, products: Rows) -> None:
+    """``products[i, j] = few[i] . many[j]``, reading `many` once; the twin is ``few @ many.T``."""
+    for j in range(many.shape[0]):
+        row = many[j]
+        for i in range(few.shape[0]):
+            total = few.dtype.type(0)
+            for k in range(few.shape[1]):
+                total += few[i, k] * row[k]
+            products[i, j] = total

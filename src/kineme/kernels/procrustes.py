@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.compiled import use_compiled
 from kineme.errors import SpecificationError
 from kineme.parallel import single_threaded_blas
 from kineme.validation import Array, check_number
@@ -97,7 +98,6 @@ class Procrustes:
         return _turned_back(_best_rotations(C), self.max_angle)
 
 
-_FEW = 8  # rows below which vectors are multiplied one by one
 _MANY = 16  # rows from which on the complex product pays
 
 
@@ -114,14 +114,23 @@ def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
     real = B.real.dtype
     twice = np.concatenate((A, 1j * A)).astype(A.dtype)
     a, b = np.ascontiguousarray(twice).view(real), np.ascontiguousarray(B).view(real)
-    if len(A) >= _FEW:
-        parts = a @ b.T
-    else:
-        # A product with few rows copies all of B first; with one vector after the other it only reads it. In one
-        # thread: two that wait for each other take twenty times as long where something else runs on the machine.
-        with single_threaded_blas():
-            parts = np.stack([b @ row for row in a])
+    parts = _few_products(a, b)
     return np.asarray(parts[: len(A)] + 1j * parts[len(A) :])
+
+
+def _few_products(few: NDArray[Any], many: NDArray[Any]) -> NDArray[Any]:
+    """``few @ many.T``, which would copy all of `many` first, by reading it once.
+
+    In one thread: two that wait for each other take twenty times as long where something else runs on the machine.
+    """
+    if use_compiled(few.shape[0] * many.size):
+        from kineme.kernels._compiled import fill_products
+
+        products = np.empty((len(few), len(many)), few.dtype)
+        fill_products(few, many, products)
+        return products
+    with single_threaded_blas():
+        return np.stack([many @ row for row in few])
 
 
 def _within(product: NDArray[np.complex128], max_angle: float) -> Array:
