@@ -27,7 +27,7 @@ def standard_paths(demonstrations: Demonstrations, n_points: int = N_POINTS) -> 
     """Positions at even times, centered and scaled as a whole to unit size, shape (n, d, n_points)."""
     paths = relative_rows(demonstrations, 0, len(demonstrations), n_points)
     normalization = Normalization()
-    return (paths - normalization.center(paths)) / normalization.size(paths)
+    return normalization.apply(paths)
 
 
 class _Nearest:

@@ -32,6 +32,10 @@ class Normalization:
     def __post_init__(self) -> None:
         check_choice("scale", self.scale, SCALES)
 
+    def apply(self, paths: Array) -> Array:
+        """Paths (n, d, T) minus their place, divided by their size."""
+        return np.asarray((paths - self.center(paths)) / self.size(paths))
+
     def center(self, paths: Array) -> Array:
         """The place of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
         return paths.mean(axis=2, keepdims=True) if self.translation else np.zeros((*paths.shape[:2], 1))

@@ -7,7 +7,6 @@ from functools import lru_cache
 
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import encoder, forcing_matrix
-from kineme.recognition.normalization import Normalization
 from kineme.trajectories.arc_length import resample_by_arc_length
 from kineme.trajectories.spline import spline_matrix
 from kineme.validation import Array, check_choice, check_number
@@ -57,17 +56,18 @@ class Representation:
             return paths[:, :, ::every] if rest == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
-    def describe(self, along: Array, normalization: Normalization) -> Array:
-        """Rows (n, d * n_points), dimension-major, of paths sampled along the phase."""
-        size = normalization.size(along)
-        if self.quantity == "positions":
-            described = (along - normalization.center(along)) / size
-        else:
-            relative = (along - along[:, :, :1]).reshape(-1, self.n_points)
-            described = (relative @ _forcing_operator(self)).reshape(along.shape) / size
-            if not normalization.translation:  # f does not know the place; the average would forgive a wrong one
-                described = described + along.mean(axis=2, keepdims=True) / size
-        return described.reshape(len(along), -1)
+    def describe(self, paths: Array, translation: bool = True) -> Array:
+        """Rows (n, d * n_points), dimension-major, of paths (n, d, n_points) along the phase, place and size taken out.
+
+        Without `translation` the place is still in the paths, and the forcing term gets it back: f does not know the
+        place, so the average over representations would forgive a wrong one.
+        """
+        described = paths
+        if self.quantity == "forcing":
+            described = (paths.reshape(-1, self.n_points) @ _forcing_operator(self)).reshape(paths.shape)
+            if not translation:
+                described += paths.mean(axis=2, keepdims=True)
+        return described.reshape(len(paths), -1)
 
 
 #: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".
@@ -80,7 +80,7 @@ DEFAULT_REPRESENTATIONS = (
 
 @lru_cache(maxsize=32)
 def _forcing_operator(representation: Representation) -> Array:
-    """From positions relative to the start to f at as many points, (T, T): encode, then Eq. (2)."""
+    """From positions to f at as many points, (T, T): relative to the start, encode, then Eq. (2)."""
     dmp = DMP(
         "bio-inspired",
         n_basis=representation.n_basis,
@@ -90,5 +90,6 @@ def _forcing_operator(representation: Representation) -> Array:
         n_points=representation.n_points,
     )
     operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
+    operator[0] -= operator.sum(axis=0)  # (x - x0) E = x E - x0 (sum of the rows of E)
     operator.setflags(write=False)
     return operator

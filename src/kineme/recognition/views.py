@@ -47,13 +47,13 @@ def view_tile(
     paths = even_paths(demos, start, stop, cutoff)
     if not normalization.translation:
         paths = paths + demos.positions[demos.offsets[start:stop]][:, :, None]
-    along: dict[tuple[float, int], Array] = {}  # representations share their phases
+    normalized: dict[tuple[float, int], Array] = {}  # representations share their phases
     seen = []
     for one in representations:
         phase = (one.arc_share, one.n_points)
-        if phase not in along:
-            along[phase] = one.along(paths)
-        seen.append(one.describe(along[phase], normalization))
+        if phase not in normalized:
+            normalized[phase] = normalization.apply(one.along(paths))
+        seen.append(one.describe(normalized[phase], normalization.translation))
     return tuple(seen)
 
 
