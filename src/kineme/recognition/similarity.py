@@ -15,6 +15,7 @@ from kineme.validation import Array
 
 _WIDTH = 0.35  # of the median distance to the nearest movement of another class
 _LEAST = 0.01  # of the typical size: movements closer than that are the same, as recordings go
+_SAME = 1e-3  # of the size: what single precision leaves between a movement and itself is less
 _WIDTH_ROWS = 500  # movements that the width is estimated from, at most
 
 
@@ -110,11 +111,11 @@ def impostor_widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels:
         squares = procrustes.squared_distances(some, some)
         squares[own] = np.inf
         nearest = np.sqrt(squares.min(axis=1, initial=np.inf))
-        nearest = nearest[np.isfinite(nearest) & (nearest > 0)]
+        size = float(np.sqrt(np.median(some.squares)))
+        nearest = nearest[np.isfinite(nearest) & (nearest > _SAME * size)]
         if not len(nearest):
             raise SpecificationError(
                 "expected training movements that differ, got one movement or all the same; add demonstrations"
             )
-        least = _LEAST * float(np.sqrt(np.median(some.squares)))
-        widths.append(max(_WIDTH * float(np.median(nearest)), least))
+        widths.append(max(_WIDTH * float(np.median(nearest)), _LEAST * size))
     return np.array(widths)

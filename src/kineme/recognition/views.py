@@ -15,7 +15,7 @@ from kineme.trajectories.resample import relative_rows
 from kineme.trajectories.smooth import smooth_rows
 from kineme.validation import Array
 
-_TILE_SAMPLES = 50_000  # numbers in one tile of paths: with what is made of them they stay in a core's cache
+_TILE_SAMPLES = 200_000  # numbers in one tile of paths: smaller ones make two threads wait for each other in Python
 N_POINTS = 199  # even samples between the recording and the phases; every second is one of 100
 
 
