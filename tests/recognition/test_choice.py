@@ -85,10 +85,10 @@ def test_given_weights_are_those_of_the_weighted_mean():
     given = Recognizer(weights=(2.0, 1.0, 1.0)).fit(demos)
     each = np.exp(equal.similarity_.logs(equal.look_at(fresh), equal.views_))
     expected = np.log(np.tensordot([0.5, 0.25, 0.25], each, 1))
-    np.testing.assert_allclose(given.log_similarity(fresh), expected, atol=1e-5)
+    np.testing.assert_allclose(given.log_similarity(fresh), expected, rtol=1e-4, atol=1e-4)  # single precision
     one = Recognizer(weights=(0.0, 3.0, 0.0)).fit(demos)
     alone = Recognizer((DEFAULT_REPRESENTATIONS[1],)).fit(demos)
-    np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-12)
+    np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-4, atol=1e-4)
 
 
 def test_kernels_that_know_nothing_stay_equal():
