@@ -22,7 +22,7 @@ from bench.movements import SEED, Array
 from bench.rows import Row, save
 from kineme.library.serving import Serving
 
-_BATCH = 10_000
+_BATCH = 50_000  # movements in one call
 _PER_KIND = 200
 
 

@@ -23,6 +23,7 @@ from kineme.trajectories.demonstrations import Demonstrations
 Progress = Callable[[int, int], object]
 
 _BATCH_MOVEMENTS = 8192
+_SMALL_BATCH = 2048  # of fewer movements four batches are made: one is written while the next one is described
 _BATCH_SAMPLES = 2_000_000
 
 
@@ -112,9 +113,10 @@ def _tell(progress: Progress | None, done: int, total: int) -> int:
 def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
     """Batches of at most so many movements and samples; at least one movement."""
     start, n = 0, len(demos)
+    most = min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-n // 4)))
     while start < n:
         limit = int(np.searchsorted(demos.offsets, demos.offsets[start] + _BATCH_SAMPLES, side="right")) - 1
-        stop = min(max(limit, start + 1), start + _BATCH_MOVEMENTS, n)
+        stop = min(max(limit, start + 1), start + most, n)
         yield start, stop
         start = stop
 

@@ -23,7 +23,6 @@ from kineme.validation import Array, describe
 
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored
 _SMALL, _LARGE = 1e-30, 1e30  # extents between which single precision keeps its relative error
-_SMOOTHED = 5  # samples that smoothing needs; `view` smooths all movements of a batch or none
 
 
 @dataclass(frozen=True)
@@ -120,14 +119,8 @@ def _primitives(demos: Demonstrations, specification: Specification) -> list[tup
 
 
 def _features(demos: Demonstrations, specification: Specification) -> list[bytes]:
-    rows = np.empty((len(demos), sum(specification.widths(demos.n_dims))), dtype=np.float32)
-    short = demos.lengths < _SMOOTHED
-    for group in (short, ~short):
-        if group.any():
-            chosen = demos if group.all() else demos[group]
-            seen = view(chosen, specification.representations, specification.normalization, specification.cutoff)
-            rows[group] = np.concatenate(seen, axis=1)
-    return _cut(rows)
+    seen = view(demos, specification.representations, specification.normalization, specification.cutoff)
+    return _cut(np.concatenate(seen, axis=1, dtype=np.float32))
 
 
 def _cut(block: NDArray[np.floating]) -> list[bytes]:
