@@ -16,7 +16,7 @@ from kineme.trajectories.preprocess import preprocess
 from kineme.trajectories.resample import even_rows, extents_of, relative_rows
 from kineme.validation import Array, describe
 
-_TILE_SAMPLES = 100_000  # numbers in one tile: with its product it stays in a core's cache
+_TILE_SAMPLES = 200_000  # in one tile: larger ones leave the cache, of smaller ones threads wait for each other
 
 
 def encode(dmp: DMP, movements: Any) -> Primitives:

@@ -164,7 +164,7 @@ def _check_sized(value: Any, expected: str) -> None:
 def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...], names: Names) -> list[Array]:
     """Check movement by movement; only an error costs the time to say which one it was."""
     try:
-        return [check(*one) for one in zip(*columns, strict=True)]
+        return list(map(check, *columns))
     except TrajectoryError:
         for i, one in enumerate(zip(*columns, strict=True)):
             check(*one, who=describe(i, names))
@@ -174,15 +174,16 @@ def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...],
 def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
     if not checked:
         raise TrajectoryError("expected at least one movement, got none")
-    n_dims = checked[0].shape[1]
-    if len({x.shape[1] for x in checked}) > 1:
+    lengths = np.fromiter(map(len, checked), np.intp, len(checked))
+    try:
+        return np.concatenate(checked), np.concatenate(([0], np.cumsum(lengths)))
+    except ValueError:
+        n_dims = checked[0].shape[1]
         odd = next(i for i, x in enumerate(checked) if x.shape[1] != n_dims)
         raise TrajectoryError(
             f"{describe(odd, names)}: expected {n_dims} dimensions as in trajectory 0, "
             f"got {checked[odd].shape[1]}; movements of one batch share their dimensions"
-        )
-    lengths = np.fromiter(map(len, checked), np.intp, len(checked))
-    return np.concatenate(checked), np.concatenate(([0], np.cumsum(lengths)))
+        ) from None
 
 
 def _join_times(
