@@ -1,0 +1,77 @@
+"""The same recordings as MATLAB, Parquet and CSV files: learned once, whatever they come in."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.datasets import lasa
+
+SHAPES = ["CShape", "GShape"]
+
+
+def learn(*arguments):
+    command = [sys.executable, "-W", "error", "-m", "kineme", "learn", *map(str, arguments), "--json"]
+    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+def _columns(demos):
+    return {
+        "movement": np.repeat(np.arange(len(demos)), demos.lengths),
+        "action": np.repeat(demos.labels.astype(str), demos.lengths),
+        "time": demos.times,
+        "x": demos.positions[:, 0],
+        "y": demos.positions[:, 1],
+    }
+
+
+def _as_matlab(path, demos):
+    path.mkdir()
+    for shape in SHAPES:
+        shutil.copy(lasa._resources()[shape], path / f"{shape}.mat")
+
+
+def _as_parquet(path, demos):
+    import pyarrow
+    import pyarrow.parquet
+
+    pyarrow.parquet.write_table(pyarrow.table(_columns(demos)), path)
+
+
+def _as_long_csv(path, demos):
+    columns = _columns(demos)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    path.write_text("\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+
+
+WRITERS = {"mat": _as_matlab, "demos.parquet": _as_parquet, "demos.csv": _as_long_csv}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("formats")
+    for name, write in WRITERS.items():
+        write(path / name, kineme.load_lasa(SHAPES))
+    return path
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_every_format_gives_the_same_library(folder, name, tmp_path):
+    learned = learn(folder / name, "-l", tmp_path / "actions")
+    assert (learned["added"], learned["problems"]) == (14, [])
+    assert sorted(learned["symbols"]) == SHAPES
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
+        for shape in SHAPES:
+            stored, expected = library.movements(shape), kineme.load_lasa([shape])
+            np.testing.assert_allclose(stored.positions, expected.positions, atol=1e-5)
+
+
+def test_what_comes_in_another_format_is_known(folder, tmp_path):
+    learned = learn(*(folder / name for name in WRITERS), "-l", tmp_path / "actions")
+    assert (learned["added"], learned["known"], learned["movements"]) == (14, 28, 14)
