@@ -52,6 +52,25 @@ def test_a_folder_of_folders_becomes_symbols(recordings, demos, tmp_path):
         np.testing.assert_allclose(again.times, one.times, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("columns", "keys"),
+    [("label,movement", ["a,0", "a,1", "b,0", "b,1"]), ("movement,trial", ["a/b,c", "a,b/c", "a,b\\/c", "a\\/b,c"])],
+)
+def test_every_movement_of_a_long_table_is_learned(demos, tmp_path, columns, keys):
+    """Also where each action counts its movements from 0."""
+    rows = [
+        f"{key},{t},{x},{y}"
+        for key, one in zip(keys, demos, strict=False)
+        for t, (x, y) in zip(one.times.tolist(), one.positions.tolist(), strict=True)
+    ]
+    (tmp_path / "long.csv").write_text("\n".join([f"{columns},t,x,y", *rows]))
+    options = ["--movement", columns] if "label" not in columns else []
+    learned = answer("learn", tmp_path / "long.csv", "-l", tmp_path / "actions", *options)
+    assert (learned["added"], learned["known"]) == (4, 0)
+    again = answer("learn", tmp_path / "long.csv", "-l", tmp_path / "actions", *options)
+    assert (again["added"], again["known"]) == (0, 4)
+
+
 def test_a_movement_tells_the_file_that_it_comes_from(recordings, tmp_path):
     answer("learn", "recordings/GShape/7.csv", "recordings", "--label", "g", "-l", "actions", cwd=tmp_path)
     shown = answer("library", "show", "g", "-l", "actions", cwd=tmp_path)["members"]

@@ -209,7 +209,9 @@ def test_ambiguous_columns_are_refused():
 def test_movements_of_a_long_table_may_be_interleaved_and_share_their_number_between_labels():
     rows = [(label, k % 2, t, x, y) for t, x, y in SIX for k, label in enumerate(("wave", "wave", "point", "point"))]
     found = read(lines(rows, "label,trial,time,x,y"))
-    assert [(one.label, one.place) for one in found.sources] == [("wave", "0"), ("wave", "1"), ("point", "0"), ("point", "1")]  # noqa: E501  # fmt: skip
+    assert [(one.label, one.place) for one in found.sources] == [
+        (label, f"{label}/{k}") for label in ("wave", "point") for k in "01"
+    ]
     for one in found.demonstrations:
         np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
 

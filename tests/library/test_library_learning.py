@@ -203,6 +203,11 @@ def test_disk_is_little_more_than_the_arrays_in_single_precision(tmp_path):
         (np.random.default_rng(0).normal(size=(2, 9, 3)), {}, r"expected movements of 2 dimensions .* got 3; select"),
         (np.random.default_rng(0).normal(size=(2, 9, 2)), {"labels": ["a"]}, r"one label for each of the 2 .* got 1"),
         (np.random.default_rng(0).normal(size=(2, 9, 2)), {"places": ["a"]}, r"one place for each of the 2 .* got 1"),
+        (
+            np.random.default_rng(0).normal(size=(2, 9, 2)),
+            {"source": Source("a.csv", "0" * 64, 1), "places": ["1", "1"]},
+            "a place of its own in 'a.csv' .* got '1' for movements 0 and 1; name them apart",
+        ),
         (np.random.default_rng(0).normal(size=(2, 9, 2)), {"source": []}, r"one for each of the 2 movements, got 0"),
     ],
 )  # fmt: skip
@@ -229,8 +234,10 @@ def test_nothing_of_the_caller_is_changed(library):
     np.testing.assert_array_equal(x, before)
 
 
-def test_the_specification_is_kept_with_the_library(tmp_path):
-    recognizer = kineme.Recognizer(scale="none", translation=False, cutoff=None, max_angle=0.3)
+@pytest.mark.parametrize("weights", ["equal", [0.5, 0.25, 0.25]])
+def test_the_specification_is_kept_with_the_library(tmp_path, weights):
+    chosen = weights if isinstance(weights, str) else tuple(weights)
+    recognizer = kineme.Recognizer(scale="none", translation=False, cutoff=None, max_angle=0.3, weights=weights)
     dmp = kineme.DMP("bio-inspired", n_basis=15, fit="trajectory", preprocessing=(kineme.Smooth(12.0),))
     with ActionLibrary(tmp_path, create=True, recognizer=recognizer, dmp=dmp) as library:
         library.learn(draw_movements(4))
@@ -239,6 +246,7 @@ def test_the_specification_is_kept_with_the_library(tmp_path):
         assert library.specification.recognizer().get_params() == {
             **recognizer.get_params(),
             "representations": library.specification.representations,
+            "weights": chosen,
         }
         assert library.primitives().dmp == dmp
         np.testing.assert_allclose(library.features()[:, 0], draw_movements(4).positions[::40, 0], rtol=1e-6)

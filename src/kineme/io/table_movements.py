@@ -79,6 +79,17 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
     seen: dict[Any, int] = {}
     keys = zip(labels, *columns, strict=True) if label is not None else zip(*columns, strict=True)
     codes = np.fromiter((seen.setdefault(key, len(seen)) for key in keys), np.intp, n_rows)
-    parts = [key[label is not None :] for key in seen]
     names: list[str | None] = [key[0] or None if label is not None else None for key in seen]
-    return codes, ["/".join(map(str, part)) for part in parts], names
+    return codes, _places(list(seen), label is not None), names
+
+
+def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:
+    """The texts that tell movements apart as one text each, all different; with the label only where it is needed.
+
+    Where every action counts its movements from 1, the number alone says nothing.
+    """
+    for some in ([key[labeled:] for key in keys], keys):
+        places = ["/".join(map(str, key)) for key in some]
+        if len(set(places)) == len(places):
+            return places
+    return ["/".join(str(part).replace("\\", "\\\\").replace("/", "\\/") for part in key) for key in keys]

@@ -170,6 +170,7 @@ def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> li
     if places is not None:
         if len(places) != len(sources):
             raise TrajectoryError(f"expected one place for each of the {len(sources)} movements, got {len(places)}")
+        _check_apart(places, sources)
         return [None if place is None else str(place) for place in places]
     count: dict[str, int] = {}
     found: list[str | None] = []
@@ -181,3 +182,14 @@ def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> li
         found.append(str(count.get(key, 0)))
         count[key] = count.get(key, 0) + 1
     return found
+
+
+def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
+    """Refuse two movements at one place of a source: the second would be taken for the first."""
+    seen: dict[tuple[int, str], int] = {}
+    for i, (place, source) in enumerate(zip(places, sources, strict=True)):
+        if source is not None and place is not None and seen.setdefault((id(source), str(place)), i) != i:
+            raise TrajectoryError(
+                f"expected a place of its own in {source.path!r} for each movement, got {place!r} for movements "
+                f"{seen[id(source), str(place)]} and {i}; name them apart"
+            )

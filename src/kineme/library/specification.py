@@ -33,6 +33,7 @@ class Specification:
     cutoff: float | None = 10.0
     mean: str = "arithmetic"
     classifier: str = "auto"
+    weights: str | tuple[float, ...] = "auto"
     dmp: DMP = DEFAULT_DMP
 
     @classmethod
@@ -41,6 +42,8 @@ class Specification:
         names = {one.name for one in fields(cls)} - {"dmp"}
         chosen: dict[str, Any] = {} if recognizer is None else {name: getattr(recognizer, name) for name in names}
         chosen["representations"] = tuple(chosen.get("representations") or DEFAULT_REPRESENTATIONS)
+        if not isinstance(weights := chosen.get("weights", "auto"), str):
+            chosen["weights"] = tuple(map(float, weights))
         return cls(**chosen, dmp=dmp or DEFAULT_DMP)
 
     @property
@@ -70,6 +73,8 @@ class Specification:
         try:
             seen = json.loads(meta["recognizer"])
             seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
+            if isinstance(weights := seen.get("weights"), list):
+                seen["weights"] = tuple(map(float, weights))
             return cls(**seen, dmp=specification_from_dict(DMP, json.loads(meta["dmp"])))
         except (KeyError, TypeError, ValueError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
