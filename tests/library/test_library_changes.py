@@ -189,6 +189,24 @@ def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
     assert library.verify() == []
 
 
+@pytest.mark.parametrize("leave", [lambda it: it.assign([1, 2], "nod"), lambda it: it.release([1, 2])])
+def test_a_prototype_that_shows_another_symbol_does_not_stand_for_the_first(library, leave):
+    for name in ("wave", "nod", "bow"):
+        library.describe(name, prototype=int(library[name].members[0]))  # 1, 2, 3
+    library.assign([1], "wave")  # where it is: nothing changes
+    assert library["wave"].prototype == 1
+    leave(library)
+    assert [library[name].prototype for name in ("wave", "bow")] == [None, 3]
+    assert library["nod"].prototype == (2 if 2 in library["nod"].members else None)
+
+
+def test_an_id_given_as_a_label_is_the_symbol_of_that_id(library):
+    wave = library["wave"]
+    report = library.learn(draw_movements(2, seed=1), labels=[wave.id, "new"])
+    assert report.symbols == ("new",)
+    assert len(library[wave.id]) == len(library["wave"]) == len(wave) + 1
+
+
 def test_how_a_movement_came_to_its_symbol_is_kept_when_symbols_merge(library):
     library.assign([1], "nod", how="recognized")
     library.merge(["nod"], "bow")
@@ -240,6 +258,9 @@ def test_history_says_what_was_done(library):
         (lambda it: it.delete([1.5]), r"expected ids of movements, whole numbers, at least one, got \[1.5\]"),
         (lambda it: it.describe("wave", prototype=99), r"movements in the library, got 99"),
         (lambda it: it.describe("wave", threshold=np.nan), r"expected threshold to be a number, got nan"),
+        (lambda it: it.describe("wave", name=""), r"expected what is described to be one of .* got 'name'"),
+        (lambda it: it.rename("wave", it["nod"].id), r"expected a name, got 'sym-\w+', which is the id of a symbol"),
+        (lambda it: it.at("1"), r"expected a version from 0 to 1, got '1'"),
         (lambda it: it.describe("wave", 5), r"expected a description, got 5"),
         (lambda it: it.at(2), r"expected a version from 0 to 1, got 2; see history\(\)"),
     ],

@@ -16,6 +16,7 @@ from kineme.library.symbols import HOW, check_name, join, make, state_of
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
+_SAID = ("description", "prototype", "threshold")  # what `describe` changes
 
 
 def rename(store: Store, old: str, new: str) -> None:
@@ -29,6 +30,8 @@ def rename(store: Store, old: str, new: str) -> None:
 
 def describe(store: Store, who: str, **values: Any) -> None:
     """Change what a symbol says about itself: description, prototype (id of a movement), threshold."""
+    for name in values:
+        check_choice("what is described", name, _SAID)
     if (prototype := values.get("prototype")) is not None:
         values["prototype"] = int(as_ids(store, prototype)[0])
     if (threshold := values.get("threshold")) is not None:
@@ -101,8 +104,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> None:
         if len(members) != len(set(wanted.tolist())):
             strange = sorted(set(wanted.tolist()) - {row[1] for row in members})
             raise SpecificationError(f"expected movements of {name!r}, got {strange[0]}, which is not one of them")
-        if state[4] in {row[1] for row in members}:
-            _replace_state(change, state, prototype=None)
+        _forget_prototypes(change, members)
         _rejoin(change, members, key)
 
 
@@ -113,7 +115,8 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
     with store.writing("assign", {"symbol": who, "movements": len(wanted), "how": how}) as change:
         state = _find(change.connection, who)
         key = make(change, check_name(who)) if state is None else state[1]
-        _leave(change, among("movement"), {"keys": listed(wanted)})
+        left = _leave(change, among("movement"), {"keys": listed(wanted)})
+        _forget_prototypes(change, [row for row in left if row[2] != key])
         join(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
 
 
@@ -121,7 +124,7 @@ def release(store: Store, ids: Any) -> None:
     """Let movements show no symbol any more."""
     wanted = as_ids(store, ids)
     with store.writing("release", {"movements": len(wanted)}) as change:
-        _leave(change, among("movement"), {"keys": listed(wanted)})
+        _forget_prototypes(change, _leave(change, among("movement"), {"keys": listed(wanted)}))
 
 
 def _replace_state(change: Change, state: Row, **values: Any) -> None:
@@ -137,6 +140,15 @@ def _leave(change: Change, where: str, parameters: dict[str, Any]) -> list[Row]:
     rows = select(change.connection, "member", f"removed IS NULL AND {where}", parameters)
     change.retire("member", rows)
     return rows
+
+
+def _forget_prototypes(change: Change, left: Sequence[Row]) -> None:
+    """A symbol whose prototype is among the members that left it has none any more."""
+    pairs = {(row[2], row[1]) for row in left}
+    keys = {"keys": listed(key for key, _ in pairs)}
+    for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('symbol')}", keys):
+        if (state[1], state[4]) in pairs:
+            _replace_state(change, state, prototype=None)
 
 
 def _rejoin(change: Change, members: Sequence[Row], key: int) -> None:
@@ -159,3 +171,5 @@ def _ids_of(connection: sqlite3.Connection, states: Sequence[Row]) -> list[str]:
 def _check_free(connection: sqlite3.Connection, name: str) -> None:
     if select(connection, "symbol_state", "removed IS NULL AND name = :name", {"name": name}):
         raise SpecificationError(f"expected a name that no symbol has, got {name!r}; merge the two, or choose another")
+    if select(connection, "symbol", "id = :name", {"name": name}):
+        raise SpecificationError(f"expected a name, got {name!r}, which is the id of a symbol for good; choose another")

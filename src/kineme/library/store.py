@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from numbers import Integral
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -135,7 +136,7 @@ class Store:
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
-        if as_of is not None and not 0 <= as_of <= last:
+        if as_of is not None and not (isinstance(as_of, Integral) and 0 <= as_of <= last):
             raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
         return NOW if as_of is None else int(as_of)
 

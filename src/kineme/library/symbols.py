@@ -164,10 +164,13 @@ def check_name(name: Any) -> str:
 
 
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
-    """Name -> key of its symbol, and the names whose symbols did not exist and were made."""
+    """Name or id -> key of its symbol, and the names whose symbols did not exist and were made."""
     names = list(names)
-    query = f"SELECT name, symbol FROM symbol_state WHERE removed IS NULL AND {among('name')}"
-    found: dict[str, int] = dict(change.connection.execute(query, {"keys": listed(names)}))
+    known = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    found: dict[str, int] = {}
+    for column in ("symbol.id", "name"):  # a name goes before an id, as in `state_of`
+        query = f"SELECT {column}, symbol.key {known} AND {among(column)}"
+        found |= dict(change.connection.execute(query, {"keys": listed(names)}))
     made = tuple(name for name in names if name not in found)
     for name in made:
         found[name] = make(change, name)
