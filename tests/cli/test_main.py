@@ -1,7 +1,11 @@
 """The command line as a user meets it."""
 
+import json
+import os
 import subprocess
 import sys
+
+import pytest
 
 import kineme
 
@@ -24,6 +28,34 @@ def test_an_unknown_command_is_refused():
     done = run("dance")
     assert done.returncode == 2
     assert "dance" in done.stderr
+
+
+def test_an_error_is_one_line_and_says_nothing_to_the_terminal(tmp_path):
+    (tmp_path / "\x1b[31m\x1b]0;x\x07\nred.csv").write_text("no numbers\n")
+    done = run("inspect", str(tmp_path))
+    assert done.returncode == 1
+    assert done.stderr.startswith("kineme: expected recordings in")
+    assert done.stderr.count("\n") == 1
+    assert "\x1b" not in done.stderr
+    assert r"\x1b[31m" in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+def test_the_output_may_be_in_any_encoding(tmp_path, encoding):
+    name = "→ é \U0001f44b \x9b31m"
+    with kineme.ActionLibrary(tmp_path, create=True) as library:
+        library.learn(kineme.load_lasa(["CShape"])[:2], labels=[name] * 2)
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "KINEME_LIBRARY": str(tmp_path)}
+    command = [sys.executable, "-m", "kineme", "library", "list"]
+    text = subprocess.run(command, capture_output=True, check=True, env=environment).stdout.decode(encoding)
+    assert "2 movements, 1 symbol" in text
+    assert r" é " in text
+    assert "\x9b" not in text
+    data = subprocess.run([*command, "--json"], capture_output=True, check=True, env=environment).stdout.decode(
+        encoding
+    )
+    assert json.loads(data)["symbols"][0]["name"] == name
+    assert "\x9b" not in data
 
 
 def test_help_loads_nothing_heavy():

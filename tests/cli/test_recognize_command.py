@@ -9,22 +9,12 @@ import sys
 
 import numpy as np
 import pytest
+from commands import answer, run, start
 
 import kineme
 from kineme.anchoring.regain import grounding_schema, primitive_from
 from kineme.io.movements import write_movement
 from kineme.io.recordings import read_recording
-
-
-def run(*arguments, **options):
-    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
-
-
-def answer(*arguments, **options):
-    done = run(*arguments, "--json", **options)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 @pytest.fixture(scope="module")
@@ -74,14 +64,14 @@ def test_the_answer_is_that_of_python(folder, asked):
 
 
 def test_a_recording_may_come_through_a_pipe(folder, asked):
-    data = answer("recognize", "-", "-l", folder, input=(asked / "c.csv").read_text())
+    data = answer("recognize", "-", "-l", folder, input=(asked / "c.csv").read_text(), by=start)
     assert data["movements"][0]["symbol"] == "CShape"
 
 
 def test_a_library_without_symbols_cannot_say(tmp_path, asked):
     with kineme.ActionLibrary(tmp_path / "empty", create=True) as library:
         library.learn([one.positions for one in kineme.load_lasa(["CShape"])])
-    done = run("recognize", asked / "c.csv", "-l", tmp_path / "empty")
+    done = start("recognize", asked / "c.csv", "-l", tmp_path / "empty")
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert "symbol" in done.stderr
@@ -106,7 +96,7 @@ def test_a_symbol_moves_again(folder, tmp_path):
 def test_a_symbol_for_a_planner(folder, tmp_path):
     from jsonschema import Draft202012Validator
 
-    done = run("library", "ground", "GShape", "-l", folder, "--units", "mm", "-o", tmp_path / "g.json")
+    done = start("library", "ground", "GShape", "-l", folder, "--units", "mm", "-o", tmp_path / "g.json")
     assert done.returncode == 0, done.stderr
     grounding = json.loads((tmp_path / "g.json").read_text())
     Draft202012Validator(grounding_schema()).validate(grounding)
@@ -122,7 +112,7 @@ def test_what_is_near_and_between(folder, tmp_path):
     assert near[0]["distance"] < near[1]["distance"]
     found = answer("library", "between", "GShape", "Angle", "-l", folder)
     assert all(0 <= one["share"] <= 1 and one["excess"] <= 0.25 for one in found)
-    assert run("library", "map", tmp_path / "map.png", "-l", folder).returncode == 0
+    assert start("library", "map", tmp_path / "map.png", "-l", folder).returncode == 0
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -138,6 +128,16 @@ def test_the_shell_completes_symbols_of_the_library_on_the_line(folder):
     assert _completed(f"kineme library show -l {folder} N") == ["NShape"]
     assert _completed(f"kineme generate -l {folder} G") == ["GShape"]
     assert _completed("kineme library show -l nowhere N") == []
+
+
+@pytest.mark.parametrize(
+    "name", ["a;reboot", "$(reboot)", "`x`", "two words", "*", "-y", "~", "a\nplain,b", "a,b", "a'b", "!x"]
+)
+def test_a_name_that_a_shell_would_act_on_is_completed_as_its_id(tmp_path, name):
+    with kineme.ActionLibrary(tmp_path / "a", create=True) as library:
+        library.learn(kineme.load_lasa(["CShape", "GShape"])[5:9], labels=[name, name, "größe/2", "größe/2"])
+        symbol = library[name]
+    assert sorted(_completed(f'kineme library show -l {tmp_path / "a"} ""')) == sorted([symbol.id, "größe/2"])
 
 
 def _completed(words):

@@ -61,7 +61,7 @@ class Session:
                 if not self._answer(item, line):
                     break
             except KinemeError as error:
-                click.echo(f"  {error}")
+                click.echo(f"  {printable(error)}")
         left = len(self.library.unlabeled())
         click.echo(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
 

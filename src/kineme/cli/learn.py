@@ -40,7 +40,13 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     with ActionLibrary(folder, create=True) as library:
         before = library.version
         reports = [
-            _learn(library, root, one, options, [None if no_labels else label or each for each in one.labels])
+            _learn(
+                library,
+                root,
+                one,
+                options,
+                [None if no_labels else each if label is None else label for each in one.labels],
+            )
             for root, one in found
         ]
         data = {

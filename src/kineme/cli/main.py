@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from typing import Any
 
@@ -13,6 +14,7 @@ from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
+from kineme.cli.output import printable
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.revise import COMMANDS as REVISING
@@ -24,10 +26,12 @@ class _OneLineErrors(click.Group):
     """Turn errors that users can act on into one line and exit status 1; bugs keep their traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="backslashreplace")  # what its encoding lacks is written out
         try:
             return super().invoke(ctx)
         except (KinemeError, OSError) as error:
-            click.echo(f"kineme: {error}", err=True)
+            click.echo(f"kineme: {printable(error)}", err=True)
             sys.exit(1)
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
+
+_PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that are one word to every shell, and no option
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]
@@ -24,12 +27,15 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
 
 
 class SymbolName(click.ParamType):  # type: ignore[type-arg]
-    """Name or id of a symbol; the shell completes it from the library named on the same line."""
+    """Name or id of a symbol; the shell completes it from the library named on the same line.
+
+    Bash puts what it completes on the line as it is: a name that it would read as something else is offered as its id.
+    """
 
     name = "symbol"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Names that begin as typed; none without a library, never an error."""
+        """Names and ids that begin as typed; none without a library, never an error."""
         from kineme.errors import KinemeError
 
         folder = ctx.params.get("folder") or ctx.lookup_default("folder")
@@ -44,7 +50,7 @@ def _names(folder: Path) -> list[str]:
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:
-        return [symbol.name for symbol in library.symbols()]
+        return [one.name if _PLAIN.fullmatch(one.name) else one.id for one in library.symbols()]
 
 
 def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,7 +14,19 @@ _LISTED = 12  # items of a list, written out
 
 def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
     """Print `data` as one JSON document, or the text."""
-    click.echo(json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1) if as_json else text())
+    click.echo(to_json(data, sys.stdout.encoding or "utf-8") if as_json else text())
+
+
+def to_json(data: Any, encoding: str = "utf-8") -> str:
+    """One JSON document; where a terminal would obey a character, or the encoding lacks one, all in ASCII."""
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        shown = False
+    else:
+        shown = text.replace("\n", "").isprintable()
+    return text if shown else json.dumps(data, allow_nan=False, indent=1)
 
 
 def printable(name: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import click
 
 from kineme.cli.library import opened
 from kineme.cli.options import SymbolName, json_option, library_option
-from kineme.cli.output import count, printable, say
+from kineme.cli.output import count, printable, say, to_json
 
 
 @click.command(short_help="Write a symbol for a planner, as JSON.")
@@ -88,11 +87,10 @@ def _lies(one: dict[str, Any]) -> str:
 def _write(data: dict[str, Any], output: Path) -> None:
     from kineme.io.atomic import write_atomically
 
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
     if str(output) == "-":
-        click.echo(text, nl=False)
+        say(True, data, str)
     else:
-        write_atomically(output, text.encode())
+        write_atomically(output, (to_json(data) + "\n").encode())
 
 
 #: For the group ``kineme library``.
