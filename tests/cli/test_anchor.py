@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import select
@@ -11,21 +10,11 @@ import sys
 import time
 
 import pytest
+from commands import answer, run, start
 
 import kineme
 
 KINDS = ["CShape", "GShape", "NShape", "Sine"]
-
-
-def run(*arguments, **options):
-    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
-
-
-def answer(*arguments, **options):
-    done = run(*arguments, "--json", **options)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 @pytest.fixture
@@ -49,9 +38,8 @@ def test_without_a_choice_it_only_lists(folder, tmp_path):
 
 def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
     (tmp_path / "names.json").write_text('{"0": "first/../kind", "2": "third"}')
-    data = answer(
-        "anchor", "-l", folder, "--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p"
-    )
+    options = ("--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p")
+    data = answer("anchor", "-l", folder, *options, by=start)
     assert sorted(data["accepted"]) == ["first/../kind", "kind 1", "kind 2", "third"]
     listed = answer("library", "list", "-l", folder)
     assert listed["unlabeled"] == 0

@@ -1,9 +1,8 @@
 """``kineme evaluate`` as a user runs it."""
 
 import json
-import subprocess
-import sys
 
+import commands
 import pytest
 
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
@@ -12,9 +11,8 @@ from kineme.evaluation.protocols import PROTOCOLS
 from kineme.io.movements import write_movement
 
 
-def run(*arguments):
-    command = [sys.executable, "-W", "error", "-m", "kineme", "evaluate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def run(*arguments, by=commands.run):
+    return by("evaluate", *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +48,7 @@ def test_a_folder_of_recordings_is_evaluated(folder, tmp_path):
 def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
     done = run(
         folder, "--protocol", "few-shot", "--method", "euclidean", "--splits", 3, "--shots", 2, "--seed", 9,
-        "--jobs", 2, "--out", tmp_path,
+        "--jobs", 2, "--out", tmp_path, by=commands.start,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
@@ -60,7 +58,7 @@ def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
 
 
 def test_data_that_are_not_there_are_one_line_and_exit_status_1(tmp_path):
-    done = run(tmp_path / "nothing", "--out", tmp_path / "out")
+    done = run(tmp_path / "nothing", "--out", tmp_path / "out", by=commands.start)
     assert done.returncode == 1
     assert done.stderr.startswith("kineme: expected lasa, lasa-letters or a folder, found no folder")
     assert done.stderr.count("\n") == 1

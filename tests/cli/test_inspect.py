@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 
+import commands
 import pytest
 
 import kineme
@@ -13,9 +14,8 @@ from kineme.io.movements import write_movement
 PNG = b"\x89PNG\r\n"
 
 
-def run(*arguments, **options):
-    command = [sys.executable, "-W", "error", "-m", "kineme", "inspect", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, check=False, **options)
+def run(*arguments, by=commands.run, **options):
+    return by("inspect", *arguments, **options)
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +29,10 @@ def folder(tmp_path_factory):
 
 
 def test_a_folder_in_words_and_as_a_picture(folder, tmp_path):
-    done = run(folder, "--plot", tmp_path / "out.png")
+    done = run(folder, "--plot", tmp_path / "out.png", by=commands.start)
     assert done.returncode == 0, done.stderr
-    assert done.stderr == b""  # no progress bar where there is no terminal
-    text = done.stdout.decode()
+    assert done.stderr == ""  # no progress bar where there is no terminal
+    text = done.stdout
     assert text.startswith("14 movements of 2 dimensions in 14 files")
     assert "Snake/bad.csv, line 3: expected a number in 'x', got 'oops'" in text
     assert (tmp_path / "out.png").read_bytes().startswith(PNG)
@@ -52,7 +52,7 @@ def test_a_folder_as_data(folder):
 def test_a_table_from_the_standard_input_with_columns_named():
     rows = "".join(f"a;{k * 20};{k};{-k}\n" for k in range(9))
     options = ("--time", "clock", "--columns", "y, x", "--label-column", "what", "--units", "ms", "--json")
-    done = run("-", *options, input=f"what;clock;x;y\n{rows}".encode())
+    done = run("-", *options, input=f"what;clock;x;y\n{rows}", by=commands.start)
     data = json.loads(done.stdout)
     assert data["detected"][0] | {"columns": ["y", "x"], "units": "ms", "units_from": "given"} == data["detected"][0]
     assert data["labels"][0]["rate"]["median"] == pytest.approx(50)
@@ -61,7 +61,7 @@ def test_a_table_from_the_standard_input_with_columns_named():
 
 def test_samples_may_be_left_out_alone_and_units_be_a_number():
     rows = "".join(f"{k},{'' if k == 3 else k},{k}\n" for k in range(9))
-    done = run("-", "--skip", "sample", "--units", "0.01", "--json", input=f"time,x,y\n{rows}".encode())
+    done = run("-", "--skip", "sample", "--units", "0.01", "--json", input=f"time,x,y\n{rows}")
     data = json.loads(done.stdout)
     assert data["labels"][0]["samples"]["median"] == 8
     assert data["labels"][0]["rate"]["median"] == pytest.approx(100)
@@ -71,27 +71,27 @@ def test_samples_may_be_left_out_alone_and_units_be_a_number():
 @pytest.mark.parametrize(
     ("arguments", "data", "words"),
     [
-        (["nowhere"], b"", "kineme: expected a file or folder of recordings, found nothing at 'nowhere'"),
-        (["-"], b"", "kineme: expected recordings in standard input.csv, found none; 1 could not be read"),
-        (["-", "--columns", "z"], b"time,x\n0,1\n", r"expected a column 'z', got the columns ['time', 'x']"),
-        (["-", "--units", "h"], b"time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
-        (["-", "--plot", "a.gif"], b"0 1\n1 2\n2 3\n3 4\n", "kineme: expected a picture ending in one of png"),
+        (["nowhere"], "", "kineme: expected a file or folder of recordings, found nothing at 'nowhere'"),
+        (["-"], "", "kineme: expected recordings in standard input.csv, found none; 1 could not be read"),
+        (["-", "--columns", "z"], "time,x\n0,1\n", r"expected a column 'z', got the columns ['time', 'x']"),
+        (["-", "--units", "h"], "time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
+        (["-", "--plot", "a.gif"], "0 1\n1 2\n2 3\n3 4\n", "kineme: expected a picture ending in one of png"),
     ],
 )
 def test_a_failure_is_one_clear_line_and_a_status(arguments, data, words, tmp_path):
     done = run(*arguments, input=data, cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stdout == b""
-    assert words in done.stderr.decode()
-    assert done.stderr.count(b"\n") == 1
+    assert done.stdout == ""
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_names_cannot_command_the_terminal(tmp_path):
     label = "a\x1b[31m$(b)"
     rows = "".join(f"{label},{k},{k}\n" for k in range(5))
-    done = run("-", input=f"label,time,x\n{rows}".encode())
-    assert b"\x1b" not in done.stdout
-    assert rb"a\x1b[31m$(b)" in done.stdout
+    done = run("-", input=f"label,time,x\n{rows}", by=commands.start)
+    assert "\x1b" not in done.stdout
+    assert r"a\x1b[31m$(b)" in done.stdout
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are those of POSIX systems")

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from commands import answer, run, start
 
 import kineme
 from kineme.io.movements import write_movement
-
-
-def run(*arguments, **options):
-    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
-
-
-def answer(*arguments, **options):
-    done = run(*arguments, "--json", **options)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +79,7 @@ def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_p
     learned = answer("learn", recordings, "-l", tmp_path / "actions")
     assert learned["added"] == 14
     assert learned["problems"] == ["CShape/bad.csv, line 3: expected a number in 'y', got 'oops'"]
-    text = run("learn", recordings, "-l", tmp_path / "actions").stdout
+    text = start("learn", recordings, "-l", tmp_path / "actions").stdout
     assert "14 known already" in text
     assert "left out CShape/bad.csv, line 3" in text
 
@@ -115,7 +101,7 @@ def test_labels_can_be_given_or_left_out(recordings, tmp_path):
 
 def test_the_standard_input_is_a_recording(recordings, tmp_path):
     table = (recordings / "CShape" / "0.csv").read_text()
-    learned = answer("learn", "-", "--label", "piped", "-l", tmp_path / "actions", input=table)
+    learned = answer("learn", "-", "--label", "piped", "-l", tmp_path / "actions", input=table, by=start)
     assert (learned["added"], learned["symbols"]) == (1, ["piped"])
 
 
@@ -133,7 +119,7 @@ def test_movements_of_other_dimensions_are_refused_and_nothing_changes(recording
     library = tmp_path / "actions"
     answer("learn", recordings, "-l", library)
     (tmp_path / "space.csv").write_text("time,x,y,z\n" + "".join(f"{t},{t},{t * t},1\n" for t in range(9)))
-    done = run("learn", tmp_path / "space.csv", "-l", library)
+    done = start("learn", tmp_path / "space.csv", "-l", library)
     assert done.returncode == 1
     assert "expected movements of 2 dimensions as all others of the library" in done.stderr
     assert len(answer("library", "history", "-l", library)) == 1

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from commands import answer
 
 import kineme
 from kineme.datasets import lasa
 
 SHAPES = ["CShape", "GShape"]
-
-
-def learn(*arguments):
-    command = [sys.executable, "-W", "error", "-m", "kineme", "learn", *map(str, arguments), "--json"]
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
 def _columns(demos):
@@ -63,7 +56,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format_gives_the_same_library(folder, name, tmp_path):
-    learned = learn(folder / name, "-l", tmp_path / "actions")
+    learned = answer("learn", folder / name, "-l", tmp_path / "actions")
     assert (learned["added"], learned["problems"]) == (14, [])
     assert sorted(learned["symbols"]) == SHAPES
     with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
@@ -73,5 +66,5 @@ def test_every_format_gives_the_same_library(folder, name, tmp_path):
 
 
 def test_what_comes_in_another_format_is_known(folder, tmp_path):
-    learned = learn(*(folder / name for name in WRITERS), "-l", tmp_path / "actions")
+    learned = answer("learn", *(folder / name for name in WRITERS), "-l", tmp_path / "actions")
     assert (learned["added"], learned["known"], learned["movements"]) == (14, 28, 14)

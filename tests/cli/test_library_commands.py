@@ -8,22 +8,11 @@ import sys
 
 import numpy as np
 import pytest
+from commands import answer, run, start
 
 import kineme
 
 WICKED = "../wave'; DROP TABLE movement; -- $(touch x) \u202e\x1b[31m Ünï"
-
-
-def run(*arguments, **options):
-    command = [sys.executable, "-W", "error", "-m", "kineme", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, **options)
-
-
-def answer(*arguments, **options):
-    done = run(*arguments, "--json", **options)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    return json.loads(done.stdout)
 
 
 @pytest.fixture
@@ -42,7 +31,7 @@ def test_list_shows_symbols_and_counts(folder):
         ("GShape", 7),
         ("NShape", 7),
     ]
-    text = run("library", "list", "-l", folder).stdout
+    text = start("library", "list", "-l", folder).stdout
     assert "21 movements, 3 symbols, 0 without a symbol" in text
     assert listed["symbols"][0]["id"] in text
 
@@ -68,10 +57,10 @@ def test_show_gives_every_movement_of_a_symbol(folder):
 def test_any_name_is_data(folder):
     """Separators, quotes, commands and escape sequences neither act nor get lost."""
     before = answer("library", "show", "GShape", "-l", folder)
-    renamed = answer("library", "rename", "GShape", WICKED, "-l", folder)
+    renamed = answer("library", "rename", "GShape", WICKED, "-l", folder, by=start)
     assert (renamed["name"], renamed["id"], renamed["was"]) == (WICKED, before["id"], "GShape")
     assert answer("library", "show", WICKED, "-l", folder)["members"] == before["members"]
-    text = run("library", "list", "-l", folder).stdout
+    text = start("library", "list", "-l", folder).stdout
     assert "\x1b" not in text
     assert "\u202e" not in text
     assert "\\x1b[31m" in text
@@ -96,7 +85,7 @@ def test_describe_merge_delete_and_history(folder):
 def test_deleting_asks_first(folder):
     assert run("library", "delete", "NShape", "-l", folder, input="n\n").returncode != 0
     assert answer("library", "list", "-l", folder)["movements"] == 21
-    assert run("library", "delete", "NShape", "-l", folder, input="y\n").returncode == 0
+    assert start("library", "delete", "NShape", "-l", folder, input="y\n").returncode == 0
     assert [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]] == ["CShape", "GShape"]
 
 
@@ -122,7 +111,7 @@ def test_verify_says_what_is_damaged(folder):
     assert place > 0
     data[place + 10] ^= 4
     path.write_bytes(data)
-    done = run("library", "verify", "--json", "-l", folder)
+    done = start("library", "verify", "--json", "-l", folder)
     assert done.returncode == 1
     assert any("features of movement 9" in problem for problem in json.loads(done.stdout)["problems"])
 
