@@ -19,7 +19,7 @@ import numpy as np
 import kineme
 from bench.library_movements import ASKED, N_SAMPLES, SHOWN, copies, kinds
 from bench.movements import SEED, Array
-from bench.rows import Row, save
+from bench.rows import Row, save, table
 from kineme.library.serving import Serving
 
 _BATCH = 50_000  # movements in one call
@@ -31,8 +31,8 @@ def measure(quick: bool) -> list[Row]:
     if wanted and not quick:
         load = os.getloadavg()[0]
         rows = _measure(int(wanted), 2, 100)
-        save(f"library-{int(wanted)}", rows, load)
-        return rows[:0]
+        print(f"\n{table(rows)}\nsaved {save(f'library-{int(wanted)}', rows, load)}")
+        return []
     if quick:
         return _measure(5_000, 2, 50)
     return _measure(200_000, 2, 500) + _measure(20_000, 3, 40)
