@@ -114,16 +114,26 @@ def _cut(path, where):
 DAMAGES = {"flipped": _flip, "truncated": _cut, "gone": lambda path, where: path.unlink()}
 
 
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    """A library that has answered, what it was asked, its answers, and the caches that it made for them."""
+    asked = _questions([3] * 5)
+    with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
+        library.learn(_kinds([3] * 5))
+        before = _plain(Serving(library.store, exhaustive=0).recognize(asked))
+        caches = {name: (library.folder / name).read_bytes() for name in (index.FILE, calibrated.FILE)}
+    return library.folder, asked, before, caches
+
+
 @pytest.mark.parametrize("name", [index.FILE, calibrated.FILE])
 @pytest.mark.parametrize("damage", DAMAGES)
 @given(where=st.floats(0, 0.999))
-def test_a_damaged_cache_is_made_again(tmp_path_factory, name, damage, where):
-    folder = tmp_path_factory.mktemp("actions")
-    asked = _questions([3] * 5)
-    with ActionLibrary(folder, create=True) as library:
-        library.learn(_kinds([3] * 5))
-        before = _plain(Serving(library.store, exhaustive=0).recognize(asked))
-        whole = (folder / name).read_bytes()
+def test_a_damaged_cache_is_made_again(served, name, damage, where):
+    folder, asked, before, caches = served
+    for each, whole in caches.items():
+        (folder / each).write_bytes(whole)
+    with ActionLibrary(folder) as library:
+        whole = caches[name]
         DAMAGES[damage](folder / name, where)
         _same(_plain(Serving(library.store, exhaustive=0).recognize(asked)), before)
         again = (folder / name).read_bytes()
