@@ -58,9 +58,11 @@ def test_the_output_may_be_in_any_encoding(tmp_path, encoding):
     assert "\x9b" not in data
 
 
-def test_help_loads_nothing_heavy():
+@pytest.mark.parametrize("arguments", [["--help"], ["library", "--help"], ["library", "schema"]])
+def test_what_only_prints_loads_nothing_heavy(arguments):
     code = (
-        "import sys, click.testing, kineme.cli as cli; click.testing.CliRunner().invoke(cli.main, ['--help']);"
+        "import sys, click.testing, kineme.cli as cli;"
+        f"assert click.testing.CliRunner().invoke(cli.main, {arguments}).exit_code == 0;"
         "print([name for name in ('numpy', 'scipy', 'sklearn', 'numba', 'matplotlib') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

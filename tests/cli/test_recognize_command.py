@@ -102,6 +102,9 @@ def test_a_symbol_for_a_planner(folder, tmp_path):
     Draft202012Validator(grounding_schema()).validate(grounding)
     assert json.loads(run("library", "schema").stdout) == grounding_schema()
     assert grounding["symbol"]["name"] == "GShape"
+    with kineme.ActionLibrary(folder, read_only=True) as library:  # the medoid is the library's id of it
+        shown = library.primitives(ids=[grounding["prototype"]["medoid"]])
+    np.testing.assert_array_equal(shown.scaled_weights[0], grounding["primitive"]["scaled_weights"])
     path = primitive_from(grounding).rollout(goal=grounding["demonstrated"]["goal"]["median"])
     np.testing.assert_allclose(path.positions[0, -1], grounding["demonstrated"]["goal"]["median"], atol=1.0)
 

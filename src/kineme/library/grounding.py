@@ -49,7 +49,9 @@ def ground_symbol(
     name = SymbolName(symbol.id, symbol.name, symbol.description, symbol.parents)
     place = int(np.searchsorted(members, typical))
     like = library.specification.recognizer()
-    return ground(name, library.primitives(ids=members), by=by, units=units, medoid=place, like=like)
+    grounding = ground(name, library.primitives(ids=members), by=by, units=units, medoid=place, like=like)
+    grounding["prototype"]["medoid"] = typical  # as the library knows it, for a planner that asks it for more
+    return grounding
 
 
 def space_of(library: ActionLibrary) -> ConceptualSpace:
