@@ -81,12 +81,15 @@ def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
     [
         (["--accept", "9"], 2, "there are 4 proposals, counted from 0, got 9"),
         (["--accept", "x"], 2, "expected numbers of proposals separated by commas, or all, got 'x'"),
+        (["--accept", "0,1", "--reject", "1"], 2, "expected each proposal accepted or rejected, got both for 1"),
+        (["--accept", "all", "--names", "worse.json"], 1, "expected a name without the character U+0000"),
         (["--accept", "0", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
         (["--clusters", "3", "--method", "hdbscan"], 1, "expected no n_clusters with method='hdbscan'"),
     ],
 )
 def test_wrong_choices_change_nothing(folder, tmp_path, arguments, status, message):
     (tmp_path / "bad.json").write_text("[1, 2]")
+    (tmp_path / "worse.json").write_text('{"0": "wave", "1": "a\\u0000"}')
     done = run("anchor", "-l", folder, *arguments, cwd=tmp_path)
     assert done.returncode == status
     assert message in done.stderr

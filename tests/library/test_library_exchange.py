@@ -91,6 +91,18 @@ def test_a_spoiled_export_is_not_imported(eventful, tmp_path, spoil, message):
     assert list((tmp_path / "copy").iterdir()) == []
 
 
+def test_a_library_in_use_is_not_taken_for_an_export(tmp_path):
+    """Its newest changes lie in the log beside it."""
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(3))
+        with pytest.raises(
+            DataError, match=r"got .*library.sqlite with changes beside it in library.sqlite-wal; export"
+        ):
+            ActionLibrary.import_(tmp_path / "actions" / FILE, tmp_path / "copy")
+    with ActionLibrary.import_(tmp_path / "actions" / FILE, tmp_path / "copy") as copy:  # closed, it is whole
+        assert len(copy) == 3
+
+
 def test_nothing_is_overwritten(eventful, tmp_path):
     (tmp_path / "taken").write_text("mine")
     with ActionLibrary(eventful) as library:

@@ -70,6 +70,8 @@ def anchor(folder: Path, **options: Any) -> None:
         )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
+        if both := set(accepted) & set(rejected):
+            raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
             "joined": join(library, joining) if writes else {},
@@ -98,14 +100,15 @@ def _named(library: Any, ids: Any) -> str:
 
 def _names(path: Path | None) -> dict[int, str]:
     from kineme.errors import DataError
+    from kineme.library.symbols import check_name
 
     if path is None:
         return {}
     try:
         names = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(names, dict) or not all(isinstance(name, str) for name in names.values()):
-            raise ValueError("numbers of proposals with names")
-        return {int(number): name for number, name in names.items()}
+        if not isinstance(names, dict):
+            raise ValueError("no numbers of proposals")
+        return {int(number): check_name(name) for number, name in names.items()}
     except ValueError as error:
         raise DataError(
             f'expected {path} to hold names by the number of the proposal, as {{"0": "wave"}}, got something else '

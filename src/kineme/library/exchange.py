@@ -40,11 +40,18 @@ def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
     Raises
     ------
     DataError
-        There is a library already; the file is no export, is damaged, or of a later schema version.
+        There is a library already; the file is no export, is a library in use, is damaged, or of a later schema
+        version.
     """
     source, target = Path(path), Path(folder) / FILE
     if not source.is_file():
         raise DataError(f"expected an exported library at {source}, found no file there")
+    log = source.with_name(f"{source.name}-wal")
+    if log.exists() and log.stat().st_size:  # the newest changes are there, and the file alone would be an older state
+        raise DataError(
+            f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and import "
+            "that file"
+        )
     Path(folder).mkdir(parents=True, exist_ok=True)
     with _new(target) as beside:
         shutil.copyfile(source, beside)
