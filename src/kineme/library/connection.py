@@ -46,7 +46,11 @@ def connect(path: Path, mode: str, wait: float) -> sqlite3.Connection:
 
 
 def _cannot_keep_a_log(path: Path) -> bool:
-    """Whether the folder is read-only and holds no log: then no writer can be there, and no lock is needed."""
+    """Whether the folder is read-only to us and holds no log: then SQLite cannot lock, and reads without.
+
+    It takes the file for one that does not change. Should another user, who may write there, do so meanwhile, what is
+    read is refused as damaged until the library is opened again.
+    """
     return (
         not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
         and not path.with_name(path.name + "-wal").exists()
