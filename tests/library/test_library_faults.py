@@ -46,7 +46,10 @@ def nobody():
     """Without the rights of root, for whom nothing is read-only."""
     root = os.geteuid() == 0
     if root:
-        os.seteuid(65534)
+        try:
+            os.seteuid(65534)
+        except OSError as error:  # some containers know no other user
+            pytest.skip(f"root cannot become another user here: {error}")
     try:
         yield
     finally:
@@ -172,6 +175,8 @@ def test_reading_works_in_a_read_only_folder_and_writing_is_refused_there(open_p
     (folder / FILE).chmod(0o444)
     folder.chmod(0o555)
     with nobody():
+        if not os.access(folder, os.R_OK | os.X_OK, effective_ids=True):
+            pytest.skip(f"other users cannot enter {tempfile.gettempdir()}")
         with ActionLibrary(folder, read_only=True) as library:
             assert contents(library) == expected
             assert library.verify() == []
