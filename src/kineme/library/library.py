@@ -138,7 +138,8 @@ class ActionLibrary:
         source : Source, or sequence of n Source or None, optional
             The files they come from.
         places : sequence of n str, optional
-            Where in its file each movement is; by default its number there.
+            Where in its file each movement is; by default its number among those of that file in this call. Say it
+            where one file is learned in several calls: a movement at a place that is known is taken for known.
         progress : callable, optional
             Called with the movements done and their number after every batch.
 
