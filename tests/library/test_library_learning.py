@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from library_samples import draw_movements
 
 import kineme
-from kineme import ActionLibrary, Demonstrations, Trajectory, TrajectoryError
+from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
 from kineme.library import learn as learning
 from kineme.library.source import Source
 from kineme.recognition.views import view
@@ -123,13 +123,31 @@ def test_a_movement_is_known_by_its_place_in_a_file_read_in_the_same_way(library
     path.write_text("0,1\n")
     source = Source.of_file(path, options={"unit": "m"})
     demos = draw_movements(4)
-    library.learn(demos, source=source)
+    places = ["0", "1", "2", "3"]
+    library.learn(demos, source=source, places=places)
     moved = Source.of_file(path.rename(tmp_path / "other.csv"), options={"unit": "m"})
     rounded = [one.positions.astype(np.float32) for one in demos]
-    assert library.learn(rounded, source=moved).known == 4
-    assert library.learn(rounded, source=Source.of_file(moved.path, options={"unit": "mm"})).added == 4
+    assert library.learn(rounded, source=moved, places=places).known == 4
+    other = Source.of_file(moved.path, options={"unit": "mm"})
+    assert library.learn(rounded, source=other, places=places).added == 4
     again = library.learn([demos[1].positions.astype(np.float16)], source=[moved], places=["1"])
     assert again.ids.tolist() == [2]
+
+
+def test_a_file_that_comes_in_two_calls_without_places_is_learned_whole(library):
+    source, demos = Source("wave.csv", "0" * 64, 1), draw_movements(4)
+    assert library.learn(demos[:2], source=source).added == 2
+    assert library.learn(demos[2:], source=source).added == 2
+    assert library.learn(demos, source=source).known == 4
+
+
+def test_a_library_keeps_the_specification_that_it_was_made_with(library, tmp_path):
+    folder = library.folder
+    for same in ({}, {"recognizer": kineme.Recognizer()}, {"dmp": library.specification.dmp}):
+        kineme.ActionLibrary(folder, create=True, **same).close()
+    for other in ({"recognizer": kineme.Recognizer(max_angle=0.1)}, {"dmp": kineme.DMP(n_basis=20)}):
+        with pytest.raises(SpecificationError, match=r"that the library in .* was made with, got others"):
+            kineme.ActionLibrary(folder, **other)
 
 
 def test_a_label_makes_a_symbol_or_joins_it_and_a_person_may_rename_it(library):

@@ -35,6 +35,7 @@ def connect(path: Path, mode: str, wait: float) -> sqlite3.Connection:
     try:
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA cell_size_check = ON")
+        connection.execute("PRAGMA trusted_schema = OFF")  # an imported file may say anything
         connection.execute("PRAGMA temp_store = MEMORY")
         if mode != "ro":
             connection.execute(f"PRAGMA cache_size = -{_WRITER_CACHE_KIB}")

@@ -23,7 +23,8 @@ def export(store: Store, path: str | Path) -> Path:
     Raises
     ------
     DataError
-        The file exists; the disk is full; the library is damaged.
+        The file exists; the disk is full; the library's structure is damaged. Rows with a wrong checksum are copied as
+        they are: `verify` finds them, and `import_` refuses them.
     """
     target = Path(path)
     with _new(target) as beside:

@@ -166,22 +166,13 @@ def _as_sources(source: Source | Sequence[Source | None] | None, n: int) -> list
 
 
 def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> list[str | None]:
-    """Where in its source each movement is; by default its number there."""
-    if places is not None:
-        if len(places) != len(sources):
-            raise TrajectoryError(f"expected one place for each of the {len(sources)} movements, got {len(places)}")
-        _check_apart(places, sources)
-        return [None if place is None else str(place) for place in places]
-    count: dict[str, int] = {}
-    found: list[str | None] = []
-    for source in sources:
-        if source is None:
-            found.append(None)
-            continue
-        key = source.sha256 + source.options_json
-        found.append(str(count.get(key, 0)))
-        count[key] = count.get(key, 0) + 1
-    return found
+    """Where in its source each movement is; unless that is said, movements are known by their samples alone."""
+    if places is None:
+        return [None] * len(sources)
+    if len(places) != len(sources):
+        raise TrajectoryError(f"expected one place for each of the {len(sources)} movements, got {len(places)}")
+    _check_apart(places, sources)
+    return [None if place is None else str(place) for place in places]
 
 
 def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:

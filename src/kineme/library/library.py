@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import SpecificationError
 from kineme.library import changes, read, symbols
 from kineme.library.connection import FILE
 from kineme.library.specification import Specification
@@ -56,6 +57,8 @@ class ActionLibrary:
     ------
     DataError
         No library there, another program's file, damaged bytes, a later schema version, no permission.
+    SpecificationError
+        The library is there, and was made with another recognizer or dmp.
 
     Notes
     -----
@@ -75,6 +78,13 @@ class ActionLibrary:
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
         self.store = Store(Path(folder) / FILE, specification, read_only=read_only, wait=wait)
+        made = self.specification
+        if Specification.of(recognizer or made.recognizer(), dmp or made.dmp) != made:
+            self.close()
+            raise SpecificationError(
+                f"expected the recognizer and dmp that the library in {folder} was made with, got others; its features "
+                "would mean something else: leave them out, or make another library"
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -138,8 +148,8 @@ class ActionLibrary:
         source : Source, or sequence of n Source or None, optional
             The files they come from.
         places : sequence of n str, optional
-            Where in its file each movement is; by default its number among those of that file in this call. Say it
-            where one file is learned in several calls: a movement at a place that is known is taken for known.
+            Where in its file each movement is: one at a place that is known is taken for known. Without, movements are
+            known by their samples alone.
         progress : callable, optional
             Called with the movements done and their number after every batch.
 
