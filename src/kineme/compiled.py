@@ -46,6 +46,12 @@ def use_compiled(n_operations: int, now: int | None = None) -> bool:
     return max(n_operations, _spent) >= _REPAYS_IMPORT
 
 
+def load_compiled() -> None:
+    """Import Numba now, for work that must not stop for it later; without effect where compiling is ruled out."""
+    if os.environ.get("KINEME_COMPILED", "auto") != "never":
+        import numba  # noqa: F401
+
+
 def jit(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:
     """Compile one thread's loop: cached on disk where possible, without the GIL.
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -206,3 +209,18 @@ def test_a_decision_needs_patience_and_a_change_twice_as_much():
 def test_wishes_out_of_range_are_refused(recognizer, wishes, message):
     with pytest.raises(SpecificationError, match=message):
         recognizer.stream(**wishes)
+
+
+def test_nothing_is_loaded_while_a_movement_is_under_way():
+    """A fresh process: after `stream()`, no update imports anything, however many there are."""
+    code = (
+        "import sys, kineme\n"
+        "demos = kineme.load_lasa()\n"
+        "live = kineme.Recognizer().fit(demos).stream()\n"
+        "before = set(sys.modules)\n"
+        "for t, x in zip(demos[3].times[::5], demos[3].positions[::5]):\n"
+        "    live.update(t, x)\n"
+        "print(sorted(set(sys.modules) - before))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

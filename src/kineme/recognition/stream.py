@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kineme.compiled import load_compiled
 from kineme.recognition.bounded_path import BoundedPath
 from kineme.recognition.decision import Decision
 from kineme.recognition.forecast import forecast
@@ -38,6 +39,14 @@ class Live:
         self._decision = decision
         self._path = BoundedPath(CAPACITY, recognizer.n_dims_)
         self._classes = recognizer.classes_.tolist()
+        self.reset()
+        self._rehearse()
+
+    def _rehearse(self) -> None:
+        """Go through a stored movement once: what is loaded on first use would stall the stream for 0.3 s."""
+        load_compiled()
+        known = self._recognizer.demonstrations_[0]
+        self.update(known.times, known.positions)
         self.reset()
 
     def reset(self) -> None:
