@@ -19,6 +19,7 @@ from kineme.anchoring.tree import average_linkage, cut_at
 from kineme.recognition.answer import known_labels
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.recognizer import Recognizer
+from kineme.sampling import evenly_spaced
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_count
 
@@ -125,7 +126,7 @@ def agreement(known: Recognizer) -> float:
     was shown once, that at 0.6 of the distance to the nearest other, as the recognizer's calibration takes.
     """
     stored = Seen(known.procrustes_, known.views_, known.mean)
-    some = np.unique(np.linspace(0, len(stored) - 1, 500).astype(int))
+    some = evenly_spaced(len(stored), 500)
     K = compare(known.similarity_, stored.take(some), stored.take(some))
     own, member = known.labels_[some], np.unique(known.labels_[some], return_inverse=True)[1]
     np.fill_diagonal(K, 0.0)

@@ -14,6 +14,7 @@ from kineme.anchoring.similarities import averaged, compare, similarities
 from kineme.anchoring.tree import average_linkage, cuts
 from kineme.errors import SpecificationError
 from kineme.recognition.recognizer import Recognizer
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once
@@ -128,7 +129,7 @@ def suggest_splits(
 
 
 def _in_two(name: Any, seen: Seen, places: NDArray[np.intp], widths: Array) -> Split:
-    some = np.unique(np.linspace(0, len(seen) - 1, _LARGEST // 5).astype(int))
+    some = evenly_spaced(len(seen), _LARGEST // 5)
     K = similarities(seen.take(some), widths=widths)
     order = own_order(K)
     K = K[np.ix_(order, order)]

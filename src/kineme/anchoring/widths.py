@@ -6,6 +6,7 @@ import numpy as np
 
 from kineme.anchoring.seen import Seen
 from kineme.errors import SpecificationError
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 _WIDTH = 0.35  # of the distance to what lies beyond the gap, as the recognizer takes of that to an impostor
@@ -38,7 +39,7 @@ def gap_widths(seen: Seen) -> Array:
     n = len(seen)
     if n < 3:
         raise SpecificationError(f"expected at least 3 movements to tell kinds apart without labels, got {n}; add some")
-    chosen = np.unique(np.linspace(0, n - 1, _ROWS).astype(int))
+    chosen = evenly_spaced(n, _ROWS)
     widths = []
     for prepared in seen.views:
         squares = seen.procrustes.squared_distances(prepared.take(chosen), prepared)

@@ -16,6 +16,7 @@ from kineme.anchoring.revise import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.seen import see_rows
 from kineme.errors import SpecificationError
 from kineme.recognition.recognizer import Recognizer
+from kineme.sampling import evenly_spaced
 from kineme.trajectories.demonstrations import Demonstrations
 
 if TYPE_CHECKING:
@@ -198,6 +199,6 @@ def some_of_each(library: ActionLibrary) -> tuple[Ids, NDArray[Any]]:
     """At most 3000 movements that show a symbol, evenly many of each, and the names of their symbols."""
     symbols = [symbol for symbol in library.symbols() if len(symbol)]
     share = max(1, _KNOWN // max(1, len(symbols)))
-    some = [one.members[np.unique(np.linspace(0, len(one) - 1, share).astype(int))] for one in symbols]
+    some = [one.members[evenly_spaced(len(one), share)] for one in symbols]
     labels = np.repeat([one.name for one in symbols], [len(members) for members in some])
     return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

@@ -16,6 +16,7 @@ from kineme.recognition.conformal import Calibration
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.recognition.shortlist import Stored
+from kineme.sampling import evenly_spaced
 
 if TYPE_CHECKING:
     from kineme.library.serving import Members
@@ -28,7 +29,7 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 
 def sample_recognizer(store: Store, members: Members) -> Recognizer:
     """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
-    chosen = np.unique(np.linspace(0, len(members.ids) - 1, _SAMPLE).astype(int))
+    chosen = evenly_spaced(len(members.ids), _SAMPLE)
     demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
     recognizer = store.specification.recognizer().set_params(classifier="nearest")
     return recognizer.fit(demos, members.labels[chosen])

@@ -16,6 +16,7 @@ from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.errors import SpecificationError
 from kineme.library.symbols import Symbol
 from kineme.primitives.primitives import Primitives
+from kineme.sampling import evenly_spaced
 
 if TYPE_CHECKING:
     from kineme.library.library import ActionLibrary
@@ -77,4 +78,4 @@ def _some(symbol: Symbol) -> Ids:
         raise SpecificationError(
             f"expected a symbol with movements, {symbol.name!r} has none; delete it, or learn some"
         )
-    return np.asarray(symbol.members[np.unique(np.linspace(0, len(symbol) - 1, _MEMBERS).astype(int))])
+    return np.asarray(symbol.members[evenly_spaced(len(symbol), _MEMBERS)])

@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.io.atomic import replaced
 from kineme.library import read
 from kineme.library.store import Store
 from kineme.recognition.candidates import N_CODES, Code, encode, fit_bases
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 FILE = "codes.cache"
@@ -128,7 +130,7 @@ def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
     """Write the codes of all movements into a buffer."""
     index = _view(store, buffer, len(ids))
     index.ids[:] = ids
-    sample = ids[np.unique(np.linspace(0, len(ids) - 1, _SAMPLE).astype(int))]
+    sample = ids[evenly_spaced(len(ids), _SAMPLE)]
     for to, basis in zip(index.bases, fit_bases(_features(store, sample), store.n_dims or 0), strict=True):
         to[:] = basis
     for start in range(0, len(ids), _ROWS):
@@ -140,8 +142,7 @@ def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
 
 
 def _write(store: Store, path: Path, ids: Ids) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with replaced(path) as beside:
         size = _HEADER + _layout(store, len(ids))[1]
         with beside.open("wb") as file:
             os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)
@@ -152,11 +153,6 @@ def _write(store: Store, path: Path, ids: Ids) -> None:
         buffer[: len(text)] = np.frombuffer(text, np.uint8)
         buffer.flush()
         del buffer
-        with beside.open("rb") as file:
-            os.fsync(file.fileno())
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def _tie(store: Store, version: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
 from kineme.recognition.similarity import AveragedSimilarity
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 ENOUGH = 8  # demonstrations of every class, from which on they choose
@@ -66,7 +67,7 @@ def aligned_weights(similarity: AveragedSimilarity, views: tuple[Prepared, ...],
     """
     from scipy.optimize import nnls
 
-    chosen = np.unique(np.linspace(0, len(labels) - 1, _ROWS).astype(int))
+    chosen = evenly_spaced(len(labels), _ROWS)
     some = tuple(one.take(chosen) for one in views)
     same = (labels[chosen, None] == labels[None, chosen]).astype(float)
     kernels = np.stack([_centered(one) for one in np.exp(similarity.logs(some, some))], axis=1)

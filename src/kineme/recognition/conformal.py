@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def calibrate(recognizer: Recognizer) -> Calibration:
     counts = np.diff(first, append=n)
     blocks, impostors = [], []
     for start, count in zip(first, counts, strict=True):
-        chosen = start + np.unique(np.linspace(0, count - 1, min(count, _CALIBRATED)).astype(int))
+        chosen = start + evenly_spaced(count, _CALIBRATED)
         rows = tuple(one.take(chosen) for one in recognizer.views_)
         away = distances(recognizer.similarity_.log_average(rows, recognizer.views_))
         away[np.arange(len(chosen)), chosen] = np.inf

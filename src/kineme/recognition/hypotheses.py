@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.prefixes import Prefixes, beginnings, smooth_paths
 from kineme.recognition.similarity import LOG_MEANS
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count, check_number
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ def prepare(procrustes: Procrustes, prefixes: Prefixes) -> tuple[Prepared, ...]:
 def _widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels: NDArray[np.intp]) -> Array:
     """A share of the typical distance from a beginning to the nearest one of another class, at any progress."""
     m, G = len(labels), len(views[0].rows) // len(labels)
-    chosen = np.unique(np.linspace(0, m - 1, _WIDTH_MOVEMENTS).astype(int))
+    chosen = evenly_spaced(m, _WIDTH_MOVEMENTS)
     rows = (chosen[:, None] * G + np.arange(G)).ravel()
     own = np.repeat(labels[chosen], G)
     if (own == own[0]).all():

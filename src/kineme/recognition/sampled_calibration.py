@@ -12,6 +12,7 @@ from kineme.recognition.candidates import log_bounds
 from kineme.recognition.conformal import Calibration, ClassDistances, distances, score_classes, typical_scale
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.shortlist import Rows, Stored
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 _CLASSES = 1000  # classes sampled, at most, evenly spaced
@@ -32,7 +33,7 @@ def calibrate_sample(recognizer: Recognizer, stored: Stored) -> Calibration:
     codes propose. Distances are to the whole class, not to the sample.
     """
     n_classes = len(stored.first)
-    sampled = np.unique(np.linspace(0, n_classes - 1, _CLASSES).astype(int))
+    sampled = evenly_spaced(n_classes, _CLASSES)
     most = int(np.clip(_BUDGET // len(sampled), _FEWEST, _CALIBRATED))
     blank = ClassDistances(np.full((1, 1), np.inf), np.zeros(1, dtype=np.intp))
     windows, wholes = [blank] * n_classes, [blank] * n_classes
@@ -111,7 +112,7 @@ def _proposed(recognizer: Recognizer, stored: Stored, c: int, asked: Rows) -> Ro
 
 def _impostors(recognizer: Recognizer, stored: Stored) -> Array:
     """Distances of some movements to the nearest other one, where each is a class of its own."""
-    asked = np.unique(np.linspace(0, len(stored.members) - 1, _CALIBRATED).astype(int))
+    asked = evenly_spaced(len(stored.members), _CALIBRATED)
     bounds = stored.bounds(recognizer.similarity_, stored.codes_at(stored.members[asked]))
     bounds[np.arange(len(asked)), asked] = -np.inf
     near = np.argpartition(-bounds, _NEAREST, axis=1)[:, :_NEAREST]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 _WIDTH = 0.35  # of the median distance to the nearest movement of another class
@@ -101,7 +102,7 @@ def impostor_widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels:
     SpecificationError
         All movements are the same, or there is only one.
     """
-    chosen = np.unique(np.linspace(0, len(labels) - 1, _WIDTH_ROWS).astype(int))
+    chosen = evenly_spaced(len(labels), _WIDTH_ROWS)
     own = labels[chosen, None] == labels[None, chosen]
     if own.all():
         own = np.eye(len(chosen), dtype=bool)

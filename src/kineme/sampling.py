@@ -1,0 +1,11 @@
+"""Some of many, when all would take too long."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def evenly_spaced(n: int, most: int) -> NDArray[np.intp]:
+    """At most `most` of the indices 0 to n - 1, evenly spaced, the first and (from two on) the last among them."""
+    return np.unique(np.linspace(0, n - 1, most).astype(np.intp))
