@@ -44,6 +44,10 @@ def _demonstrations(movements):
     return Demonstrations.from_arrays(wide, times=[t for t, _ in movements])
 
 
+def _spline_rows(demos):
+    return spline_rows(demos.times, demos.positions, demos.offsets, 33)
+
+
 def _company(seed, n, least):
     """Ragged movements of extents over 12 powers of ten, long and short ones next to each other."""
     rng = np.random.default_rng(seed)
@@ -62,7 +66,7 @@ def _within_its_extent(actual, expected, tolerance):
 @given(seed=st.integers(0, 10**6))
 def test_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
     movements = _company(seed, 200, least=4)  # 13 blocks of lanes
-    rows = relative_rows(_demonstrations(movements), 0, 200, 33)
+    rows = _spline_rows(_demonstrations(movements))
     for (t, x), row in zip(movements, rows, strict=True):
         _within_its_extent(row.T, CubicSpline(t, x - x[0])(np.linspace(0, t[-1], 33)), 1e-9)
 
@@ -88,7 +92,7 @@ any_ragged = given(
 @any_ragged
 def test_splines_are_those_of_scipy(compiled, seed, origin, place):
     movements = _ragged(seed, least=4, origin=origin, place=place)
-    rows = relative_rows(_demonstrations(movements), 0, 6, 33)
+    rows = _spline_rows(_demonstrations(movements))
     for (t, x), row in zip(movements, rows, strict=True):
         even = np.linspace(0, t[-1] - t[0], 33)
         np.testing.assert_allclose(row, CubicSpline(t - t[0], x - x[0])(even).T, atol=1e-9)

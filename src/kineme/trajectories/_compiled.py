@@ -33,6 +33,29 @@ def fill_extents(rows, extents):  # type: ignore[no-untyped-def]
 
 
 @jit
+def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no-untyped-def]
+    """Quantile of the gaps of each movement, 0 where no gap is close; see `close_stamps.merge_close`."""
+    longest = 0
+    for i in range(len(steps)):
+        longest = max(longest, offsets[i + 1] - offsets[i])
+    gaps, range_bits = np.empty(longest), np.empty(2, np.int64)
+    gap_bits, ends = gaps.view(np.int64), range_bits.view(np.float64)  # bits order positive numbers, and are quicker
+    for i in range(len(steps)):
+        own = times[offsets[i] : offsets[i + 1]]
+        n_gaps = len(own) - 1
+        for j in range(n_gaps):
+            gaps[j] = own[j + 1] - own[j]
+        low, high = gap_bits[0], gap_bits[0]
+        for j in range(n_gaps):
+            low = min(low, gap_bits[j])
+        for j in range(n_gaps):
+            high = max(high, gap_bits[j])
+        range_bits[0], range_bits[1] = low, high
+        at = int(quantile * n_gaps)
+        steps[i] = np.partition(gaps[:n_gaps], at)[at] if ends[0] < share * ends[1] else 0.0
+
+
+@jit
 def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
     """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
     n, n_dims, n_samples = paths.shape

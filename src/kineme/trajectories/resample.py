@@ -24,8 +24,10 @@ class Resample:
 
     Notes
     -----
-    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Resampling far
-    below the recorded rate folds high frequencies into low ones: `Smooth` first.
+    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
+    fifth of the usual step apart are averaged first: a spline would magnify the noise between them (see
+    `kineme.trajectories.close_stamps`). Resampling far below the recorded rate folds high frequencies into low ones:
+    `Smooth` first.
     """
 
     n_points: int = 200
@@ -50,8 +52,8 @@ def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_point
     """Movements start:stop at `n_points` even times, minus their start, shape (stop - start, d, n_points)."""
     n_samples = demonstrations.even_length
     if n_samples is None:
-        offsets = demonstrations.offsets[start : stop + 1]
-        return spline_rows(demonstrations.times, demonstrations.positions, offsets, n_points)
+        movements = demonstrations.movements.separated
+        return spline_rows(movements.stamps, movements.positions, movements.offsets[start : stop + 1], n_points)
     rows = even_rows(demonstrations, start, stop)
     return rows if n_points == n_samples else rows @ spline_matrix(n_samples, n_points).T
 
