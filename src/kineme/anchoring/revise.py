@@ -161,7 +161,7 @@ def _mean_within(K: Array) -> float:
 def _labeled(movements: Any, labels: ArrayLike, like: Recognizer | None) -> tuple[Seen, NDArray[np.intp], list[Any]]:
     seen, known = see(movements, like), label_array(labels)
     if len(known) != len(seen):
-        raise SpecificationError(f"expected one label for each of the {len(seen)} movements, got {len(known)}")
+        raise SpecificationError(f"expected one label for each of the {len(seen)} movements, got shape {known.shape}")
     names, member = np.unique(known, return_inverse=True)
     return seen, np.asarray(member, dtype=np.intp), names.tolist()
 
