@@ -17,6 +17,7 @@ from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]
@@ -160,7 +161,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitiv
 
 
 def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:
-    return np.array(labels) if all(label is not None for label in labels) else None
+    return label_array(labels) if all(label is not None for label in labels) else None
 
 
 def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:

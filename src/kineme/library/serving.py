@@ -18,6 +18,7 @@ from kineme.recognition.answer import Answer, Neighbor, answers, is_one
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.shortlist import Shortlist, Stored
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 
 Ids = NDArray[np.int64]
 
@@ -115,7 +116,7 @@ def members_of(store: Store) -> Members:
         keys, which = np.unique(pairs[:, 1], return_inverse=True)
         query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
         named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
-    names, place = np.unique([named[int(key)] for key in keys], return_inverse=True)
+    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
     owner = place[which]
     order = np.lexsort((pairs[:, 0], owner))
     return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
