@@ -18,6 +18,7 @@ from kineme.reproduction import paper
 from kineme.reproduction.choices import PENALTIES
 from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, svm_accuracy
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS
+from kineme.reproduction.split_widths import fit_by_split
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
@@ -50,7 +51,7 @@ def run_draw(dataset: str, seed: int, index: int, svm: bool) -> dict[str, Any]:
     dict
         ``nearest``, ``correlation`` and ``distance`` per representation; with `svm`, ``svm`` per
         "representation/kernel/widths" and ``penalty`` per "representation/kernel/C", and ``width`` per
-        "representation/kernel".
+        "representation/kernel": the mean over splits of the widths of their training rows.
     """
     features, labels = _features(dataset)
     chosen = draw(labels, paper.PER_CLASS, seed, index)
@@ -73,10 +74,10 @@ def _run_svm(rows: dict[str, Array], y: Any, penalties: bool) -> dict[str, Any]:
     for key, X in rows.items():
         if not any(key in keys for keys in READINGS.values()):
             continue
-        rbf, tre = RBF().fit(X), TruncatedEuclidean().fit(X)
-        width |= {f"{key}/rbf": float(rbf.sigma), f"{key}/tre": float(tre.m)}  # type: ignore[arg-type]
-        for name, kernel in (("rbf", rbf), ("tre", tre)):
-            gram = kernel(X)
+        for name, kernel, widths in (("rbf", RBF(), "sigma"), ("tre", TruncatedEuclidean(), "m")):
+            fitted = fit_by_split(kernel, X)
+            width[f"{key}/{name}"] = float(np.mean([getattr(one, widths) for one in fitted]))
+            gram = np.stack([one(X) for one in fitted])
             accuracy[f"{key}/{name}/median"] = svm_accuracy(gram, y)
             for C in PENALTIES[:-1] if penalties and key == "original-sa" else ():
                 by_penalty[f"{key}/{name}/{C:g}"] = svm_accuracy(gram, y, C)

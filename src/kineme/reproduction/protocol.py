@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import clone
 from sklearn.model_selection import LeaveOneOut
 from sklearn.neighbors import NearestNeighbors
 from sklearn.svm import SVC
@@ -32,10 +31,17 @@ def nearest_neighbor_accuracy(rows: NDArray[Any], labels: NDArray[Any], metric: 
 
 
 def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENALTY) -> float:
-    """Leave-one-out accuracy of an SVM on a Gram matrix."""
-    model = SVC(kernel="precomputed", C=penalty)
+    """Leave-one-out accuracy of an SVM.
+
+    Parameters
+    ----------
+    gram : ndarray of shape (n, n), or (n, n, n)
+        One Gram matrix for all splits; or one per split, of a kernel whose widths come from its training rows.
+    labels : ndarray of shape (n,)
+    """
+    n = len(labels)
     right = 0
-    for train, test in LeaveOneOut().split(gram):
-        fitted = clone(model).fit(gram[np.ix_(train, train)], labels[train])
-        right += int(fitted.predict(gram[np.ix_(test, train)])[0] == labels[test[0]])
-    return right / len(labels)
+    for (train, test), similar in zip(LeaveOneOut().split(labels), np.broadcast_to(gram, (n, n, n)), strict=True):
+        model = SVC(kernel="precomputed", C=penalty).fit(similar[np.ix_(train, train)], labels[train])
+        right += int(model.predict(similar[np.ix_(test, train)])[0] == labels[test[0]])
+    return right / n
