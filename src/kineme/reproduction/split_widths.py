@@ -35,12 +35,12 @@ def medians_without_each(values: Array, n: int) -> list[float]:
     order = np.argsort(values, axis=None, kind="stable")
     order = order[np.count_nonzero(values <= 0) :]
     place[order] = np.arange(len(order))
-    place = place.reshape(values.shape)
+    by_pair = place.reshape(values.shape)
     ascending = values.reshape(-1)[order]
     first, second = np.triu_indices(n, 1)
     medians = []
     for row in range(n):
-        gone = np.sort(place[(first == row) | (second == row)], axis=None)
+        gone = np.sort(by_pair[(first == row) | (second == row)], axis=None)
         gone = gone[gone >= 0]
         left = len(ascending) - len(gone)
         middle = np.array([(left - 1) // 2, left // 2])
