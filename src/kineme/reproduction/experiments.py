@@ -16,8 +16,9 @@ from kineme.errors import DegenerateMovementWarning
 from kineme.kernels import RBF, TruncatedEuclidean
 from kineme.reproduction import paper
 from kineme.reproduction.choices import PENALTIES
-from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, svm_accuracy
+from kineme.reproduction.protocol import draw, nearest_neighbor_accuracy, share_at_bound, svm_accuracy
 from kineme.reproduction.representations import READINGS, REPRESENTATIONS
+from kineme.reproduction.split_widths import fit_by_split
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
@@ -26,14 +27,16 @@ DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
 
 
 @lru_cache(maxsize=2)
-def _features(dataset: str) -> tuple[dict[str, Array], Any]:
-    """Features of all usable recordings of a data set, per representation, and labels as numbers."""
+def _features(dataset: str) -> tuple[dict[str, Array], Any, list[str | None]]:
+    """Features of all usable recordings of a data set, per representation; labels as numbers; names of the others."""
     demos = load_lasa(DATASETS[dataset])
-    demos = demos[~without_weights(demos)]
+    without = without_weights(demos)
+    left_out = [name for name, missing in zip(demos.names or (), without, strict=False) if missing]
+    demos = demos[~without]
     labels = np.unique(require_labels(demos), return_inverse=True)[1]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DegenerateMovementWarning)  # the point of the experiment
-        return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels
+        return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels, left_out
 
 
 def without_weights(demos: Demonstrations) -> NDArray[np.bool_]:
@@ -48,41 +51,47 @@ def run_draw(dataset: str, seed: int, index: int, svm: bool) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``nearest``, ``correlation`` and ``distance`` per representation; with `svm`, ``svm`` per
+        ``nearest``, ``correlation`` and ``distance`` per representation; ``left_out``, names of movements that are
+        never drawn, since they have no weights; with `svm`, ``svm`` per
         "representation/kernel/widths" and ``penalty`` per "representation/kernel/C", and ``width`` per
-        "representation/kernel".
+        "representation/kernel": the mean over splits of the widths of their training rows; ``at_bound`` the same way:
+        the `share_at_bound` at the smallest C.
     """
-    features, labels = _features(dataset)
+    features, labels, left_out = _features(dataset)
     chosen = draw(labels, paper.PER_CLASS, seed, index)
     rows, y = {key: X[chosen] for key, X in features.items()}, labels[chosen]
     result: dict[str, Any] = {
         "nearest": {key: nearest_neighbor_accuracy(X, y) for key, X in rows.items()},
         "correlation": {key: nearest_neighbor_accuracy(rows[key], y, "cosine") for key in ("original-w", "bio-w")},
         "distance": {key: float(np.median(pdist(X))) for key, X in rows.items()},
+        "left_out": left_out,
     }
     if svm:
         with sklearn.config_context(skip_parameter_validation=True):
-            result |= _run_svm(rows, y, penalties=dataset == "paper")
+            result |= _run_svm(rows, y, diagnosis=dataset == "paper")
     return result
 
 
-def _run_svm(rows: dict[str, Array], y: Any, penalties: bool) -> dict[str, Any]:
+def _run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
     accuracy: dict[str, float] = {}
     width: dict[str, float] = {}
     by_penalty: dict[str, float] = {}
+    at_bound: dict[str, float] = {}
     for key, X in rows.items():
         if not any(key in keys for keys in READINGS.values()):
             continue
-        rbf, tre = RBF().fit(X), TruncatedEuclidean().fit(X)
-        width |= {f"{key}/rbf": float(rbf.sigma), f"{key}/tre": float(tre.m)}  # type: ignore[arg-type]
-        for name, kernel in (("rbf", rbf), ("tre", tre)):
-            gram = kernel(X)
+        for name, kernel, widths in (("rbf", RBF(), "sigma"), ("tre", TruncatedEuclidean(), "m")):
+            fitted = fit_by_split(kernel, X)
+            width[f"{key}/{name}"] = float(np.mean([getattr(one, widths) for one in fitted]))
+            gram = np.stack([one(X) for one in fitted])
             accuracy[f"{key}/{name}/median"] = svm_accuracy(gram, y)
-            for C in PENALTIES[:-1] if penalties and key == "original-sa" else ():
-                by_penalty[f"{key}/{name}/{C:g}"] = svm_accuracy(gram, y, C)
-    for key, cell in zip(READINGS["closest to the paper"], paper.CELLS, strict=True):
-        X = rows[key]
-        printed = paper.KERNELS[cell]
-        accuracy[f"{key}/rbf/paper"] = svm_accuracy(printed.rbf(X), y)
-        accuracy[f"{key}/tre/paper"] = svm_accuracy(printed.truncated(X), y)
-    return {"svm": accuracy, "width": width, "penalty": by_penalty}
+            if diagnosis and key == "original-sa":
+                by_penalty |= {f"{key}/{name}/{C:g}": svm_accuracy(gram, y, C) for C in PENALTIES[:-1]}
+                at_bound[f"{key}/{name}"] = share_at_bound(gram, y, PENALTIES[0])
+    for row in REPRESENTATIONS.values():
+        if not (diagnosis or row.key in READINGS["closest in distances"]):
+            continue
+        X, printed = rows[row.key], paper.KERNELS[row.formulation, row.quantity]
+        accuracy[f"{row.key}/rbf/paper"] = svm_accuracy(printed.rbf(X), y)
+        accuracy[f"{row.key}/tre/paper"] = svm_accuracy(printed.truncated(X), y)
+    return {"svm": accuracy, "width": width, "penalty": by_penalty, "at_bound": at_bound}

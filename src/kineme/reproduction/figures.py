@@ -111,7 +111,7 @@ def _similarities(formulation: str, quantity: str, seed: int) -> Figure:
     assert demos.labels is not None
     chosen = demos[draw(demos.labels, paper.PER_CLASS, seed, 0)]
     cell = (formulation, quantity)
-    key = READINGS["closest to the paper"][paper.CELLS.index(cell)]
+    key = READINGS["closest in distances"][paper.CELLS.index(cell)]
     X = REPRESENTATIONS[key].rows(chosen)
     rbf, truncated = paper.KERNELS[cell]
     grams = {

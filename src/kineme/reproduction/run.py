@@ -59,10 +59,11 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
     from kineme.reproduction.tables import make_tables
 
     by_draw = {name: [done[name, k] for k in range(draws)] for name in ("paper", "lasa-26")}
-    tables = make_tables(by_draw)
+    by_data = make_tables(by_draw)
+    tables = [*by_data[0], *by_data[1]]
     figures = {name: done["figure", name] for name in sorted(name for kind, name in done if kind == "figure")}
     facts = {"draws": draws, "seed": seed, "quick": quick, "versions": _versions()}
-    files = [*_write_figures(out, figures), *_write_tables(out, tables, figures, facts)]
+    files = [*_write_figures(out, figures), *_write_tables(out, by_data, figures, facts)]
     seconds = round(time.perf_counter() - started, 2)
     numbers = {
         "format": _FORMAT,
@@ -124,12 +125,14 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
     return written
 
 
-def _write_tables(out: Path, tables: list[Table], figures: dict[str, Any], facts: dict[str, Any]) -> list[Path]:
+def _write_tables(
+    out: Path, tables: tuple[list[Table], list[Table]], figures: dict[str, Any], facts: dict[str, Any]
+) -> list[Path]:
     from kineme.reproduction.report import write_report
     from kineme.table import to_text
 
     html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
-    text = "\n\n".join(map(to_text, tables)) + "\n"
+    text = "\n\n".join(map(to_text, [*tables[0], *tables[1]])) + "\n"
     return [write_atomically(out / "report.html", html.encode()), write_atomically(out / "tables.txt", text.encode())]
 
 

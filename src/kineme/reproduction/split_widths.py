@@ -1,0 +1,50 @@
+"""Median widths of the kernels from the training rows of each leave-one-out split, all splits at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.kernels import RBF, TruncatedEuclidean
+from kineme.kernels.base import Kernel
+from kineme.validation import Array
+
+
+def fit_by_split(kernel: RBF | TruncatedEuclidean, X: Array) -> list[Kernel]:
+    """``[kernel.fit(X without row i) for i in range(n)]``: what a classifier may know that is tested on row i.
+
+    The differences of all pairs of rows are computed and sorted once; for up to about a hundred rows, as `fit` itself
+    looks at every pair.
+    """
+    first, second = np.triu_indices(len(X), 1)
+    differences = np.abs(X[first] - X[second])
+    if isinstance(kernel, RBF):
+        distances = np.sqrt((differences**2).sum(axis=1, keepdims=True))
+        return [RBF(sigma) for sigma in medians_without_each(distances, len(X))]
+    return [TruncatedEuclidean(m, kernel.sigma) for m in medians_without_each(differences, len(X))]
+
+
+def medians_without_each(values: Array, n: int) -> list[float]:
+    """For each of n rows the median of the positive values of all pairs that it has no part in.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n (n - 1) / 2, p)
+        Of the pairs ``np.triu_indices(n, 1)``.
+    """
+    place = np.full(values.size, -1)  # of each positive value among them all, sorted
+    order = np.argsort(values, axis=None, kind="stable")
+    order = order[np.count_nonzero(values <= 0) :]
+    place[order] = np.arange(len(order))
+    by_pair = place.reshape(values.shape)
+    ascending = values.reshape(-1)[order]
+    first, second = np.triu_indices(n, 1)
+    medians = []
+    for row in range(n):
+        gone = np.sort(by_pair[(first == row) | (second == row)], axis=None)
+        gone = gone[gone >= 0]
+        left = len(ascending) - len(gone)
+        middle = np.array([(left - 1) // 2, left // 2])
+        # What is k-th among those left was moved up by those that are gone and come before it.
+        middle += np.searchsorted(gone - np.arange(len(gone)), middle, side="right")
+        medians.append(float(ascending[middle].mean()))
+    return medians
