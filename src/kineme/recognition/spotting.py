@@ -52,6 +52,8 @@ def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_p
             "select the dimensions"
         )
     atoms, bout = _atoms(whole)
+    if not len(atoms):  # nothing moves for as long as a movement takes
+        return []
     first, last = _unions(len(atoms), max_pieces)
     rows = np.column_stack((atoms[first, 0], atoms[last, 1]))
     long_enough = rows[:, 1] - rows[:, 0] >= _MIN_SAMPLES
@@ -82,6 +84,8 @@ def _atoms(recording: Trajectory) -> tuple[Rows, NDArray[np.intp]]:
     rest, minima = Rest(), SpeedMinima(depth=0.5)
     motion: Motion = observe(recording, min(rest.resolution, minima.resolution))
     bouts = moving(motion, rest.pieces(motion), rest.resolution)
+    if not len(bouts):
+        return bouts, np.empty(0, dtype=np.intp)
     cuts = minima.inner_cuts(motion)
     of = np.searchsorted(bouts[:, 0], cuts, side="right") - 1
     inside = (of >= 0) & (cuts - _MIN_SAMPLES > bouts[of, 0]) & (cuts + _MIN_SAMPLES < bouts[of, 1])

@@ -25,6 +25,8 @@ def onset_rows(motion: Motion, pieces: Rows) -> Rows:
     0.1 / c, that of a movement at full speed from the start by 0.4 / c. Half way
     between is taken back. The same holds for the end, backward in time.
     """
+    if not len(pieces):  # the largest of nothing is no number
+        return pieces
     begin = _crossings(motion, motion.times, motion.speed, pieces)
     backward = len(motion.times) - pieces[:, ::-1]
     end = _crossings(motion, -motion.times[::-1], motion.speed[::-1], backward[::-1])
