@@ -51,10 +51,35 @@ def test_kernels_know_nothing_of_movements():
     assert imported <= {"kernels", "compiled", "parallel", "validation", "errors"}
 
 
-def test_compiled_code_is_imported_inside_functions_only():
-    """At the top of a module it would cost every user the half second that Numba takes to load."""
+def _compiled_modules():
+    """Modules with compiled functions, and the one that keeps their machine code: importing them imports Numba."""
+    jitted = [path for path in _modules() if re.search(r"^@jit|= jit\(", path.read_text(), re.MULTILINE)]
+    return {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in jitted} | {
+        "kineme.machine_code": PACKAGE / "machine_code.py"
+    }
+
+
+def _all_imports(path):
+    """Whatever a file imports, as full names: ``import a.b`` and ``from a import b`` are both a.b."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        if isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_numba_and_compiled_modules_are_loaded_in_one_place_only(path):
+    """Threads that import parts of Numba at the same time break it for the rest of the process."""
+    compiled = _compiled_modules()
+    for name in _all_imports(path):
+        assert name.partition(".")[0] != "numba" or path in compiled.values(), f"load Numba by kineme.compiled: {name}"
+        asked = {name, name.rpartition(".")[0]} & set(compiled)
+        assert not asked or path in compiled.values(), f"use kineme.compiled.compiled_module: {name}"
+
+
+def test_the_modules_that_are_asked_for_have_compiled_functions():
+    assert {"kernels", "control", "trajectories"} <= {name.split(".")[1] for name in _compiled_modules()}
     for path in _modules():
-        top = [node for node in ast.parse(path.read_text()).body if isinstance(node, (ast.Import, ast.ImportFrom))]
-        names = {getattr(node, "module", None) or "" for node in top} | {a.name for node in top for a in node.names}
-        if path.name != "_compiled.py":
-            assert not any(name.startswith("numba") or name.split(".")[-1] == "_compiled" for name in names), path
+        for name in re.findall(r"compiled_module\(\"(.*?)\"\)", path.read_text()):
+            assert name in _compiled_modules(), path

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.control import plain
 from kineme.control.plan import Influences, Plan
 from kineme.control.shape_table import shape_table
@@ -28,8 +28,7 @@ def stepper(plan: Plan) -> Advance:
 
 
 def _compiled(plan: Plan) -> Advance:
-    from kineme.control import _compiled as compiled
-
+    compiled = compiled_module("kineme.control._compiled")
     table, avoidance, d = tuple(shape_table(plan)), plan.avoidance, plan.primitive.n_dims
     spring = (plan.K, plan.D, plan.intervals)
     steering = (float(avoidance.gamma), float(avoidance.beta), avoidance.fading)

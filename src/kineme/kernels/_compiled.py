@@ -8,6 +8,7 @@ from inspect import isfunction
 from typing import Any
 
 import numpy as np
+from numba.core.errors import NumbaError  # noqa: F401 - what a call of `user_sums` may raise
 from numba.extending import register_jitable
 
 from kineme.compiled import jit

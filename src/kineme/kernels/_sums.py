@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.kernels._rows import Rows, contiguous
 from kineme.parallel import for_tiles
 
@@ -44,9 +44,7 @@ class Term:
 
 def _builtin(name: str) -> Callable[[], TileSums]:
     def load() -> TileSums:
-        from kineme.kernels import _compiled
-
-        loop: TileSums = getattr(_compiled, name)
+        loop: TileSums = getattr(compiled_module("kineme.kernels._compiled"), name)
         return loop
 
     return load

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kineme.compiled import compiled_module
 from kineme.errors import SpecificationError
 from kineme.kernels._rows import Rows
 from kineme.kernels._sums import Term, TileSums, fill_gram
@@ -76,16 +77,13 @@ class DistanceKernel(Kernel):
         return np.asarray(terms, dtype=x.dtype)
 
     def _compiled(self) -> TileSums:
-        from numba.core.errors import NumbaError
-
-        from kineme.kernels import _compiled
-
-        loop = _compiled.user_sums(self.d, self.g)
+        compiled = compiled_module("kineme.kernels._compiled")
+        loop = compiled.user_sums(self.d, self.g)
 
         def sums(A: Rows, B: Rows, c: Any, sums_of_tile: Rows) -> None:
             try:
                 loop(A, B, c, sums_of_tile)
-            except NumbaError as error:
+            except compiled.NumbaError as error:
                 raise SpecificationError(
                     f"expected functions d and g that Numba can compile, got {self}; use arithmetic and math on "
                     f"numbers, or set KINEME_COMPILED=never to run them as Python. Numba says: {error}"

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.errors import SpecificationError
 from kineme.parallel import single_threaded_blas
 from kineme.validation import Array, check_number
@@ -124,10 +124,8 @@ def _few_products(few: NDArray[Any], many: NDArray[Any]) -> NDArray[Any]:
     In one thread: two that wait for each other take twenty times as long where something else runs on the machine.
     """
     if use_compiled(few.shape[0] * many.size):
-        from kineme.kernels._compiled import fill_products
-
         products = np.empty((len(few), len(many)), few.dtype)
-        fill_products(few, many, products)
+        compiled_module("kineme.kernels._compiled").fill_products(few, many, products)
         return products
     with single_threaded_blas():
         return np.stack([many @ row for row in few])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
 _OPERATIONS_PER_SAMPLE = 5
@@ -46,10 +46,9 @@ def resample_by_arc_length(paths: Array, n_points: int, share: float = 1.0) -> A
     uneven as these can swing.
     """
     if use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
-        from kineme.trajectories._compiled import fill_arc_rows
-
+        compiled = compiled_module("kineme.trajectories._compiled")
         rows = np.empty((*paths.shape[:2], n_points))
-        fill_arc_rows(np.ascontiguousarray(paths), (1.0 - _TIME_SHARE) * share, rows)
+        compiled.fill_arc_rows(np.ascontiguousarray(paths), (1.0 - _TIME_SHARE) * share, rows)
         return rows
     return resample_by_phase(paths, arc_length_phase(paths, share), n_points)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.spline import spline_matrix, spline_rows
@@ -64,9 +64,7 @@ def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
     block = demonstrations.positions[first:last].reshape(stop - start, -1, demonstrations.n_dims)
     rows = np.empty((len(block), block.shape[2], block.shape[1]))
     if use_compiled(block.size):
-        from kineme.trajectories._compiled import fill_even_rows
-
-        fill_even_rows(block, rows)
+        compiled_module("kineme.trajectories._compiled").fill_even_rows(block, rows)
         return rows
     by_dimension = block.transpose(0, 2, 1)
     return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
@@ -76,8 +74,6 @@ def extents_of(rows: Array) -> Array:
     """Largest minus smallest of each row (n, d, T), shape (n, d)."""
     if not use_compiled(rows.size):
         return np.asarray(rows.max(axis=2) - rows.min(axis=2))
-    from kineme.trajectories._compiled import fill_extents
-
     extents = np.empty(rows.shape[:2])
-    fill_extents(rows, extents)
+    compiled_module("kineme.trajectories._compiled").fill_extents(rows, extents)
     return extents

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.parallel import for_tiles
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
@@ -67,10 +67,8 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
         smoothed, m = smoothing_spline(times, positions, offsets, scales)
         elapsed = times[first : offsets[-1]] - np.repeat(times[offsets[:-1]], lengths)
         return even_rows_of_spline(elapsed * np.repeat(scales, lengths), smoothed, m, offsets - first, n_points)
-    from kineme.trajectories._splines import fill_smooth_rows
-
     rows = np.empty((stop - start, demonstrations.n_dims, n_points))
-    fill_smooth_rows(times, positions, offsets, scales, rows)
+    compiled_module("kineme.trajectories._splines").fill_smooth_rows(times, positions, offsets, scales, rows)
     return rows
 
 
@@ -79,9 +77,8 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.times, demonstrations.positions
     if _compiled(demonstrations, offsets):
-        from kineme.trajectories._splines import fill_smoothed
-
-        fill_smoothed(times, positions, offsets, scales, smoothed)
+        splines = compiled_module("kineme.trajectories._splines")
+        splines.fill_smoothed(times, positions, offsets, scales, smoothed)
         return
     starts = np.repeat(positions[offsets[:-1]], np.diff(offsets), axis=0)
     smoothed[offsets[0] : offsets[-1]] = smoothing_spline(times, positions, offsets, scales)[0] + starts

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
 _OPERATIONS_PER_SAMPLE = 100  # elementary operations that SciPy's spline costs per sample and dimension
@@ -65,9 +65,7 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
         _OPERATIONS_PER_SAMPLE * n_dims * n_samples for n_samples in (len(positions), offsets[-1] - offsets[0])
     )
     if fits_lanes(offsets) and use_compiled(whole, now):
-        from kineme.trajectories._splines import fill_spline_rows
-
-        fill_spline_rows(parameter, positions, offsets, rows)
+        compiled_module("kineme.trajectories._splines").fill_spline_rows(parameter, positions, offsets, rows)
     else:
         _fill_spline_rows(parameter, positions, offsets, rows)
     return rows

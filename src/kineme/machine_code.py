@@ -1,0 +1,55 @@
+"""Compiled functions on disk, read again by later processes. Importing this imports Numba."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+
+def keep(dispatcher: Callable[..., Any]) -> None:
+    """Cache a function's machine code on disk, where there is a writable place for it."""
+    function = getattr(dispatcher, "py_func", None)  # none where NUMBA_DISABLE_JIT leaves functions as they are
+    if function is not None:
+        with suppress(RuntimeError):  # no place for the cache, as in a read-only installation
+            dispatcher._cache = _Cache(function)  # type: ignore[attr-defined]
+
+
+class _Cache(FunctionCache):
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        implementation = self._impl
+        self._cache_file = _Files(
+            cache_path=self._cache_path,
+            filename_base=implementation.filename_base,
+            source_stamp=implementation.locator.get_source_stamp(),
+        )
+
+
+class _Files(IndexDataCacheFile):
+    """Numba's files, each with what it holds written into it.
+
+    Numba numbers the files of a function and names them in an index. Two processes that compile it at the same time for
+    different arguments take the same number: the index names one of them, the file holds the other, and every later
+    process fails on it. A file that does not say that it is the right one, or cannot be read, counts as none: it
+    is compiled and written again. What cannot be written, as on a full disk, is not kept.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        with suppress(OSError):
+            super().save(key, (key, self._source_stamp, data))
+
+    def load(self, key: Any) -> Any:
+        try:
+            *said, data = super().load(key)
+        except Exception:  # nothing there, or damaged bytes, on which unpickling may raise anything
+            return None
+        return data if said == [key, self._source_stamp] else None
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:
+            return {}
