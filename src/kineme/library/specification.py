@@ -15,6 +15,8 @@ from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Represent
 if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
+_MOST = 100_000  # dimensions, points, basis functions: of more, one matrix would not fit into any memory
+
 #: The primitives of a library: a fit of the path itself, which replays what was shown.
 DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
 
@@ -82,3 +84,13 @@ class Specification:
                 f"expected a library that says how its movements are seen, got a specification that does not fit "
                 f"({reason}); take the file from a backup or an export"
             ) from error
+
+
+def as_n_dims(text: str) -> int:
+    """The number of dimensions, as a library keeps it."""
+    if not (text.isascii() and text.isdecimal() and len(text) <= len(str(_MOST)) and 0 < int(text) <= _MOST):
+        raise DataError(
+            f"expected a library that says how many dimensions its movements have, from 1 to {_MOST}, got "
+            f"{text[:40]!r}; take the file from a backup or an export that you trust"
+        )
+    return int(text)

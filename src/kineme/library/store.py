@@ -19,7 +19,7 @@ from kineme.library.connection import check_kind, connect, create, migrate, sche
 from kineme.library.faults import in_plain_words
 from kineme.library.rows import Row, damage, damaged, insert, retire, select
 from kineme.library.schema import COUNTED, SCHEMA_VERSION
-from kineme.library.specification import Specification
+from kineme.library.specification import Specification, as_n_dims
 
 NOW = (1 << 62) - 1  # later than every version: what is there now
 
@@ -158,7 +158,7 @@ class Store:
         """Dimensions that all movements share; None before the first one."""
         with self.reading() as connection:
             found = select(connection, "meta", "key = 'n_dims'")
-        return int(found[0][1]) if found else None
+        return as_n_dims(found[0][1]) if found else None
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
