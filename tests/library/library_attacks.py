@@ -75,7 +75,7 @@ def attack(path, statements=(), definitions=(), master=()):
             value = schema_seal(connection)
             crc = seal("meta", ("schema", value))
             connection.execute("UPDATE meta SET value = ?, crc = ? WHERE key = 'schema'", (value, crc))
-        except sqlite3.Error:
+        except (sqlite3.Error, UnicodeDecodeError):
             pass  # such definitions that nobody can read on
     return path
 
@@ -86,16 +86,19 @@ def copy_of(source, target):
     return target
 
 
-def _blob(table, column, key, change):
-    """A statement that changes the bytes of a cell; `change` gets them as an array of their type."""
-    return table, column, key, change
-
-
 def floats(kind, *places, value=np.nan, size=16):
     """Bytes of small ascending numbers, with one value at some places."""
     numbers = np.linspace(0.1, 1, size).astype(kind)
     numbers[list(places)] = value
     return numbers.tobytes()
+
+
+def _set(key, place, value):
+    return f"UPDATE meta SET value = json_set(value, '$.{place}', {value}) WHERE key = '{key}'"
+
+
+def _text(name, old, new):
+    return f"UPDATE sqlite_master SET sql = replace(sql, '{old}', '{new}') WHERE name = '{name}'"
 
 
 WIDE = SAMPLES * 2
@@ -108,64 +111,103 @@ ROWS = {
     "duration is zero": (["UPDATE movement SET duration = 0.0 WHERE id = 2"], "duration is not a finite number"),
     "duration is lost beside t0": (["UPDATE movement SET t0 = 1e300 WHERE id = 2"], "time stamps of their own"),
     "duration and t0 overflow": (
-        ["UPDATE movement SET t0 = 1.7e308, duration = 1.7e308 WHERE id = 2"], "duration is not a finite number",
+        ["UPDATE movement SET t0 = 1.7e308, duration = 1.7e308 WHERE id = 2"],
+        "duration is not a finite number",
     ),
     "t0 is infinite": (["UPDATE movement SET t0 = -9e999 WHERE id = 2"], "t0 is not a finite number"),
     "t0 is bytes": (["UPDATE movement SET t0 = x'00' WHERE id = 2"], "t0 is not a finite number"),
     "no samples": (["UPDATE movement SET n_samples = 0 WHERE id = 2"], "n_samples is not a whole number from 4"),
-    "samples below zero": (["UPDATE movement SET n_samples = -8 WHERE id = 2"], "n_samples is not a whole number from 4"),
+    "samples below zero": (
+        ["UPDATE movement SET n_samples = -8 WHERE id = 2"],
+        "n_samples is not a whole number from 4",
+    ),
     "samples as text": (["UPDATE movement SET n_samples = 'many' WHERE id = 2"], "n_samples is not a whole number"),
-    "samples without end": (["UPDATE movement SET n_samples = 1 << 60 WHERE id = 2"], "n_samples is not a whole number"),
+    "samples without end": (
+        ["UPDATE movement SET n_samples = 1 << 60 WHERE id = 2"],
+        "n_samples is not a whole number",
+    ),
     "more samples than stored": (
-        ["UPDATE movement SET n_samples = 1 << 39 WHERE id = 2"], "samples of movement 2: of the wrong size",
+        ["UPDATE movement SET n_samples = 1 << 39 WHERE id = 2"],
+        "samples of movement 2: of the wrong size",
     ),
     "a digest of text": (["UPDATE movement SET digest = 'none' WHERE id = 2"], "digest is not a whole number"),
     "a name of bytes": (["UPDATE movement SET name = x'ff00' WHERE id = 2"], "name is not text"),
     "a label of bytes": (["UPDATE movement SET label = x'41' WHERE id = 2"], "label is not text"),
     "a label with U+0000": (
-        ["UPDATE movement SET label = 'wave' || char(0) WHERE id = 2"], "label is not text .* without U[+]0000",
+        ["UPDATE movement SET label = 'wave' || char(0) WHERE id = 2"],
+        "label is not text .* without U[+]0000",
     ),
     "a name that is no Unicode": (
-        ["UPDATE symbol_state SET name = CAST(x'77ff61' AS TEXT) WHERE id = 1"], "decode|cannot be read",
+        ["UPDATE symbol_state SET name = CAST(x'77ff61' AS TEXT) WHERE id = 1"],
+        "decode|cannot be read",
     ),
     "a symbol of bytes": (["UPDATE symbol_state SET name = x'41' WHERE id = 1"], "name is not text"),
     "a symbol without a name": (["UPDATE symbol_state SET name = '' WHERE id = 1"], "name is not text of 1"),
     "a symbol's name with U+0000": (
-        ["UPDATE symbol_state SET name = 'a' || char(0) WHERE id = 1"], "name is not text .* without U[+]0000",
+        ["UPDATE symbol_state SET name = 'a' || char(0) WHERE id = 1"],
+        "name is not text .* without U[+]0000",
     ),
     "a name without end": (
-        [("UPDATE symbol_state SET name = ? WHERE id = 1", ("x" * ((1 << 24) + 1),))], "name is not text of 1 to 16777216",
+        [("UPDATE symbol_state SET name = ? WHERE id = 1", ("x" * ((1 << 24) + 1),))],
+        "name is not text of 1 to 16777216",
     ),
-    "an id that a terminal obeys": (["UPDATE symbol SET id = char(27) || '[2Jxxxxxxxxxxxx' WHERE key = 1"], "id is not 'sym-'"),
-    "an id with more behind U+0000": (["UPDATE symbol SET id = id || char(0) || 'x' WHERE key = 1"], "id is not 'sym-'"),
+    "an id that a terminal obeys": (
+        ["UPDATE symbol SET id = char(27) || '[2Jxxxxxxxxxxxx' WHERE key = 1"],
+        "id is not 'sym-'",
+    ),
+    "an id with more behind U+0000": (
+        ["UPDATE symbol SET id = id || char(0) || 'x' WHERE key = 1"],
+        "id is not 'sym-'",
+    ),
     "parents that are no JSON": (["UPDATE symbol_state SET parents = 'none' WHERE id = 1"], "parents that are no JSON"),
     "parents that are a number": (["UPDATE symbol_state SET parents = '17' WHERE id = 1"], "parents that are no JSON"),
-    "parents that are numbers": (["UPDATE symbol_state SET parents = '[1, 2]' WHERE id = 1"], "parents that are no JSON"),
+    "parents that are numbers": (
+        ["UPDATE symbol_state SET parents = '[1, 2]' WHERE id = 1"],
+        "parents that are no JSON",
+    ),
     "parents nested without end": (
-        [("UPDATE symbol_state SET parents = ? WHERE id = 1", ("[" * 100_000,))], "parents that are no JSON",
+        [("UPDATE symbol_state SET parents = ? WHERE id = 1", ("[" * 100_000,))],
+        "parents that are no JSON",
     ),
     "a number of ten thousand digits": (
-        [("UPDATE symbol_state SET parents = ? WHERE id = 1", (f"[{'9' * 10_000}]",))], "parents that are no JSON",
+        [("UPDATE symbol_state SET parents = ? WHERE id = 1", (f"[{'9' * 10_000}]",))],
+        "parents that are no JSON",
     ),
-    "a threshold of text": (["UPDATE symbol_state SET threshold = 'low' WHERE id = 1"], "threshold is not a finite number"),
-    "an infinite threshold": (["UPDATE symbol_state SET threshold = 9e999 WHERE id = 1"], "threshold is not a finite number"),
+    "a threshold of text": (
+        ["UPDATE symbol_state SET threshold = 'low' WHERE id = 1"],
+        "threshold is not a finite number",
+    ),
+    "an infinite threshold": (
+        ["UPDATE symbol_state SET threshold = 9e999 WHERE id = 1"],
+        "threshold is not a finite number",
+    ),
     "a prototype that is deleted": (
-        ["UPDATE symbol_state SET prototype = 6 WHERE removed IS NULL AND prototype = 1"], "when its prototype is not",
+        ["UPDATE symbol_state SET prototype = 6 WHERE removed IS NULL AND prototype = 1"],
+        "when its prototype is not",
     ),
-    "a detail that is no JSON": (["UPDATE version SET detail = '{' || char(10) WHERE id = 1"], "detail that is no JSON"),
+    "a detail that is no JSON": (
+        ["UPDATE version SET detail = '{' || char(10) WHERE id = 1"],
+        "detail that is no JSON",
+    ),
     "a detail that is a list": (["UPDATE version SET detail = '[]' WHERE id = 1"], "detail that is no JSON object"),
     "a rejection of nothing": (
-        ["UPDATE version SET detail = '{}' WHERE action = 'reject'"], "a rejection without its list of movements",
+        ["UPDATE version SET detail = '{}' WHERE action = 'reject'"],
+        "a rejection without its list of movements",
     ),
     "a rejection of text": (
-        ["""UPDATE version SET detail = '{"movements": ["x"]}' WHERE action = 'reject'"""], "a rejection without its list",
+        ["""UPDATE version SET detail = '{"movements": ["x"]}' WHERE action = 'reject'"""],
+        "a rejection without its list",
     ),
     "a time that is none": (["UPDATE version SET at = char(27) || '[31m' WHERE id = 1"], "at is not a time"),
     "an action of bytes": (["UPDATE version SET action = x'00' WHERE id = 1"], "action is not text"),
     "a version that is missing": (
-        ["PRAGMA foreign_keys = OFF", "DELETE FROM version WHERE id = 2"], "refers to a row of table version|numbered from 1",
+        ["PRAGMA foreign_keys = OFF", "DELETE FROM version WHERE id = 2"],
+        "refers to a row of table version|numbered from 1",
     ),
-    "other counts": (["UPDATE version SET movements = movements + 1 WHERE id = 3"], "counts other movements than there are"),
+    "other counts": (
+        ["UPDATE version SET movements = movements + 1 WHERE id = 3"],
+        "counts other movements than there are",
+    ),
     "counts of text": (["UPDATE version SET members = 'all' WHERE id = 3"], "members is not a whole number from 0"),
     "two symbols for one movement": (
         [
@@ -194,39 +236,50 @@ ROWS = {
     "a member of text": (["UPDATE member SET movement = 'two' WHERE id = 1"], "movement is not a whole number"),
     "a strange way to a symbol": (["UPDATE member SET how = 'magic' WHERE id = 1"], "how|CHECK constraint"),
     "removed before it was added": (
-        ["UPDATE member SET added = 3, removed = 1 WHERE id = 1"], "removed is not no version before",
+        ["UPDATE member SET added = 3, removed = 1 WHERE id = 1"],
+        "removed is not no version before",
     ),
     "a life that never began": (["UPDATE movement SET added = 'once' WHERE id = 2"], "added is not a whole number"),
     "positions that are NaN": (
-        [("UPDATE raw SET positions = ? WHERE movement = 2", (floats(np.float32, 5, size=WIDE),))], "not finite",
+        [("UPDATE raw SET positions = ? WHERE movement = 2", (floats(np.float32, 5, size=WIDE),))],
+        "not finite",
     ),
     "positions that are infinite": (
         [("UPDATE raw SET positions = ? WHERE movement = 2", (floats(np.float32, 5, value=np.inf, size=WIDE),))],
         "not finite",
     ),
     "a start that is NaN": (
-        [("UPDATE raw SET start = ? WHERE movement = 2", (floats(np.float64, 1, size=2),))], "not finite",
+        [("UPDATE raw SET start = ? WHERE movement = 2", (floats(np.float64, 1, size=2),))],
+        "not finite",
     ),
     "positions of text": (
-        [("UPDATE raw SET positions = ? WHERE movement = 2", ("x" * 8 * WIDE,))], "positions is not bytes|damaged bytes",
+        [("UPDATE raw SET positions = ? WHERE movement = 2", ("x" * 8 * WIDE,))],
+        "positions is not bytes|damaged bytes",
     ),
     "positions of odd length": (["UPDATE raw SET positions = x'001122' WHERE movement = 2"], "wrong size|not finite"),
     "no positions": (["UPDATE raw SET positions = x'' WHERE movement = 2"], "of the wrong size"),
     "a movement that rests": (
-        [f"UPDATE raw SET positions = zeroblob({4 * WIDE}) WHERE movement = 2"], "a movement that does not move",
+        [f"UPDATE raw SET positions = zeroblob({4 * WIDE}) WHERE movement = 2"],
+        "a movement that does not move",
     ),
     "stamps that stand still": (
-        ["UPDATE raw SET times = zeroblob(length(times)) WHERE movement = 8"], "time stamps that do not lead",
+        ["UPDATE raw SET times = zeroblob(length(times)) WHERE movement = 8"],
+        "time stamps that do not lead",
     ),
     "stamps that are NaN": (
-        ["UPDATE raw SET times = CAST(replace(hex(zeroblob(length(times) / 4)), '00', char(255)) AS BLOB) WHERE movement = 8"],
-        "wrong size|time stamps that do not lead",
+        [
+            "UPDATE raw SET times = replace(hex(zeroblob(length(times) / 2)), '0', char(127)) WHERE movement = 8",
+            "UPDATE raw SET times = CAST(times AS BLOB) WHERE movement = 8",
+        ],
+        "time stamps that do not lead",
     ),
     "stamps that go on after the end": (
-        ["UPDATE movement SET duration = duration / 2 WHERE id = 8"], "time stamps that do not lead",
+        ["UPDATE movement SET duration = duration / 2 WHERE id = 8"],
+        "time stamps that do not lead",
     ),
     "features that are NaN": (
-        [("UPDATE feature SET rows = ? WHERE movement = 2", (floats(np.float32, 9, size=600),))], "not finite",
+        [("UPDATE feature SET rows = ? WHERE movement = 2", (floats(np.float32, 9, size=600),))],
+        "not finite",
     ),
     "features of other size": (["UPDATE feature SET rows = zeroblob(8) WHERE movement = 2"], "features .* wrong size"),
     "weights that are infinite": (
@@ -234,61 +287,80 @@ ROWS = {
         "not finite",
     ),
     "a boundary that is NaN": (
-        [("UPDATE primitive SET boundary = ? WHERE movement = 2", (floats(np.float64, 3, size=8),))], "not finite",
+        [("UPDATE primitive SET boundary = ? WHERE movement = 2", (floats(np.float64, 3, size=8),))],
+        "not finite",
     ),
-    "the samples of nobody": (["UPDATE raw SET movement = 99 WHERE movement = 2"], "samples of movement 2: not there|refers to"),
+    "the samples of nobody": (
+        ["UPDATE raw SET movement = 99 WHERE movement = 2"],
+        "samples of movement 2: not there|refers to",
+    ),
     "dimensions of text": (["UPDATE meta SET value = 'two' WHERE key = 'n_dims'"], "how many dimensions .* 'two'"),
     "no dimensions": (["UPDATE meta SET value = '0' WHERE key = 'n_dims'"], "how many dimensions .* '0'"),
     "dimensions below zero": (["UPDATE meta SET value = '-2' WHERE key = 'n_dims'"], "how many dimensions .* '-2'"),
     "dimensions without end": (["UPDATE meta SET value = '99999999999' WHERE key = 'n_dims'"], "how many dimensions"),
     "other dimensions": (["UPDATE meta SET value = '3' WHERE key = 'n_dims'"], "of the wrong size"),
-    "dimensions not said": (["DELETE FROM meta WHERE key = 'n_dims'"], "row n_dims of table meta: not there|wrong size"),
+    "dimensions not said": (
+        ["DELETE FROM meta WHERE key = 'n_dims'"],
+        "row n_dims of table meta: not there|wrong size",
+    ),
     "more about the library": (["INSERT INTO meta VALUES ('evil', '1', 0)"], "nothing but .* got 'evil'"),
-    "no id": (["DELETE FROM meta WHERE key = 'id'"], "says|specification|id"),
-    "a specification that is no JSON": (["UPDATE meta SET value = '{' WHERE key = 'dmp'"], "specification that does not fit"),
-    "a specification that is a list": (["UPDATE meta SET value = '[]' WHERE key = 'recognizer'"], "specification that does not fit"),
+    "no id": (["DELETE FROM meta WHERE key = 'id'"], "its specification, as"),
+    "a specification that is no JSON": (
+        ["UPDATE meta SET value = '{' WHERE key = 'dmp'"],
+        "specification that does not fit",
+    ),
+    "a specification that is a list": (
+        ["UPDATE meta SET value = '[]' WHERE key = 'recognizer'"],
+        "specification that does not fit",
+    ),
     "a specification nested without end": (
-        [("UPDATE meta SET value = ? WHERE key = 'recognizer'", ("[" * 100_000,))], "specification that does not fit",
+        [("UPDATE meta SET value = ? WHERE key = 'recognizer'", ("[" * 100_000,))],
+        "specification that does not fit",
     ),
     "points without end": (
-        ["UPDATE meta SET value = json_set(value, '$.representations[0].n_points', 1000000000) WHERE key = 'recognizer'"],
+        [_set("recognizer", "representations[0].n_points", "1000000000")],
         "specification that does not fit .*n_points",
     ),
     "points of text": (
-        ["UPDATE meta SET value = json_set(value, '$.representations[0].n_points', 'x') WHERE key = 'recognizer'"],
+        [_set("recognizer", "representations[0].n_points", "'x'")],
         "specification that does not fit .*n_points",
     ),
     "basis functions without end": (
-        ["UPDATE meta SET value = json_set(value, '$.n_basis', 1000000000) WHERE key = 'dmp'"], "specification .*n_basis",
+        [_set("dmp", "n_basis", "1000000000")],
+        "specification .*n_basis",
     ),
     "a stiffness that is none": (
-        ["UPDATE meta SET value = json_set(value, '$.representations[1].stiffness', -1) WHERE key = 'recognizer'"],
+        [_set("recognizer", "representations[1].stiffness", "-1")],
         "specification that does not fit .*stiffness",
     ),
     "an angle of text": (
-        ["UPDATE meta SET value = json_set(value, '$.max_angle', 'wide') WHERE key = 'recognizer'"], "specification .*max_angle",
+        [_set("recognizer", "max_angle", "'wide'")],
+        "specification .*max_angle",
     ),
     "a scale that is none": (
-        ["UPDATE meta SET value = json_set(value, '$.scale', 'evil') WHERE key = 'recognizer'"], "specification .*scale",
+        [_set("recognizer", "scale", "'evil'")],
+        "specification .*scale",
     ),
     "a mean that is none": (
-        ["UPDATE meta SET value = json_set(value, '$.mean', 'evil') WHERE key = 'recognizer'"], "specification .*mean",
+        [_set("recognizer", "mean", "'evil'")],
+        "specification .*mean",
     ),
     "a classifier that is none": (
-        ["UPDATE meta SET value = json_set(value, '$.classifier', 'evil') WHERE key = 'recognizer'"], "specification .*classifier",
+        [_set("recognizer", "classifier", "'evil'")],
+        "specification .*classifier",
     ),
     "weights of text": (
-        ["UPDATE meta SET value = json_set(value, '$.weights', json('[1, \"x\", 2]')) WHERE key = 'recognizer'"],
+        [_set("recognizer", "weights", "json('[1, \"x\", 2]')")],
         "specification that does not fit",
     ),
     "no representation": (
-        ["UPDATE meta SET value = json_set(value, '$.representations', json('[]')) WHERE key = 'recognizer'"],
+        [_set("recognizer", "representations", "json('[]')")],
         "specification that does not fit",
     ),
     "options that are no JSON": (["UPDATE source SET options = 'a=b' WHERE id = 1"], "options that are no JSON object"),
     "a path of bytes": (["UPDATE source SET path = x'2f' WHERE id = 1"], "path is not text"),
     "a size below zero": (["UPDATE source SET size = -5 WHERE id = 1"], "size is not a whole number from 0"),
-}  # fmt: skip
+}
 
 _ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) AS id FROM n"
 
@@ -298,12 +370,14 @@ DEFINITIONS = {
     "a trigger on updates": (["CREATE TRIGGER t BEFORE UPDATE ON movement BEGIN SELECT RAISE(IGNORE); END"], ()),
     "a view beside the tables": ([f"CREATE VIEW more AS {_ENDLESS}"], ()),
     "an endless view for a table": (
-        ["ALTER TABLE version RENAME TO kept", f"CREATE VIEW version AS {_ENDLESS.replace('AS id', 'AS id, 1 AS at')}"], (),
+        ["ALTER TABLE version RENAME TO kept", f"CREATE VIEW version AS {_ENDLESS.replace('AS id', 'AS id, 1 AS at')}"],
+        (),
     ),
     "a table more": (["CREATE TABLE evil (a)"], ()),
     "a virtual table": (["CREATE VIRTUAL TABLE evil USING fts5(a)"], ()),
     "a virtual table of no module": (
-        (), ["INSERT INTO sqlite_master VALUES ('table', 'v', 'v', 0, 'CREATE VIRTUAL TABLE v USING evil(a)')"],
+        (),
+        ["INSERT INTO sqlite_master VALUES ('table', 'v', 'v', 0, 'CREATE VIRTUAL TABLE v USING evil(a)')"],
     ),
     "statistics": (["ANALYZE"], ()),
     "a sequence": (["CREATE TABLE evil (a INTEGER PRIMARY KEY AUTOINCREMENT)", "DROP TABLE evil"], ()),
@@ -312,34 +386,49 @@ DEFINITIONS = {
     "an index less": (["DROP INDEX member_now"], ()),
     "a table less": (["DROP TABLE feature"], ()),
     "a column more": (["ALTER TABLE movement ADD COLUMN evil"], ()),
-    "a computed column": (["ALTER TABLE movement ADD COLUMN evil AS (randomblob(1000000000))"], ()),
+    "a computed column": (["ALTER TABLE movement ADD COLUMN evil AS (zeroblob(1000000000))"], ()),
     "a default that computes": (["ALTER TABLE source ADD COLUMN evil DEFAULT 'x'"], ()),
     "a table without row ids": (
-        (), ["UPDATE sqlite_master SET sql = sql || ' WITHOUT ROWID' WHERE name = 'feature'"],
+        (),
+        ["UPDATE sqlite_master SET sql = sql || ' WITHOUT ROWID' WHERE name = 'feature'"],
     ),
     "strict tables": ((), ["UPDATE sqlite_master SET sql = sql || ' STRICT' WHERE name = 'member'"]),
     "a check that calls a function": (
-        (), ["UPDATE sqlite_master SET sql = replace(sql, 'how IN', 'load_extension(''x'') OR how IN') WHERE name = 'member'"],
+        (),
+        [_text("member", "how IN", "load_extension(''x'') OR how IN")],
     ),
     "a collation that is unknown": (
-        (), ["UPDATE sqlite_master SET sql = replace(sql, 'name TEXT NOT NULL', 'name TEXT COLLATE evil NOT NULL') "
-             "WHERE name = 'symbol_state'"],
+        (),
+        [
+            "UPDATE sqlite_master SET sql = replace(sql, 'name TEXT NOT NULL', 'name TEXT COLLATE evil NOT NULL') "
+            "WHERE name = 'symbol_state'"
+        ],
     ),
     "a collation that is blind": (
-        (), ["UPDATE sqlite_master SET sql = replace(sql, '(name)', '(name COLLATE NOCASE)') WHERE name = 'symbol_name'"],
+        (),
+        [_text("symbol_name", "(name)", "(name COLLATE NOCASE)")],
     ),
-    "no uniqueness": ((), ["UPDATE sqlite_master SET sql = replace(sql, 'UNIQUE ', '') WHERE name = 'member_now'"]),
-    "another blank": ((), ["UPDATE sqlite_master SET sql = replace(sql, ', value', ',  value') WHERE name = 'meta'"]),
+    "no uniqueness": ((), [_text("member_now", "UNIQUE ", "")]),
+    "another blank": ((), [_text("meta", ", value", ",  value")]),
     "names that are exchanged": (
-        (), ["UPDATE sqlite_master SET name = 'raw', tbl_name = 'raw', sql = replace(sql, 'TABLE primitive', 'TABLE raw') "
-             "WHERE name = 'primitive'"],
+        (),
+        [
+            "UPDATE sqlite_master SET name = 'raw', tbl_name = 'raw', "
+            "sql = replace(sql, 'TABLE primitive', 'TABLE raw') WHERE name = 'primitive'"
+        ],
     ),
     "pages that are exchanged": (
-        (), ["UPDATE sqlite_master SET rootpage = (SELECT rootpage FROM sqlite_master WHERE name = 'raw') "
-             "WHERE name = 'primitive'"],
+        (),
+        [
+            "UPDATE sqlite_master SET rootpage = (SELECT rootpage FROM sqlite_master WHERE name = 'raw') "
+            "WHERE name = 'primitive'"
+        ],
     ),
     "a page that is not there": ((), ["UPDATE sqlite_master SET rootpage = 99999 WHERE name = 'raw'"]),
     "a definition of nothing": ((), ["UPDATE sqlite_master SET sql = NULL WHERE name = 'raw'"]),
     "a definition that is no SQL": ((), ["UPDATE sqlite_master SET sql = 'CREATE TABLE raw (' WHERE name = 'raw'"]),
-    "a definition of bytes": ((), ["UPDATE sqlite_master SET sql = CAST(x'435245ff' AS TEXT) WHERE name = 'source_sha256'"]),
-}  # fmt: skip
+    "a definition of bytes": (
+        (),
+        ["UPDATE sqlite_master SET sql = CAST(x'435245ff' AS TEXT) WHERE name = 'source_sha256'"],
+    ),
+}

@@ -6,7 +6,6 @@ with what was expected of them.
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.rows import Row
+from kineme.library.rows import Row, parsed
 from kineme.validation import Array
 
 Strange = Iterator[tuple[Any, str]]
@@ -22,20 +21,6 @@ Strange = Iterator[tuple[Any, str]]
 _SLACK = 1e-5  # of the duration: where the last stamp, in single precision, may be
 
 _FINITE = "numbers that are not finite"
-
-
-def parsed(text: str) -> Any:
-    """JSON as plain data.
-
-    Raises
-    ------
-    ValueError
-        It is none, or nested so deeply that nobody wrote it.
-    """
-    try:
-        return json.loads(text)
-    except RecursionError as error:
-        raise ValueError("nested too deeply") from error
 
 
 def _version(rows: Sequence[Row]) -> Strange:

@@ -6,7 +6,6 @@ Against The Dark Arts", sqlite.org/security.html.
 
 from __future__ import annotations
 
-import os
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -20,6 +19,11 @@ _SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # a file may take this long, and longer
 #: that is only read.
 _OFF = ("SQLITE_DBCONFIG_ENABLE_TRIGGER", "SQLITE_DBCONFIG_ENABLE_VIEW", "SQLITE_DBCONFIG_TRUSTED_SCHEMA")
 _ON = ("SQLITE_DBCONFIG_DEFENSIVE",)
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a database and of its log."""
+    return sum(one.stat().st_size for one in (path, path.with_name(path.name + "-wal")) if one.exists())
 
 
 def defend(connection: sqlite3.Connection) -> None:
@@ -40,16 +44,15 @@ def defend_foreign(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _switch(connection: sqlite3.Connection, names: tuple[str, ...], on: bool) -> None:
-    setconfig = getattr(connection, "setconfig", None)
-    for name in names if setconfig is not None else ():
-        setconfig(getattr(sqlite3, name), on)
+    if setconfig := getattr(connection, "setconfig", None):
+        for name in names:
+            setconfig(getattr(sqlite3, name), on)
 
 
 @contextmanager
 def limited(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
     """Interrupt what takes longer than reading every byte of the file could: pages that lead in circles never end."""
-    size = sum(os.path.getsize(one) for one in (path, path.with_name(path.name + "-wal")) if one.exists())
-    end = time.monotonic() + _SECONDS + size / _BYTES_PER_SECOND
+    end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
     connection.set_progress_handler(lambda: time.monotonic() > end, _STEPS)
     try:
         yield

@@ -8,9 +8,9 @@ import zlib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 from kineme.library.checks import GOOD
-from kineme.library.schema import BLOBS, COLUMNS
+from kineme.library.schema import BLOBS, COLUMNS, MAX_TEXT
 
 Row = tuple[Any, ...]
 
@@ -86,6 +86,37 @@ def strange(table: str, row: Row) -> DataError:
     return damage(f"{row_name(table, row[0])} as a library stores it", "values that no library holds")
 
 
+def parsed(text: str) -> Any:
+    """JSON as plain data.
+
+    Raises
+    ------
+    ValueError
+        It is none, or nested so deeply that nobody wrote it.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("expected JSON, got some that is nested too deeply") from error
+
+
+def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
+    """The JSON of a column, which must be a list or an object.
+
+    Raises
+    ------
+    DataError
+        It is something else; the message names the row.
+    """
+    try:
+        value = parsed(row[COLUMNS[table].index(column)])
+    except ValueError:
+        value = None
+    if not isinstance(value, kind):
+        raise strange(table, row)
+    return value
+
+
 def damage(expected: str, got: str) -> DataError:
     """The error for anything that is not as stored."""
     return DataError(
@@ -125,4 +156,14 @@ def next_key(connection: sqlite3.Connection, table: str) -> int:
 
 def as_text(value: Any) -> str:
     """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
-    return str(value).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
+    check_size("a name", text, MAX_TEXT)
+    return text
+
+
+def check_size(what: str, text: str, most: int) -> None:
+    """Refuse a text that no library holds."""
+    if len(text) > most // 4 and len(text.encode()) > most:
+        raise SpecificationError(
+            f"expected {what} of at most {most:,} bytes, got {len(text.encode()):,}: {text[:40]!r}...; shorten it"
+        )
