@@ -146,7 +146,7 @@ def reject(library: ActionLibrary, proposal: Proposal) -> None:
 
 def _rejected_before(library: ActionLibrary, ids: Ids) -> list[NDArray[np.intp]]:
     """Places among `ids` of what was rejected, per rejection."""
-    rejected = [one.detail["movements"] for one in library.history() if one.action == "reject"]
+    rejected = [one.detail.get("movements", []) for one in library.history() if one.action == "reject"]
     return [np.flatnonzero(np.isin(ids, one)) for one in rejected]
 
 

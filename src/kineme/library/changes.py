@@ -9,8 +9,8 @@ from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.read import as_ids
-from kineme.library.rows import Row, among, listed, next_key, select
-from kineme.library.schema import COLUMNS
+from kineme.library.rows import Row, among, check_size, listed, next_key, parsed_column, select
+from kineme.library.schema import COLUMNS, MAX_DOCUMENT
 from kineme.library.store import NOW, Change, Store
 from kineme.library.symbols import HOW, check_name, join, make, state_of
 from kineme.validation import check_choice, check_number
@@ -37,8 +37,10 @@ def describe(store: Store, who: str, **values: Any) -> None:
     if (threshold := values.get("threshold")) is not None:
         check_number("threshold", threshold)
         values["threshold"] = float(threshold)
-    if "description" in values and not isinstance(values["description"], str):
-        raise SpecificationError(f"expected a description, got {values['description']!r}")
+    if "description" in values:
+        if not isinstance(values["description"], str):
+            raise SpecificationError(f"expected a description, got {values['description']!r}")
+        check_size("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, written as JSON
     with store.writing("describe", {"symbol": who, **values}) as change:
         _replace_state(change, state_of(change.connection, who, NOW), **values)
 
@@ -84,7 +86,9 @@ def merge(store: Store, names: Sequence[str], into: str) -> None:
             key = make(change, into, parents)
         else:
             key = target[1]
-            _replace_state(change, target, parents=json.dumps([*json.loads(target[6]), *parents]))
+            _replace_state(
+                change, target, parents=json.dumps([*parsed_column("symbol_state", target, "parents", list), *parents])
+            )
         for state in merged:
             members = _leave(change, "symbol = :key", {"key": state[1]})
             _rejoin(change, members, key)

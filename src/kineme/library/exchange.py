@@ -8,9 +8,11 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from kineme.errors import DataError
-from kineme.library.connection import FILE, check_kind, connect
+from kineme.library.connection import FILE, check_alone, check_kind, connect, migrate
 from kineme.library.faults import in_plain_words
-from kineme.library.placing import placed
+from kineme.library.guard import defend_foreign, limited
+from kineme.library.placing import LOGS, placed
+from kineme.library.schema import SCHEMA_VERSION
 from kineme.library.store import Store
 from kineme.library.verify import verify
 
@@ -36,31 +38,62 @@ def export(store: Store, path: str | Path) -> Path:
 
 
 def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
-    """Make a library in `folder` of a file that `export` wrote, once every byte of it has been checked.
+    """Make a library in `folder` of a file that `export` wrote, once every byte and every value has been checked.
+
+    The file may come from anywhere: a copy of it is looked at, by a connection that nothing in it can make act, and
+    becomes a library only if it defines and holds nothing but what a library does.
 
     Raises
     ------
     DataError
-        There is a library already; the file is no export, is a library in use, is damaged, or of a later schema
-        version.
+        There is a library already; the file is no export, is a library in use, is damaged, holds what no library does,
+        or is of a later schema version.
     """
     source, target = Path(path), Path(folder) / FILE
-    if not source.is_file():
-        raise DataError(f"expected an exported library at {source}, found no file there")
-    log = source.with_name(f"{source.name}-wal")
-    if log.exists() and log.stat().st_size:  # the newest changes are there, and the file alone would be an older state
-        raise DataError(
-            f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and import "
-            "that file"
-        )
+    _check_file(source)
     Path(folder).mkdir(parents=True, exist_ok=True)
+    check_alone(target)
     with _new(target) as beside:
+        _check_room(source, target)
         shutil.copyfile(source, beside)
-        with in_plain_words(source, wait), closing(connect(beside, "rw", wait)) as copy:
-            check_kind(copy, source)
-            copy.execute("PRAGMA journal_mode = WAL")
-        _check(beside, source, wait)
+        with _named(beside, source), in_plain_words(source, wait):
+            _check_structure(beside, source, wait)
+            with closing(connect(beside, "rw", wait)) as copy:
+                if check_kind(copy, source) < SCHEMA_VERSION:
+                    migrate(copy, source)
+                copy.execute("PRAGMA journal_mode = WAL")
+            _check(beside, source, wait)
     return target
+
+
+def _check_file(source: Path) -> None:
+    """Refuse what is not one whole file."""
+    if not source.is_file():
+        got = "something else" if source.exists() else "no file"
+        raise DataError(f"expected an exported library at {source}, found {got} there")
+    for log in (source.with_name(source.name + end) for end in LOGS):
+        if log.exists() and log.stat().st_size:  # changes are there, and the file alone would be another state
+            raise DataError(
+                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
+                "import that file"
+            )
+
+
+def _check_room(source: Path, target: Path) -> None:
+    """Refuse a file that would fill the disk; one with holes may be larger than the disk it comes from."""
+    size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
+    if size > free:
+        raise DataError(f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some")
+
+
+def _check_structure(beside: Path, source: Path, wait: float) -> None:
+    """Refuse definitions that are not ours, and pages that do not form tables, before anything in them is read."""
+    with closing(connect(beside, "ro", wait)) as copy, limited(copy, beside):
+        defend_foreign(copy, beside)
+        check_kind(copy, source)
+        found = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
+        if found != "ok":
+            raise _refusal(source, 1, f"the file: {' '.join(found.split())}")
 
 
 def _check(beside: Path, source: Path, wait: float) -> None:
@@ -70,10 +103,26 @@ def _check(beside: Path, source: Path, wait: float) -> None:
     finally:
         store.close()
     if problems:
-        raise DataError(
-            f"expected {source} as it was exported, got damaged bytes ({len(problems)} problems, the first: "
-            f"{problems[0]}); nothing was imported: export it again, or take it from a backup"
-        )
+        raise _refusal(source, len(problems), str(problems[0]))
+
+
+def _refusal(source: Path, n: int, first: str) -> DataError:
+    found = "1 problem" if n == 1 else f"{n} problems, the first"
+    return DataError(
+        f"expected {source} as it was exported, got damaged bytes, or values that no library holds ({found}: {first}); "
+        "nothing was imported: export it again, or take it from a backup that you trust"
+    )
+
+
+@contextmanager
+def _named(beside: Path, source: Path) -> Iterator[None]:
+    """Errors name the file that the user knows, not the copy that is looked at."""
+    try:
+        yield
+    except DataError as error:
+        if str(beside) not in str(error):
+            raise
+        raise DataError(str(error).replace(str(beside), str(source))) from error
 
 
 @contextmanager

@@ -37,6 +37,11 @@ _WORDS = {
         "open it with read_only=True; where a crash has left a log (-wal) beside it, reading needs to write once"
     ),
     sqlite3.SQLITE_CORRUPT: _DAMAGED,
+    sqlite3.SQLITE_INTERRUPT: (
+        "expected {path} to be read within a time that its size allows, got a file whose pages do not end; do not use "
+        "it: take it from a backup or an export that you trust"
+    ),
+    sqlite3.SQLITE_TOOBIG: "expected {path} to hold no value larger than itself, got one ({error}): damaged bytes",
     sqlite3.SQLITE_NOTADB: "expected {path} to be a library, got a file that is no database ({error})",
 }
 _WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kineme.library.rows import select
+from kineme.library.rows import parsed_column, select
 from kineme.library.store import Store
 
 
@@ -37,4 +36,4 @@ def history(store: Store) -> tuple[Version, ...]:
     """Every change up to the version shown, the first one first."""
     with store.reading() as connection:
         rows = select(connection, "version", "id <= :v", {"v": store.as_of})
-    return tuple(Version(key, at, action, json.loads(detail)) for key, at, action, detail, *_ in rows)
+    return tuple(Version(row[0], row[1], row[2], parsed_column("version", row, "detail", dict)) for row in rows)

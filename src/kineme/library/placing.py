@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_COMPANIONS = ("", "-wal", "-shm", "-journal")  # files that a database may have beside it
+LOGS = ("-wal", "-journal")  # ends of the names of the files beside a database from which SQLite changes it
+_COMPANIONS = ("", *LOGS, "-shm")
 
 
 @contextmanager

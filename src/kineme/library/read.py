@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, damage, damaged, listed, select
+from kineme.library.rows import ALIVE, Row, among, damage, damaged, listed, select, strange
 from kineme.library.schema import COLUMNS
 from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
@@ -97,24 +97,53 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstra
     """The recordings, in the order of `ids`."""
     wanted, order = _sorted(ids)
     about = records(store, wanted)
-    lengths = np.array([one["n_samples"] for one in about])
+    d, lengths = store.n_dims or 0, np.array([one["n_samples"] for one in about])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
+    _check_total(store, about, 4 * d * int(offsets[-1]))
     t0, durations = (np.array([one[name] for one in about]) for name in ("t0", "duration"))
-    positions = np.empty((offsets[-1], store.n_dims or 0))
+    positions = np.empty((offsets[-1], d))
     stamps: dict[int, bytes] = {}
     done = 0
     for rows in _chunks(store, "raw", "movement", wanted):
         part = slice(done, done + len(rows))
-        starts = np.frombuffer(b"".join(row[1] for row in rows)).reshape(len(rows), -1)
-        relative = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, starts.shape[1])
-        np.add(relative, np.repeat(starts, lengths[part], axis=0), out=positions[offsets[done] : offsets[part.stop]])
+        for row, n in zip(rows, lengths[part].tolist(), strict=True):
+            if len(row[1]) != 8 * d or len(row[2]) != 4 * d * n or (row[3] and len(row[3]) not in {4 * n, 8 * n}):
+                raise strange("raw", row)
+        starts = np.frombuffer(b"".join(row[1] for row in rows)).reshape(len(rows), d)
+        relative = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d)
+        block = positions[offsets[done] : offsets[part.stop]]
+        np.add(relative, np.repeat(starts, lengths[part], axis=0), out=block)
+        _check_finite("raw", rows, block, lengths[part])
         stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
         done = part.stop
     times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
-    block = Movements(positions, offsets, durations, times, None, _names(about))
+    _check_increasing(times, offsets, wanted)
+    found = Movements(positions, offsets, durations, times, None, _names(about))
     if not np.array_equal(wanted, ids):
-        block = block.take(order)
-    return Demonstrations.of_movements(replace(block, labels=_labels(labels)))
+        found = found.take(order)
+    return Demonstrations.of_movements(replace(found, labels=_labels(labels)))
+
+
+def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
+    """Refuse to make room for more samples than the files could hold."""
+    if size > store.size:
+        raise strange("movement", (max(about, key=lambda one: int(one["n_samples"]))["id"],))
+
+
+def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths: Any = 1) -> None:
+    """Refuse numbers that are not finite: as many rows of the block belong to each row as its length says."""
+    if not (good := np.isfinite(block).all(axis=1)).all():
+        first = np.cumsum(np.broadcast_to(lengths, len(rows)))
+        raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
+
+
+def _check_increasing(times: Array | None, offsets: NDArray[np.intp], keys: Ids) -> None:
+    if times is None:
+        return
+    increasing = times[1:] > times[:-1]
+    increasing[offsets[1:-1] - 1] = True  # from one movement to the next
+    if not increasing.all():
+        raise strange("raw", (keys[int(np.searchsorted(offsets, np.argmin(increasing), side="right")) - 1],))
 
 
 def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
@@ -134,7 +163,9 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
     width, done = sum(store.specification.widths(store.n_dims or 0)), 0
     found = np.empty((len(wanted), width), dtype=np.float32)
     for rows in _chunks(store, "feature", "movement", wanted):
-        found[done : done + len(rows)] = np.frombuffer(b"".join(row[1] for row in rows), np.float32).reshape(-1, width)
+        block = found[done : done + len(rows)]
+        block[:] = _joined("feature", rows, 1, np.float32, width)
+        _check_finite("feature", rows, block)
         done += len(rows)
     return found if np.array_equal(wanted, ids) else found[order]
 
@@ -145,8 +176,11 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitiv
     dmp, d = store.specification.dmp, store.n_dims or 0
     about = records(store, ids)
     rows = [row for chunk in _chunks(store, "primitive", "movement", wanted) for row in chunk]
-    boundary = np.frombuffer(b"".join(row[1] for row in rows)).reshape(-1, 4, d)[order]
-    weights = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d, dmp.n_basis)[order]
+    boundary = _joined("primitive", rows, 1, np.float64, 4 * d)
+    weights = _joined("primitive", rows, 2, np.float32, d * dmp.n_basis)
+    for block in (boundary, weights):
+        _check_finite("primitive", rows, block)
+    boundary, weights = boundary.reshape(-1, 4, d)[order], weights.reshape(-1, d, dmp.n_basis)[order]
     return Primitives(
         dmp,
         scaled_weights=weights.astype(np.float64),
@@ -158,6 +192,15 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitiv
         labels=_labels(labels),
         names=_names(about),
     )
+
+
+def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
+    """The bytes of a column, (rows, width)."""
+    size = np.dtype(kind).itemsize * width
+    for row in rows:
+        if len(row[column]) != size:
+            raise strange(table, row)
+    return np.frombuffer(b"".join(row[column] for row in rows), kind).reshape(-1, width)
 
 
 def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:

@@ -8,8 +8,9 @@ import zlib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kineme.errors import DataError
-from kineme.library.schema import BLOBS, COLUMNS
+from kineme.errors import DataError, SpecificationError
+from kineme.library.checks import GOOD
+from kineme.library.schema import BLOBS, COLUMNS, MAX_TEXT
 
 Row = tuple[Any, ...]
 
@@ -51,25 +52,69 @@ def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> N
 def select(
     connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
 ) -> list[Row]:
-    """Rows of a table ordered by key, seals checked and left out.
+    """Rows of a table ordered by key, seals and values checked, seals left out.
 
     Raises
     ------
     DataError
-        A row is not what was stored; the message names it.
+        A row is not what was stored, or holds what no library does; the message names it.
     """
     columns = COLUMNS[table]
-    query = f"SELECT {', '.join(columns)}, crc FROM {table} WHERE {where} ORDER BY {columns[0]}"
+    query = f"SELECT {', '.join(columns)}, crc, {GOOD[table]} FROM {table} WHERE {where} ORDER BY {columns[0]}"
     rows = connection.execute(query, parameters or {}).fetchall()
     for row in rows:
-        if seal(table, row[:-1]) != row[-1]:
-            raise damaged(table, row)
-    return [row[:-1] for row in rows]
+        if not row[-1] or seal(table, row[:-2]) != row[-2]:
+            raise damaged(table, row) if not sealed(table, row[:-1]) else strange(table, row)
+    return [row[:-2] for row in rows]
+
+
+def sealed(table: str, row: Row) -> bool:
+    """Whether a row fits its seal, which is its last column."""
+    try:
+        return seal(table, row[:-1]) == row[-1]
+    except TypeError:  # a value of another type than was stored
+        return False
 
 
 def damaged(table: str, row: Row) -> DataError:
     """The error for a row whose seal does not fit."""
     return damage(f"{row_name(table, row[0])} as stored", "damaged bytes")
+
+
+def strange(table: str, row: Row) -> DataError:
+    """The error for a row that fits its seal, but holds what no library does."""
+    return damage(f"{row_name(table, row[0])} as a library stores it", "values that no library holds")
+
+
+def parsed(text: str) -> Any:
+    """JSON as plain data.
+
+    Raises
+    ------
+    ValueError
+        It is none, or nested so deeply that nobody wrote it.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("expected JSON, got some that is nested too deeply") from error
+
+
+def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
+    """The JSON of a column, which must be a list or an object.
+
+    Raises
+    ------
+    DataError
+        It is something else; the message names the row.
+    """
+    try:
+        value = parsed(row[COLUMNS[table].index(column)])
+    except ValueError:
+        value = None
+    if not isinstance(value, kind):
+        raise strange(table, row)
+    return value
 
 
 def damage(expected: str, got: str) -> DataError:
@@ -111,4 +156,14 @@ def next_key(connection: sqlite3.Connection, table: str) -> int:
 
 def as_text(value: Any) -> str:
     """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
-    return str(value).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
+    check_size("a name", text, MAX_TEXT)
+    return text
+
+
+def check_size(what: str, text: str, most: int) -> None:
+    """Refuse a text that no library holds."""
+    if len(text) > most // 4 and len(text.encode()) > most:
+        raise SpecificationError(
+            f"expected {what} of at most {most:,} bytes, got {len(text.encode()):,}: {text[:40]!r}...; shorten it"
+        )

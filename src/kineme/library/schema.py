@@ -8,6 +8,7 @@ from __future__ import annotations
 
 APPLICATION_ID = 0x6B696E65  # "kine", in the header of the file
 SCHEMA_VERSION = 1
+MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # bytes of a name, and of a description or JSON
 PAGE_SIZE = 32768  # a row of features fills a seventh of it or less, so little of a page stays empty
 
 #: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
@@ -28,13 +29,17 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "member": ("id", "movement", "symbol", "how", "added", "removed"),
 }  # fmt: skip
 
+#: Keys of the table `meta`; the last one comes with the first movement.
+META = frozenset({"id", "recognizer", "dmp", "schema", "n_dims"})
+
 #: Tables of a key and bytes, one row per movement.
 BLOBS = ("raw", "primitive", "feature")
 
 #: Tables whose rows are alive or removed; each version says how many are alive, in columns of these names.
 COUNTED = {"movement": "movements", "member": "members", "symbol_state": "symbols"}
 
-#: What makes an empty file a library. Columns carry the type and the meaning of `COLUMNS`.
+#: What makes an empty file a library of version 1. Columns carry the type and the meaning of `COLUMNS`. Not a word may
+#: change, blanks included: SQLite keeps these texts, and a library is refused if its texts are others.
 CREATE = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
     """CREATE TABLE version (
@@ -75,5 +80,5 @@ CREATE = (
     "CREATE INDEX source_sha256 ON source (sha256)",
 )
 
-#: Schema version -> the statements that lead from it to the next one.
+#: Schema version -> the statements that lead from it to the next one, for a library that is there and for a new one.
 MIGRATIONS: dict[int, tuple[str, ...]] = {}

@@ -12,7 +12,7 @@ from kineme.errors import SpecificationError
 from kineme.library import read
 from kineme.library.calibrated import calibrate, sample_recognizer
 from kineme.library.index import Index, open_index, refreshed
-from kineme.library.rows import ALIVE, among, listed
+from kineme.library.rows import ALIVE, among, damage, damaged, listed
 from kineme.library.store import Store
 from kineme.recognition.answer import Answer, Neighbor, answers, is_one
 from kineme.recognition.recognizer import Recognizer
@@ -107,7 +107,12 @@ def members_of(store: Store) -> Members:
     """
     with store.reading() as connection:
         query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
-        pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
+        try:
+            pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
+        except (TypeError, ValueError) as error:
+            raise damage(
+                "movements and symbols as whole numbers in table member", f"something else ({error})"
+            ) from error
         if not len(pairs):
             raise SpecificationError(
                 f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
@@ -116,6 +121,8 @@ def members_of(store: Store) -> Members:
         keys, which = np.unique(pairs[:, 1], return_inverse=True)
         query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
         named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
+    if lost := set(keys.tolist()) - named.keys():
+        raise damaged("symbol", (min(lost),))
     names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
     owner = place[which]
     order = np.lexsort((pairs[:, 0], owner))

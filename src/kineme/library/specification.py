@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kineme.errors import DataError, KinemeError
+from kineme.errors import DataError, KinemeError, SpecificationError
+from kineme.library.rows import parsed
 from kineme.primitives.dmp import DMP
 from kineme.primitives.persistence import specification_from_dict, specification_to_dict
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.validation import check_choice, check_count, check_number
 
 if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
+
+_MOST = 100_000  # dimensions, points, basis functions: of more, one matrix would not fit into any memory
 
 #: The primitives of a library: a fit of the path itself, which replays what was shown.
 DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
@@ -68,17 +73,72 @@ class Specification:
         return {"recognizer": json.dumps(seen), "dmp": json.dumps(specification_to_dict(self.dmp))}
 
     @classmethod
-    def from_json(cls, meta: dict[str, str]) -> Specification:
-        """What `to_json` wrote; every parameter is checked as if a user had typed it."""
+    def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
+        """What `to_json` wrote into the library at `path`; every parameter is checked as if a user had typed it."""
         try:
-            seen = json.loads(meta["recognizer"])
+            seen, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
+            _check_sizes(seen, "recognizer")
+            _check_sizes(dmp, "dmp")
             seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
             if isinstance(weights := seen.get("weights"), list):
                 seen["weights"] = tuple(map(float, weights))
-            return cls(**seen, dmp=specification_from_dict(DMP, json.loads(meta["dmp"])))
-        except (KeyError, TypeError, ValueError) as error:
+            made = cls(**seen, dmp=specification_from_dict(DMP, dmp))
+            made.check()
+        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
             raise DataError(
-                f"expected a library that says how its movements are seen, got a specification that does not fit "
-                f"({reason}); take the file from a backup or an export"
+                f"expected {path} to say how its movements are seen, got a specification that does not fit ({reason}); "
+                "take the file from a backup or an export that you trust"
             ) from error
+        return made
+
+    def check(self) -> None:
+        """Refuse what no recognizer could be made with; a `DMP` has been checked when it was made."""
+        if not self.representations:
+            raise SpecificationError("expected at least one representation, got none")
+        for one in self.representations:
+            check_count("n_points", one.n_points, 2)
+            check_count("n_basis", one.n_basis, 3)
+            check_number("stiffness", one.stiffness, above=0.0)
+            check_number("ridge", one.ridge, least=0.0)
+        if self.max_angle is not None:
+            check_number("max_angle", self.max_angle, least=0.0)
+        if self.cutoff is not None:
+            check_number("cutoff", self.cutoff, above=0.0)
+        if not isinstance(self.translation, bool):
+            raise SpecificationError(f"expected translation to be true or false, got {self.translation!r}")
+        _ = self.normalization  # checks the scale
+        self._check_choices()
+
+    def _check_choices(self) -> None:
+        from kineme.recognition.classifiers import CLASSIFIERS
+        from kineme.recognition.similarity import LOG_MEANS
+
+        check_choice("mean", self.mean, list(LOG_MEANS))
+        check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
+        if isinstance(self.weights, str):
+            check_choice("weights", self.weights, ["auto", "equal"])
+        elif len(self.weights) != len(self.representations):
+            raise SpecificationError(f"expected {len(self.representations)} weights, got {len(self.weights)}")
+        else:
+            for weight in self.weights:
+                check_number("weights", weight, least=0.0)
+
+
+def _check_sizes(data: Any, name: str) -> None:
+    """Refuse whole numbers of which a matrix would fit into no memory: points, basis functions."""
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            _check_sizes(value, f"{name}.{key}")
+    elif isinstance(data, int) and abs(data) > _MOST:
+        raise SpecificationError(f"expected {name} to be at most {_MOST}, got {data}")
+
+
+def as_n_dims(text: str, path: Path) -> int:
+    """The number of dimensions, as the library at `path` keeps it."""
+    if not (text.isascii() and text.isdecimal() and len(text) <= len(str(_MOST)) and 0 < int(text) <= _MOST):
+        raise DataError(
+            f"expected {path} to say how many dimensions its movements have, from 1 to {_MOST}, got {text[:40]!r}; "
+            "take the file from a backup or an export that you trust"
+        )
+    return int(text)

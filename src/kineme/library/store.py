@@ -17,9 +17,10 @@ from typing import Any
 from kineme.errors import DataError, SpecificationError
 from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
+from kineme.library.guard import size_of
 from kineme.library.rows import Row, damage, damaged, insert, retire, select
-from kineme.library.schema import COUNTED, SCHEMA_VERSION
-from kineme.library.specification import Specification
+from kineme.library.schema import COUNTED, META, SCHEMA_VERSION
+from kineme.library.specification import Specification, as_n_dims
 
 NOW = (1 << 62) - 1  # later than every version: what is there now
 
@@ -97,7 +98,7 @@ class Store:
                 self._check_kind()
                 meta = self._checked_meta()
                 self.id = meta["id"]
-                self.specification = Specification.from_json(meta)
+                self.specification = Specification.from_json(meta, self.path)
                 self.as_of = self._checked_version(as_of)
             except BaseException:
                 self._reader.close()
@@ -127,12 +128,14 @@ class Store:
         """What the library says of itself, once the definitions of its tables have been found undamaged."""
         try:
             meta: dict[str, str] = dict(select(self._reader, "meta"))
-            if meta.get("schema") == schema_seal(self._reader):
+            if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(self._reader):
                 return meta
         except sqlite3.OperationalError as error:
             if "no such" not in str(error):  # table or column
                 raise
-        raise damage(f"the definitions of tables in {self.path} as they were stored", "damaged bytes")
+        raise damage(
+            f"the definitions of tables in {self.path}, and its specification, as they were stored", "damaged bytes"
+        )
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
@@ -144,6 +147,11 @@ class Store:
     def folder(self) -> Path:
         """Where the library is."""
         return self.path.parent
+
+    @property
+    def size(self) -> int:
+        """Bytes of the database and of its log."""
+        return size_of(self.path)
 
     @property
     def version(self) -> int:
@@ -158,7 +166,7 @@ class Store:
         """Dimensions that all movements share; None before the first one."""
         with self.reading() as connection:
             found = select(connection, "meta", "key = 'n_dims'")
-        return int(found[0][1]) if found else None
+        return as_n_dims(found[0][1], self.path) if found else None
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:

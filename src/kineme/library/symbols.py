@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, damage, damaged, listed, next_key, select
-from kineme.library.schema import COLUMNS
+from kineme.library.rows import ALIVE, Row, among, check_size, damage, damaged, listed, next_key, parsed_column, select
+from kineme.library.schema import COLUMNS, MAX_TEXT
 from kineme.library.store import Change, Moment, Store
 
 #: How a movement came to its symbol.
@@ -116,6 +116,7 @@ def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequen
     if lost := set(keys) - about.keys():
         raise damaged("symbol", (min(lost),))
     members = _members(connection, keys, moment)
+    parents = [tuple(parsed_column("symbol_state", row, "parents", list)) for row in states]
     return [
         Symbol(
             about[record["symbol"]][0],
@@ -124,11 +125,11 @@ def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequen
             members[record["symbol"]],
             record["prototype"],
             record["threshold"],
-            tuple(json.loads(record["parents"])),
+            above,
             about[record["symbol"]][1],
             record["added"],
         )
-        for record in records
+        for record, above in zip(records, parents, strict=True)
     ]
 
 
@@ -158,6 +159,7 @@ def check_name(name: Any) -> str:
         raise SpecificationError(
             f"expected a name in Unicode, got {name!r}, which holds half of a character; decode it again"
         ) from error
+    check_size("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
     return name

@@ -1,18 +1,24 @@
-"""Looking for damage: every page, every checksum, every reference, every size."""
+"""Looking for damage: every page, every checksum, every value, every reference, every size."""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
+from kineme.library.checks import ALL_GOOD, CHECKS
 from kineme.library.connection import connect
-from kineme.library.rows import Row, row_name, seal
-from kineme.library.schema import BLOBS, COLUMNS
+from kineme.library.contents import CONTENTS, samples
+from kineme.library.guard import limited
+from kineme.library.lives import lives
+from kineme.library.rows import Row, row_name, sealed
+from kineme.library.schema import BLOBS, COLUMNS, META
 from kineme.library.store import Store
 
 _SHOWN = 100  # messages of one check
+_BATCH_BYTES = 1 << 24  # of rows whose contents are looked at together
 
 
 @dataclass(frozen=True)
@@ -37,21 +43,25 @@ class Problem:
         return self.text
 
 
+Check = Callable[[sqlite3.Connection], Iterator[Problem]]
+
+
 def verify(store: Store) -> list[Problem]:
-    """All that is damaged, as it is at one moment; an empty list if nothing is."""
-    with closing(connect(store.path, "ro", store.wait)) as connection:
+    """All that is damaged or that no library holds, as it is at one moment; an empty list if nothing is."""
+    with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
         connection.execute("BEGIN")
-        checks: list[Callable[[sqlite3.Connection], Iterator[Problem]]] = [
+        checks: list[Check] = [
             _structure,
-            *(_seals(table) for table in COLUMNS),
+            *(_rows(table, store) for table in COLUMNS),
             _references,
             _completeness,
             _sizes(store),
         ]
-        return [problem for check in checks for problem in _all_of(check, connection)]
+        problems = [problem for check in checks for problem in _all_of(check, connection)]
+        return problems or _all_of(_lives, connection)  # rows are looked at together once each is as it should be
 
 
-def _all_of(check: Callable[[sqlite3.Connection], Iterator[Problem]], connection: sqlite3.Connection) -> list[Problem]:
+def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
     """What a check finds; that it cannot go on is a finding too."""
     found: list[Problem] = []
     try:
@@ -70,11 +80,23 @@ def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
             yield Problem("", None, f"the file: {' '.join(text.split())}")
 
 
-def _seals(table: str) -> Callable[[sqlite3.Connection], Iterator[Problem]]:
+def _rows(table: str, store: Store) -> Check:
+    """The seal of every row, its values, and what they hold; the last is not asked of rows that failed before."""
+
     def check(connection: sqlite3.Connection) -> Iterator[Problem]:
         try:
-            for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc FROM {table}"):
-                yield from _broken(table, row)
+            good: list[Row] = []
+            size = 0
+            for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
+                if not row[-1] or not sealed(table, row[:-1]):
+                    yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
+                    continue
+                good.append(row[:-2])
+                size += sum(len(value) for value in good[-1] if isinstance(value, bytes))
+                if size > _BATCH_BYTES:
+                    yield from _contents(connection, table, good, store)
+                    good, size = [], 0
+            yield from _contents(connection, table, good, store)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             yield Problem(table, None, f"table {table} cannot be read as a whole ({error})")
             yield from _one_by_one(connection, table)
@@ -82,13 +104,30 @@ def _seals(table: str) -> Callable[[sqlite3.Connection], Iterator[Problem]]:
     return check
 
 
-def _broken(table: str, row: Row) -> Iterator[Problem]:
-    try:
-        fits = seal(table, row[:-1]) == row[-1]
-    except (TypeError, UnicodeError):  # a value of another type than was stored
-        fits = False
-    if not fits:
-        yield Problem(table, row[0], f"{row_name(table, row[0])}: damaged bytes")
+def _broken(table: str, row: Row) -> list[Problem]:
+    """A row that does not fit its seal."""
+    return [] if sealed(table, row) else [Problem(table, row[0], f"{row_name(table, row[0])}: damaged bytes")]
+
+
+def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[Problem]:
+    """Which values of a row are none that a library holds."""
+    checks = CHECKS[table]
+    fits = ", ".join(f"({one.condition}) IS TRUE" for one in checks.values())
+    row = connection.execute(f"SELECT {fits} FROM {table} WHERE {COLUMNS[table][0]} IS ?", (key,)).fetchone()
+    for (column, one), good in zip(checks.items(), row or (), strict=False):
+        if not good:
+            yield Problem(table, key, f"{row_name(table, key)}: {column} is not {one.words}")
+
+
+def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
+    if not rows:
+        return
+    found = samples(connection, rows, store.n_dims or 0) if table == "raw" else CONTENTS.get(table, _nothing)(rows)
+    yield from (Problem(table, key, f"{row_name(table, key)}: holds {words}") for key, words in found)
+
+
+def _nothing(rows: Sequence[Row]) -> Iterator[tuple[Any, str]]:
+    yield from ()
 
 
 def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]:
@@ -114,12 +153,22 @@ def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
         query = f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table}) LIMIT {_SHOWN}"
         for (key,) in connection.execute(query):
             yield Problem(table, key, f"{row_name(table, key)}: not there")
-    last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM version").fetchone()
-    if last != n:
-        yield Problem("version", None, f"table version: expected {last} versions, got {n}")
+    for table in ("version", "movement"):
+        last, n = connection.execute(f"SELECT coalesce(max(id), 0), count(*) FROM {table}").fetchone()
+        if last != n:
+            yield Problem(table, None, f"table {table}: expected {last} rows, numbered from 1, got {n}")
+    keys = {key for (key,) in connection.execute("SELECT key FROM meta").fetchall()}
+    if strange := keys - META:
+        yield Problem("meta", min(strange), f"table meta: expected nothing but {sorted(META)}, got {min(strange)!r}")
+    if n and "n_dims" not in keys:
+        yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
 
 
-def _sizes(store: Store) -> Callable[[sqlite3.Connection], Iterator[Problem]]:
+def _lives(connection: sqlite3.Connection) -> Iterator[Problem]:
+    yield from (Problem(table, key, f"{row_name(table, key)}: {words}") for table, key, words in lives(connection))
+
+
+def _sizes(store: Store) -> Check:
     specification, d = store.specification, store.n_dims or 0
     n_features, n_weights = sum(specification.widths(d)), d * specification.dmp.n_basis
     expected = {

@@ -1,0 +1,216 @@
+"""Libraries that somebody has made to harm: refused on import, found by `verify`, and never obeyed."""
+
+from __future__ import annotations
+
+import lzma
+import os
+import shutil
+import sqlite3
+import time
+from contextlib import closing, suppress
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_victim
+from library_samples import contents
+
+from kineme import ActionLibrary, DataError, KinemeError
+from kineme.library import guard
+from kineme.library.connection import FILE
+
+
+@pytest.fixture(scope="module")
+def victim(tmp_path_factory):
+    """A good library, and its export."""
+    folder = make_victim(tmp_path_factory.mktemp("victim") / "actions")
+    with ActionLibrary(folder, read_only=True) as library:
+        assert library.verify() == []
+        library.export(folder.parent / "export")
+    return folder
+
+
+@pytest.fixture
+def export(victim, tmp_path):
+    """A copy of the export, to attack."""
+    return copy_of(victim.parent / "export", tmp_path / "export")
+
+
+def _opened(export, tmp_path):
+    """The attacked file as a library that was never imported."""
+    (tmp_path / "planted").mkdir()
+    shutil.copyfile(export, tmp_path / "planted" / FILE)
+    return tmp_path / "planted"
+
+
+def test_a_good_library_whose_checksums_were_computed_anew_is_a_good_library(export, victim, tmp_path):
+    """Else every attack below would be refused for its checksums alone."""
+    attack(export)
+    with ActionLibrary.import_(export, tmp_path / "copy") as copy, ActionLibrary(victim, read_only=True) as library:
+        assert contents(copy) == contents(library)
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_rows_that_no_library_holds_are_not_imported(export, tmp_path, name):
+    statements, words = ROWS[name]
+    try:
+        attack(export, statements)
+    except sqlite3.IntegrityError:  # the definitions alone forbid it
+        assert words is None
+        return
+    with pytest.raises(DataError, match=rf"(?s)expected .*{export}.*({words})"):
+        ActionLibrary.import_(export, tmp_path / "copy")
+    assert list((tmp_path / "copy").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_rows_that_no_library_holds_are_found_where_they_are_and_end_nothing_but_the_question(export, tmp_path, name):
+    statements, words = ROWS[name]
+    if words is None:
+        return
+    attack(export, statements)
+    try:
+        with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
+            assert library.verify()
+            for read in (contents, lambda it: it.recognize(it.movements()), lambda it: it.ground("wave")):
+                with suppress(KinemeError):
+                    read(library)
+    except DataError:
+        pass
+
+
+@pytest.mark.parametrize("name", DEFINITIONS)
+def test_definitions_that_are_not_ours_are_neither_imported_nor_opened(export, tmp_path, name):
+    definitions, master = DEFINITIONS[name]
+    attack(export, (), definitions, master)
+    with pytest.raises(DataError, match=r"to define the tables and indexes of a library and nothing else|damaged"):
+        ActionLibrary.import_(export, tmp_path / "copy")
+    assert list((tmp_path / "copy").iterdir()) == []
+    try:
+        with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
+            assert "pages" in name or "page" in name
+            assert library.verify()
+    except DataError:
+        pass
+
+
+def test_a_library_of_the_first_release_opens_imports_and_is_whole(tmp_path):
+    """Its definitions are what every later version must still write, word for word."""
+    kept = Path(__file__).with_name("library_0.1.0.xz")
+    (tmp_path / "export").write_bytes(lzma.decompress(kept.read_bytes()))
+    planted = _opened(tmp_path / "export", tmp_path)
+    with ActionLibrary(planted) as library, ActionLibrary.import_(tmp_path / "export", tmp_path / "copy") as copy:
+        assert library.verify() == copy.verify() == []
+        assert contents(library) == contents(copy)
+        assert [one.name for one in library.symbols()] == ["head", "naïve 'wave'; --", "tilt"]
+        assert library["tilt"].threshold == 0.25
+        copy.rename("tilt", "lean")
+        assert copy.verify() == []
+
+
+def _is_refused(path, tmp_path, words):
+    with pytest.raises(DataError, match=words):
+        ActionLibrary.import_(path, tmp_path / "copy")
+    assert not (tmp_path / "copy").exists() or list((tmp_path / "copy").iterdir()) == []
+
+
+def test_what_is_no_file_is_not_imported(tmp_path):
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    for name, found in {
+        "folder": "something else",
+        "pipe": "something else",
+        "loop": "no file",
+        "zero": "something",
+    }.items():
+        _is_refused(tmp_path / name, tmp_path, rf"expected an exported library at .*{name}, found {found}")
+
+
+def test_a_link_to_an_export_is_copied_never_moved_or_linked(export, victim, tmp_path):
+    (tmp_path / "link").symlink_to(export)
+    with ActionLibrary.import_(tmp_path / "link", tmp_path / "copy") as copy:
+        assert not (copy.folder / FILE).is_symlink()
+        copy.rename("wave", "other")
+    assert export.read_bytes() == (victim.parent / "export").read_bytes()
+
+
+@pytest.mark.parametrize("end", ["-wal", "-journal"])
+def test_an_export_with_a_log_beside_it_is_not_imported(export, tmp_path, end):
+    """With it the file would be another library."""
+    Path(f"{export}{end}").write_bytes(b"x" * 512)
+    _is_refused(export, tmp_path, rf"with changes beside it in export{end}; export it, and import that file")
+
+
+@pytest.mark.parametrize("end", ["-wal", "-journal"])
+def test_no_library_is_made_where_the_log_of_another_one_lies(export, tmp_path, end):
+    """SQLite would add those changes to the new library, and call it whole."""
+    left = tmp_path / "copy" / f"{FILE}{end}"
+    left.parent.mkdir()
+    left.write_bytes(b"x" * 512)
+    for make in (
+        lambda: ActionLibrary.import_(export, left.parent),
+        lambda: ActionLibrary(left.parent, create=True),
+    ):
+        with pytest.raises(DataError, match=rf"expected no log without its library, found .*{FILE}{end} and no"):
+            make()
+    assert [path.name for path in left.parent.iterdir()] == [left.name]
+
+
+def test_a_file_of_holes_does_not_fill_the_disk(export, tmp_path, monkeypatch):
+    os.truncate(export, 1 << 43)
+    monkeypatch.setattr(shutil, "copyfile", None)  # it must not come to that
+    _is_refused(export, tmp_path, r"expected room for the 8,796,093,022,208 bytes of .*export in .*copy, got")
+
+
+def test_texts_in_another_encoding_are_refused(export, tmp_path):
+    with closing(sqlite3.connect(export)) as one, closing(sqlite3.connect(tmp_path / "wide")) as other:
+        other.execute("PRAGMA encoding = 'UTF-16'")
+        for statement in one.iterdump():
+            other.execute(statement)
+        other.execute(f"PRAGMA application_id = {one.execute('PRAGMA application_id').fetchone()[0]}")
+        other.execute("PRAGMA user_version = 1")
+        other.commit()
+    _is_refused(tmp_path / "wide", tmp_path, r"libraries? and nothing else, got texts in UTF-16|got texts in UTF-16le")
+
+
+def test_pages_that_lead_to_each_other_do_not_hang(export, tmp_path, monkeypatch):
+    """A tree of ten levels, in which every branch is the same one: there is no end of rows, and no loop to be seen."""
+    _make_endless(export)
+    start = time.monotonic()
+    _is_refused(export, tmp_path, r"damaged bytes")
+    monkeypatch.setattr(guard, "_SECONDS", 0.2)
+    with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
+        assert any("interrupted" in str(one) for one in library.verify())
+    assert time.monotonic() - start < 30
+
+
+def _make_endless(path, table="feature", levels=10):
+    """Put pages behind the file, each with a hundred branches to the next one, before the root of a table."""
+    with closing(sqlite3.connect(path)) as connection:
+        size = connection.execute("PRAGMA page_size").fetchone()[0]
+        root = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", (table,)).fetchone()[0]
+        pages = connection.execute("PRAGMA page_count").fetchone()[0]
+    data = bytearray(path.read_bytes())
+    leaf = bytes(data[(root - 1) * size : root * size])
+    numbers = [root, *range(pages + 1, pages + levels + 1)]
+    for at, to in pairwise(numbers):
+        page = bytearray(size)
+        cells = 100
+        page[0:12] = (
+            b"\x05\0\0"
+            + cells.to_bytes(2, "big")
+            + (size - 5 * cells).to_bytes(2, "big")
+            + b"\0"
+            + to.to_bytes(4, "big")
+        )
+        for k in range(cells):
+            place = size - 5 * (k + 1)
+            page[12 + 2 * k : 14 + 2 * k] = place.to_bytes(2, "big")
+            page[place : place + 5] = to.to_bytes(4, "big") + bytes([k + 1])
+        start = (at - 1) * size
+        data[start : start + size] = page
+    data[(numbers[-1] - 1) * size :] = leaf
+    data[28:32] = (pages + levels).to_bytes(4, "big")
+    path.write_bytes(data)
