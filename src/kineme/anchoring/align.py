@@ -39,7 +39,7 @@ def maps_onto(paths: Array, onto: Array, like: Recognizer | None = None) -> Maps
     """From each path (n, d, T) onto the one path (d, T): the best fit over arc length within the invariances.
 
     Center onto center, size onto size, and the rotation within the recognizer's `max_angle` that brings it closest
-    (Kabsch), fitted to positions at even arc lengths. What the recognizer does not take out stays as it is.
+    (Procrustes), fitted to positions at even arc lengths. What the recognizer does not take out stays as it is.
     """
     like = like or Recognizer()
     n, d = paths.shape[:2]

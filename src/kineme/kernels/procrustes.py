@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from kineme.compiled import compiled_module, use_compiled
 from kineme.errors import SpecificationError
-from kineme.parallel import single_threaded_blas
+from kineme.kernels.rotation import best_products, best_rotations, half_angle
+from kineme.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, check_number
 
 
@@ -32,8 +34,9 @@ class Procrustes:
 
     ``d(A, B)^2 = min_R |A - R B|^2 = |A|^2 + |B|^2 - 2 max_R <A, R B>`` over rotations R (no mirror images) by
     at most `max_angle`. In the plane, with ``z = x + i y``, ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``:
-    one complex matrix product for all pairs. In space, a singular value decomposition per pair (Kabsch). In one
-    dimension, and with ``max_angle = 0``, it is the Euclidean distance.
+    one complex matrix product for all pairs. In space, one real matrix product for all pairs, and a quadratic form of
+    unit quaternions for each, see `kernels.rotation`. In one dimension, and with ``max_angle = 0``, it is the Euclidean
+    distance.
 
     Parameters
     ----------
@@ -41,13 +44,11 @@ class Procrustes:
         Dimensions d of the movements; rows are dimension-major, x_1 ... x_S, y_1 ... y_S, Eq. (9).
     max_angle : float
         Largest rotation [rad], 0 to pi. Choose it as small as the application allows: with pi, N and Z are the
-        same, and with more than a right angle, V and caret. In space, a best rotation beyond the limit is turned
-        back about its own axis, which is close to, but not always, the best one within it. Beyond three dimensions
-        only 0 is possible.
+        same, and with more than a right angle, V and caret. Beyond three dimensions only 0 is possible.
 
     References
     ----------
-    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Crystallographica A32, 1976.
+    B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4(4), 1987.
     """
 
     n_dims: int
@@ -85,7 +86,10 @@ class Procrustes:
         return _aligned_in_space(A.rows, B.rows, self.max_angle)
 
     def rotations(self, A: Array, B: Array) -> Array:
-        """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row."""
+        """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
+
+        Where several are equally good, as about the axis of a straight movement, the smallest.
+        """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
             return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
@@ -95,7 +99,7 @@ class Procrustes:
             c, s = np.cos(angle), np.sin(angle)
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        return _turned_back(_best_rotations(C), self.max_angle)
+        return best_rotations(C, self.max_angle)
 
 
 _MANY = 16  # rows from which on the complex product pays
@@ -141,42 +145,42 @@ def _within(product: NDArray[np.complex128], max_angle: float) -> Array:
     return np.where(product.real >= c * size, size, at_end)
 
 
-def _covariances(A: Array, B: Array) -> Array:
-    """``C_ij = A_i B_j^T`` (n, m, 3, 3)."""
+_PAIRS = 20_000  # covariances at a time: what is computed of them stays in a core's cache
+_PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
+
+
+def _aligned_in_space(A: NDArray[Any], B: NDArray[Any], max_angle: float) -> Array:
+    """``best_products`` of the covariances ``A_i B_j^T`` (n, m), a tile of the longer side at a time."""
     n, m = len(A), len(B)
     a, b = A.reshape(n * 3, -1), B.reshape(m * 3, -1)
-    return np.ascontiguousarray((a @ b.T).reshape(n, 3, m, 3).transpose(0, 2, 1, 3))
+    fill = _filler(n * m * _PAIR_OPERATIONS)
+    best = np.empty((n, m))
+
+    def rows(start: int, stop: int) -> None:
+        fill(a[3 * start : 3 * stop] @ b.T, max_angle, best[start:stop])
+
+    def columns(start: int, stop: int) -> None:
+        part = b[3 * start : 3 * stop]
+        products = _few_products(a, part) if n < _MANY else a @ part.T
+        fill(products, max_angle, best[:, start:stop])
+
+    if n >= m:
+        for_tiles(rows, n, max(1, _PAIRS // m))
+    else:
+        for_tiles(columns, m, max(1, _PAIRS // n))
+    return best
 
 
-def _best_rotations(C: Array) -> Array:
-    """Rotations R maximizing ``tr(R^T C)``, that is <A, R B>."""
-    U, _, Vt = np.linalg.svd(C)
-    proper = np.sign(np.linalg.det(U @ Vt))
-    proper[proper == 0] = 1.0
-    U[..., -1] *= proper[..., None]
-    return np.asarray(U @ Vt)
+def _filler(n_operations: int) -> Callable[[NDArray[Any], float, Array], None]:
+    """What writes the best products (n, m) of a block of products (3 n, 3 m)."""
+    if use_compiled(n_operations):
+        from kineme.kernels._rotation import fill_best_products
 
+        return lambda products, max_angle, best: fill_best_products(products, *half_angle(max_angle), best)
 
-def _turned_back(R: Array, max_angle: float) -> Array:
-    """Rotations by at most `max_angle`, about the same axes."""
-    if max_angle >= math.pi:
-        return R
-    from scipy.spatial.transform import Rotation
+    def fill(products: NDArray[Any], max_angle: float, best: Array) -> None:
+        n, m = best.shape
+        C = products.reshape(n, 3, m, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+        best[:] = best_products(C, max_angle).reshape(n, m)
 
-    vectors = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec()
-    angles = np.linalg.norm(vectors, axis=1, keepdims=True)
-    factors = np.where(angles > max_angle, max_angle / np.where(angles > 0, angles, 1.0), 1.0)
-    return np.asarray(Rotation.from_rotvec(vectors * factors).as_matrix()).reshape(R.shape)
-
-
-_PAIRS = 100_000  # covariance matrices at a time
-
-
-def _aligned_in_space(A: Array, B: Array, max_angle: float) -> Array:
-    result = np.empty((len(A), len(B)))
-    step = max(1, _PAIRS // len(B))
-    for start in range(0, len(A), step):
-        C = _covariances(A[start : start + step], B)
-        R = _turned_back(_best_rotations(C), max_angle)
-        result[start : start + step] = np.einsum("ijkl,ijkl->ij", R, C)
-    return result
+    return fill

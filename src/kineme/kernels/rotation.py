@@ -1,0 +1,171 @@
+"""The best rotation in space within an angle: of all, not the best free one turned back.
+
+A rotation by an angle ``phi`` about a unit axis u is the unit quaternion ``(w, v) = (cos(phi/2), sin(phi/2) u)``, and
+for a covariance C the inner product ``tr(R^T C)`` is
+
+    w^2 tr C + 2 w z'v + v'S v,   S = C + C' - tr(C) I,   z = (C_32 - C_23, C_13 - C_31, C_21 - C_12)
+
+(B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", JOSA A 4(4), 1987). Wanted is its
+maximum over unit quaternions with ``w >= c``, ``c = cos(max_angle/2)``, ``s = sin(max_angle/2)``. With eigenvalues
+``m_1 >= m_2 >= m_3`` of S and z in its eigenvectors, every number ``l`` above both m_1 and the top eigenvalue of Horn's
+4 x 4 matrix bounds it by
+
+    F(l) = c^2 tr C + s^2 l + c^2 sum_i z_i^2 / (l - m_i),
+
+and the least of these bounds is the maximum: duality holds without a gap. Either ``F'(l) = 0``, and the best rotation
+is at the limit, or l is that top eigenvalue, the root of ``l - tr C = sum_i z_i^2 / (l - m_i)``, and the best rotation
+is within. Both roots are those of increasing concave functions, so Newton steps from the left never pass them (J. J.
+More and D. C. Sorensen, "Computing a trust region step", SIAM J. Sci. Stat. Comput. 4(3), 1983). F is flat where it is
+least, so an error of l counts twice as many digits less; and it needs no axis, which a straight movement does not have.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.validation import Array
+
+LEAST_STEP = 1e-14  # of the covariance's largest entry: l - m_1 at least, so that divisions are safe
+STEPS = 60  # at most; two to six in practice
+CLOSE = 1e-10  # relative step after which quadratic convergence has reached the rounding
+_LEAST_SINE = 1e-50  # below it, a limit is none to double precision
+_TIE = 1e-9  # of the largest entry: rotations that are as good but for this are equal, and the smallest is taken
+_STRAIGHT = 1e-4  # second singular value, of the first: a movement that keeps to a line but for 0.3 % of its length
+_STRAIGHT_TIE = 1e-3  # outweighs what such a movement gains by turning about itself, and bends its turn by 0.03 degrees
+
+
+class _Form(NamedTuple):
+    """n quadratic forms of quaternions in the eigenvectors of S, for covariances with a largest entry of 1."""
+
+    C: Array  # (n, 3, 3)
+    scale: Array  # (n,), the largest entry taken out
+    trace: Array  # (n,)
+    top: Array  # (n,), m_1
+    gaps: Array  # (3, n), m_1 - m_i
+    z: Array  # (3, n)
+    axes: Array  # (n, 3, 3), eigenvectors in columns
+
+
+def best_products(C: Array, max_angle: float) -> Array:
+    """Largest ``tr(R^T C)`` (n,) over rotations by at most `max_angle`, for covariances C (n, 3, 3).
+
+    NaN where a covariance is not finite.
+    """
+    form = _form(C)
+    c, s = half_angle(max_angle)
+    step, inside = _solve(form, form.trace, c, s)
+    level = form.top + step
+    at_limit = c * c * form.trace + s * s * level + c * c * (form.z**2 / (step + form.gaps)).sum(axis=0)
+    return np.asarray(np.where(inside, level, at_limit) * form.scale)
+
+
+def best_rotations(C: Array, max_angle: float) -> Array:
+    """Rotations R (n, 3, 3) by at most `max_angle` that make ``tr(R^T C)`` largest; of equal ones the smallest.
+
+    How far a straight movement is turned about itself, only its noise says: it is not turned. What that costs of
+    ``tr(R^T C)`` is below 4e-4 of it, and nothing in all other movements.
+    """
+    form = _form(C)
+    c, s = half_angle(max_angle)
+    tie = np.where(_straight(form.C), _STRAIGHT_TIE, _TIE)
+    step, inside = _solve(form, form.trace + tie, c, s)
+    v = form.z / (step + form.gaps)
+    within = np.vstack((np.ones(len(C)), v)) / np.sqrt(1.0 + (v * v).sum(axis=0))
+    axis = (c / s) * v
+    # In the hard case nothing but the length of the axis says how much of it lies along the first eigenvector.
+    left = np.sqrt(np.maximum(1.0 - axis[1] ** 2 - axis[2] ** 2, 0.0))
+    axis[0] = np.where(np.abs(axis[0]) < left, np.copysign(left, axis[0]), axis[0])
+    axis *= s / np.sqrt((axis * axis).sum(axis=0))
+    quaternions = np.where(inside, within, np.vstack((np.full(len(C), c), axis)))
+    return _matrices(quaternions[0], np.einsum("nij,jn->in", form.axes, quaternions[1:]))
+
+
+def half_angle(max_angle: float) -> tuple[float, float]:
+    """Cosine and sine of half the limit; the cosine is 0 at pi, and the sine large enough to divide by its square."""
+    if max_angle >= math.pi:
+        return 0.0, 1.0
+    return math.cos(max_angle / 2), max(math.sin(max_angle / 2), _LEAST_SINE)
+
+
+def _form(C: Array) -> _Form:
+    C = np.asarray(C, dtype=np.float64)
+    scale = np.abs(C).max(axis=(1, 2))
+    usable = np.isfinite(scale) & (scale > 0)
+    C = np.where(usable[:, None, None], C, 0.0) / np.where(usable, scale, 1.0)[:, None, None]
+    trace = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2]
+    turned = C.transpose(0, 2, 1)
+    values, axes = np.linalg.eigh(C + turned - trace[:, None, None] * np.eye(3))
+    values, axes = values.T[::-1], axes[:, :, ::-1]
+    z = np.stack((C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]))
+    return _Form(C, scale, trace, values[0], values[0] - values, np.einsum("nij,in->jn", axes, z), axes)
+
+
+def _straight(C: Array) -> NDArray[np.bool_]:
+    """Whether the second singular value is below a share of the first: ``|adj C|`` is about their product."""
+    cofactors = np.cross(C[:, [1, 2, 0]], C[:, [2, 0, 1]])
+    return np.asarray((cofactors**2).sum(axis=(1, 2)) <= (_STRAIGHT * (C**2).sum(axis=(1, 2))) ** 2)
+
+
+def _solve(form: _Form, trace: Array, c: float, s: float) -> tuple[Array, Array]:
+    """``l - m_1`` (n,) where F is least, and whether the best rotation is within the limit."""
+    squares = form.z**2
+    at_limit = _root_at_limit(squares, form.gaps, c, s)
+    below = form.top - trace
+    inside = below + at_limit < (squares / (at_limit + form.gaps)).sum(axis=0)
+    step = at_limit.copy()
+    if inside.any():
+        parts = (squares[:, inside], form.gaps[:, inside], below[inside])
+        step[inside] = _root_within(*parts, at_limit[inside])
+    return step, inside
+
+
+def _root_at_limit(squares: Array, gaps: Array, c: float, s: float) -> Array:
+    """Root x >= 0 of ``sum_i c^2 z_i^2 / (x + gap_i)^2 = s^2``, or 0: Newton steps on ``1 / sqrt`` of both sides."""
+    ratio = c / s
+    x = np.maximum((ratio * np.sqrt(squares) - gaps).max(axis=0), ratio * np.sqrt(squares.sum(axis=0)) - gaps[2])
+    x = np.maximum(x, LEAST_STEP)
+    moving = np.ones(len(x), dtype=bool)
+    for _ in range(STEPS):
+        inverse = 1.0 / (x + gaps)
+        terms = ratio * ratio * squares * inverse * inverse
+        size, slope = terms.sum(axis=0), (terms * inverse).sum(axis=0)
+        step = np.where(slope > 0, (np.sqrt(size) - 1.0) * size / np.where(slope > 0, slope, 1.0), 0.0)
+        x = np.where(moving, np.maximum(x + step, LEAST_STEP), x)
+        moving &= np.abs(step) > CLOSE * x
+        if not moving.any():
+            break
+    return x
+
+
+def _root_within(squares: Array, gaps: Array, below: Array, x: Array) -> Array:
+    """Root of ``below + x = sum_i z_i^2 / (x + gap_i)`` right of x, by Newton steps.
+
+    They begin at the largest eigenvalue of the 2 x 2 matrices that tr C and one m_i make with z_i.
+    """
+    half = 0.5 * (gaps - below)  # (tr C - m_i) / 2
+    x = np.maximum(x, (half + np.sqrt(half * half + squares) - gaps).max(axis=0))
+    moving = np.ones(len(x), dtype=bool)
+    for _ in range(STEPS):
+        inverse = 1.0 / (x + gaps)
+        terms = squares * inverse
+        step = (terms.sum(axis=0) - below - x) / (1.0 + (terms * inverse).sum(axis=0))
+        x = np.where(moving, np.maximum(x + step, LEAST_STEP), x)
+        moving &= np.abs(step) > CLOSE * x
+        if not moving.any():
+            break
+    return x
+
+
+def _matrices(w: Array, v: Array) -> Array:
+    """Rotation matrices (n, 3, 3) of unit quaternions w (n,), v (3, n)."""
+    x, y, z = v
+    rows = (
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+    return np.moveaxis(np.array(rows), 2, 0)
