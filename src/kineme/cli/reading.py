@@ -58,11 +58,12 @@ def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def read(path: Path, options: dict[str, Any]) -> Any:
     """Recordings from a folder, a file, or - the standard input, as `layout_options` say."""
     from kineme.io.layout import Layout
+    from kineme.io.limits import read_limited
     from kineme.io.recordings import read_recordings, read_recordings_from_bytes
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
     if str(path) == "-":
-        return read_recordings_from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT, Layout(**known))
+        return read_recordings_from_bytes(read_limited(sys.stdin.buffer), STANDARD_INPUT, Layout(**known))
     return read_recordings(path, **known, progress=_watched)
 
 
