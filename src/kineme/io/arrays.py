@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.found import Block, Detected, Found
+from kineme.io.found import Block, Detected, Found, listed
 from kineme.io.layout import Layout
 from kineme.io.time_units import in_seconds, unit_by_size
 from kineme.trajectories.axes import axis_names
@@ -132,7 +132,7 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     if x.ndim != 2:
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
     if t is None and not isinstance(layout.units, float | int):
-        raise DataError(f"expected times beside the positions, got {list(arrays)}; say their step with units=")
+        raise DataError(f"expected times beside the positions, got {listed(arrays)}; say their step with units=")
     if t is not None and t.shape != x.shape[:1]:
         raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
     if "offsets" not in arrays:
@@ -149,7 +149,7 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
 def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
     prefix = next((one for one in POSITIONS if f"{one}_0" in arrays), None)
     if prefix is None:
-        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {list(arrays)}")
+        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
     xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -83,8 +84,8 @@ class Npz(Mapping[str, NDArray[Any]]):
         shape, fortran_order, dtype = _HEADS[npy.read_magic(file)](file)
         if dtype.hasobject:
             raise DataError(
-                f"expected {self._path} to hold numbers and texts, got Python objects in {name!r}. Object arrays cannot "
-                "be loaded without executing what they say; save texts as labels.astype(str), and movements of unequal "
+                f"expected {self._path} to hold numbers and texts, got Python objects in {name!r}. Object arrays "
+                "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements of unequal "
                 "length as positions_0, positions_1, ..."
             )
         count = math.prod(shape)
@@ -95,6 +96,8 @@ class Npz(Mapping[str, NDArray[Any]]):
         if not count and max(shape) > _LONGEST_EMPTY:
             raise ValueError(f"{name!r} of shape {shape}")
         array = np.frombuffer(content, dtype, offset=at)
+        if dtype.kind == "U" and (array.view(np.dtype("u4").newbyteorder(dtype.byteorder)) > sys.maxunicode).any():
+            raise ValueError(f"texts in {name!r} that are none")
         array = array.reshape(shape[::-1]).T if fortran_order else array.reshape(shape)
         return np.require(array, requirements="A")
 

@@ -35,7 +35,7 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         heads = tuple(file.schema_arrow.names)
         kinds = tuple(_kind(pa, kind) for kind in file.schema_arrow.types)
         roles = choose_roles(heads, kinds, layout)
-        needed = [k for k in range(len(heads)) if k not in roles.ignored]
+        needed = sorted({*range(len(heads))} - {*roles.ignored})
         table = file.read(columns=[heads[k] for k in needed])
         texts = {*roles.movement, roles.label}
         read = {k: _column(table.column(i), k in texts, heads[k]) for i, k in enumerate(needed)}
