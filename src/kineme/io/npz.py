@@ -85,8 +85,8 @@ class Npz(Mapping[str, NDArray[Any]]):
         if dtype.hasobject:
             raise DataError(
                 f"expected {self._path} to hold numbers and texts, got Python objects in {name!r}. Object arrays "
-                "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements of unequal "
-                "length as positions_0, positions_1, ..."
+                "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements "
+                "of unequal length as positions_0, positions_1, ..."
             )
         count = math.prod(shape)
         self._take(count * max(8 - dtype.itemsize, 0))  # numbers become float64
