@@ -110,6 +110,8 @@ def _plainly(error: BaseException) -> str:
 def _reason(error: BaseException) -> str:
     if isinstance(error, KinemeError):
         return str(error)
+    if isinstance(error, MemoryError):
+        return "expected a file that fits into the memory; split it"
     if isinstance(error, OSError):
         return error.strerror or str(error)
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from itertools import islice
-from typing import Any, AnyStr
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +12,6 @@ from kineme.errors import DataError
 from kineme.io.dialect import Dialect, split
 
 _STRETCH = 1000  # lines that are tried together
-
-_PLAIN = r'(?:^|{0})"[^"\r\n]*"(?={0}|\r|\n|\Z)'  # a cell between quotes, without any in it
 
 
 def read_slowly(
@@ -38,7 +35,7 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
     if not (dialect.decimal_comma and any(texts)):
         plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
         quoted = any('"' in line for line in plain)
-        known = not quoted or quotes_are_plain("".join(plain), dialect)
+        known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
         if known and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
         if not quoted and not any(texts) and dialect.separator:  # the usual fault is an empty cell
@@ -66,15 +63,18 @@ def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> An
     return rows
 
 
-def quotes_are_plain(text: AnyStr, dialect: Dialect) -> bool:
+def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
     """Whether all quotes stand around whole cells of one line, which every parser understands in the same way."""
     if dialect.separator is None:
         return False
-    pattern, mark = _PLAIN.format(re.escape(dialect.separator)), '"'
-    if isinstance(text, bytes):
-        found = sum(1 for _ in re.finditer(pattern.encode(), text, re.MULTILINE))
-        return 2 * found == text.count(mark.encode())
-    return 2 * sum(1 for _ in re.finditer(pattern, text, re.MULTILINE)) == text.count(mark)
+    marks = np.frombuffer(b"\n" + text + b"\n", np.uint8)
+    quotes, ends = np.flatnonzero(marks == ord('"')), np.flatnonzero((marks == ord("\n")) | (marks == ord("\r")))
+    if len(quotes) % 2:
+        return False
+    first, last = quotes[::2], quotes[1::2]
+    beside = np.concatenate((marks[first - 1], marks[last + 1]))
+    in_one_line = np.searchsorted(ends, first) == np.searchsorted(ends, last)
+    return bool(np.isin(beside, [*b"\r\n", ord(dialect.separator)]).all() and in_one_line.all())
 
 
 def _filled(line: str, separator: str) -> str:
