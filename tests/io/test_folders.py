@@ -64,9 +64,72 @@ def test_links_may_lead_anywhere(tmp_path):
     (data / "away").symlink_to(tmp_path / "elsewhere")
     (data / "again").symlink_to(data / "point")
     (data / "broken.csv").symlink_to(tmp_path / "nothing.csv")
-    read = read_recordings(data)
+    read = read_recordings(data, follow_links=True)
     assert [one.path for one in read.sources] == ["away/nod/c.csv", "point/b.csv", "wave/a.csv"]
     assert [(one.file, one.reason) for one in read.problems] == [("broken.csv", "No such file or directory")]
+
+
+@posix
+def test_links_out_of_the_folder_are_not_followed_unless_one_says_so(tmp_path):
+    fill(tmp_path, "data/wave/a.csv", "data-more/b.csv", "elsewhere/nod/c.csv")
+    data = tmp_path / "data"
+    (data / "away").symlink_to(tmp_path / "elsewhere")
+    (data / "beside").symlink_to(tmp_path / "data-more")
+    (data / "up").symlink_to("..")
+    (data / "wave" / "other.csv").symlink_to("../../elsewhere/nod/c.csv")
+    (data / "within.csv").symlink_to("wave/a.csv")
+    (tmp_path / "door").symlink_to(data)
+    for folder in (data, tmp_path / "door"):
+        read = read_recordings(folder)
+        assert [one.path for one in read.sources] == ["wave/a.csv", "within.csv"]
+        assert [one.file for one in read.problems] == ["away", "beside", "up", "wave/other.csv"]
+        assert {one.reason for one in read.problems} == {
+            "a link that leads out of the folder; say follow_links to read it, or copy what it leads to"
+        }
+    assert len(read_recordings(data, follow_links=True)) == 5
+
+
+@posix
+def test_a_link_to_itself_is_a_problem(tmp_path):
+    fill(tmp_path, "a.csv")
+    (tmp_path / "b.csv").symlink_to("b.csv")
+    (tmp_path / "round").symlink_to("about")
+    (tmp_path / "about").symlink_to("round")
+    read = read_recordings(tmp_path)
+    assert [one.path for one in read.sources] == ["a.csv"]
+    assert [one.file for one in read.problems] == ["about", "b.csv", "round"]
+    assert "symbolic links" in read.problems[1].reason
+
+
+def test_a_file_larger_than_the_memory_costs_itself_alone(tmp_path, monkeypatch):
+    fill(tmp_path, "a.csv", "b.csv", "c.csv")
+    whole = Path.read_bytes
+
+    def too_large(path):
+        if path.name == "b.csv":
+            raise MemoryError
+        return whole(path)
+
+    monkeypatch.setattr(Path, "read_bytes", too_large)
+    read = read_recordings(tmp_path)
+    assert [one.path for one in read.sources] == ["a.csv", "c.csv"]
+    assert [one.file for one in read.problems] == ["b.csv"]
+    assert "memory" in read.problems[0].reason
+
+
+def test_a_file_beyond_the_limit_costs_itself_alone(tmp_path, monkeypatch):
+    fill(tmp_path, "a.csv")
+    with (tmp_path / "b.csv").open("wb") as file:
+        file.truncate(2**40)  # a hole: it takes no place on the disk
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "20000")
+    read = read_recordings(tmp_path)
+    assert [one.path for one in read.sources] == ["a.csv"]
+    assert [one.file for one in read.problems] == ["b.csv"]
+    assert "at most 20,000 bytes of memory, got one that takes 1,099,511,627,776" in read.problems[0].reason
+    assert "set the environment variable KINEME_MAX_FILE_BYTES to more" in read.problems[0].reason
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", "a lot")
+    with pytest.raises(kineme.SpecificationError, match=r"KINEME_MAX_FILE_BYTES to be a whole number .* got 'a lot'"):
+        read_recordings(tmp_path)
 
 
 @posix

@@ -82,3 +82,60 @@ def test_without_the_package_the_extra_is_named(monkeypatch):
 def test_a_table_without_rows_is_refused(columns):
     with pytest.raises(kineme.DataError, match="expected samples, got a table without rows"):
         read({name: pa.array([], pa.float64()) for name in columns})
+
+
+def test_names_of_bytes_are_decoded():
+    names = pa.array([b"wave"] * 4 + ["n\u00f6d".encode()] * 4)
+    assert read({"label": names, "time": np.tile(T[:4], 2), "x": np.arange(8)}).labels == ("wave", "n\u00f6d")
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_names_may_be_missing_and_dictionaries_differ(chunked):
+    names = pa.array(["wave"] * 4 + [None] * 4 + ["nod"] * 4)
+    if chunked:
+        names = pa.chunked_array([names[:6].dictionary_encode(), names[6:].dictionary_encode()])
+    table = {"id": [1] * 4 + [2] * 4 + [3] * 4, "label": names, "time": np.tile(T[:4], 3), "x": np.arange(12)}
+    found = read(table)
+    assert {one.place: one.label for one in found.sources} == {"1": "wave", "2": None, "3": "nod"}
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        (pa.array([[1]] * 6), "expected names in 'label', got (list|struct)"),
+        (pa.array([{"a": 1}] * 6), "expected names in 'label', got (list|struct)"),
+        (pa.array([float("nan")] * 6), "expected names in 'label', got nan"),
+    ],
+)
+def test_labels_that_are_no_names(column, words):
+    with pytest.raises(kineme.DataError, match=words):
+        read({"label": column, "time": T, "x": X})
+
+
+def test_columns_of_one_name_are_refused():
+    sink = io.BytesIO()
+    parquet.write_table(pa.Table.from_arrays([pa.array(T), pa.array(X), pa.array(-X)], ["time", "x", "x"]), sink)
+    with pytest.raises(kineme.DataError, match="expected columns of different names, got 'x' 2 times"):
+        read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout())
+
+
+def test_names_with_dots_are_names():
+    found = read({"observation.time": T, "observation.state": X, "observation": X}, time="observation.time")
+    assert found.demonstrations.n_dims == 2
+
+
+def test_a_bomb_is_not_expanded(monkeypatch):
+    n = 2**18
+    columns = {"time": np.arange(n), "x": np.zeros(n), "beside": ["a" * 100] * n}
+    sink = io.BytesIO()
+    parquet.write_table(pa.table(columns), sink, compression="zstd")
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(len(sink.getvalue()) + 2**18))
+    with pytest.raises(kineme.DataError, match="KINEME_MAX_FILE_BYTES"):
+        read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout(units="ms"))
+
+
+def test_one_long_name_costs_its_own_length(monkeypatch):
+    name, n = "x" * 2**16, 2000
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(2**20))
+    found = read({"label": [name] * n, "time": np.arange(n) / 100, "x": np.zeros(n)}, units="s")
+    assert found.labels == (name,)

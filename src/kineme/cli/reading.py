@@ -45,6 +45,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What a missing or repeated sample costs.",
     ),
+    click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
 
 
@@ -58,12 +59,14 @@ def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def read(path: Path, options: dict[str, Any]) -> Any:
     """Recordings from a folder, a file, or - the standard input, as `layout_options` say."""
     from kineme.io.layout import Layout
+    from kineme.io.limits import read_limited
     from kineme.io.recordings import read_recordings, read_recordings_from_bytes
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
+    follow_links = known.pop("follow_links", False)
     if str(path) == "-":
-        return read_recordings_from_bytes(sys.stdin.buffer.read(), STANDARD_INPUT, Layout(**known))
-    return read_recordings(path, **known, progress=_watched)
+        return read_recordings_from_bytes(read_limited(sys.stdin.buffer), STANDARD_INPUT, Layout(**known))
+    return read_recordings(path, **known, follow_links=follow_links, progress=_watched)
 
 
 def _watched(files: Any) -> Any:

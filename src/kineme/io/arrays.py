@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.io.found import Block, Detected, Found
+from kineme.io.found import Block, Detected, Found, listed
 from kineme.io.layout import Layout
 from kineme.io.time_units import in_seconds, unit_by_size
 from kineme.trajectories.axes import axis_names
@@ -82,8 +82,29 @@ def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     axes = [name for name in "xyz" if name in arrays]
     if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
         return arrays
-    others = {name: value for name, value in arrays.items() if name not in axes}
-    return {**others, "positions": np.column_stack([_numbers(arrays[name]) for name in axes])}
+    return _Joined(arrays, axes, np.column_stack([_numbers(arrays[name]) for name in axes]))
+
+
+class _Joined(Mapping[str, Any]):
+    """Arrays with positions in place of their axes; the others are read when they are asked for, as before."""
+
+    def __init__(self, arrays: Mapping[str, Any], axes: Sequence[str], positions: Array) -> None:
+        self._arrays, self._positions = arrays, positions
+        self._names = {name: None for name in arrays if name not in axes} | {"positions": None}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._positions if name == "positions" else self._arrays[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 def _numbers(values: Any) -> Array:
@@ -111,23 +132,24 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     if x.ndim != 2:
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
     if t is None and not isinstance(layout.units, float | int):
-        raise DataError(f"expected times beside the positions, got {list(arrays)}; say their step with units=")
+        raise DataError(f"expected times beside the positions, got {listed(arrays)}; say their step with units=")
     if t is not None and t.shape != x.shape[:1]:
         raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
     if "offsets" not in arrays:
         return [x], None if t is None else [t], "single"
     inner = np.asarray(arrays["offsets"])
-    if inner.ndim != 1 or inner.dtype.kind not in "iu" or len(inner) < 2 or (np.diff(inner) < 0).any():
+    if inner.ndim != 1 or inner.dtype.kind not in "iu" or len(inner) < 2 or (inner[1:] < inner[:-1]).any():
         raise DataError("expected offsets as whole numbers that do not decrease, (n + 1,)")
     if inner[0] != 0 or inner[-1] != len(x):
         raise DataError(f"expected offsets from 0 to {len(x)}, got {inner[0]} to {inner[-1]}")
-    return np.split(x, inner[1:-1]), None if t is None else np.split(t, inner[1:-1]), "offsets"
+    cuts = inner[1:-1].astype(np.intp)
+    return np.split(x, cuts), None if t is None else np.split(t, cuts), "offsets"
 
 
 def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
     prefix = next((one for one in POSITIONS if f"{one}_0" in arrays), None)
     if prefix is None:
-        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {list(arrays)}")
+        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
     xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
@@ -146,7 +168,21 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
     key = _named(arrays, LABELS)
     if key is None:
         return [None] * n
-    labels = np.atleast_1d(np.asarray(arrays[key]))
-    if labels.shape != (n,):
-        raise DataError(f"expected one label for each of the {n} movements, got labels of shape {labels.shape}")
-    return [one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in labels.tolist()]
+    given = arrays[key]
+    if isinstance(given, np.ndarray):
+        shape, labels = np.atleast_1d(given).shape, np.atleast_1d(given).tolist()
+    else:  # of JSON: one by one, as an array would turn numbers beside texts into texts
+        labels = given if isinstance(given, list) else [given]
+        shape = (len(labels),)
+    if shape != (n,):
+        raise DataError(f"expected one label for each of the {n} movements, got labels of shape {shape}")
+    return [_label(one) for one in labels]
+
+
+def _label(one: Any) -> str | None:
+    """A label as text; None where there is none."""
+    if isinstance(one, (list, dict)) or one != one:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected labels that are texts or numbers, got {one!r}")
+    if isinstance(one, bytes):
+        return one.decode("utf-8", "replace") or None
+    return None if one is None else str(one) or None

@@ -82,7 +82,7 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
 
 
 def _who(block: Block, i: int) -> str:
-    return f"movement {block.places[i]}: " if block.places[i] else ""
+    return f"movement {' '.join(block.places[i].splitlines())}: " if block.places[i] else ""
 
 
 def _reason(block: Block, i: int, k: int) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from kineme.errors import DataError
+from kineme.io.found import listed
 from kineme.io.layout import Column, Layout
 from kineme.io.time_units import PER_SECOND, words_of
 
@@ -60,24 +61,41 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     time = _time(heads, kinds, layout, named, taken)
     taken.add(time)
     if layout.coordinates is not None:
-        positions = tuple(_number(heads, one) for one in layout.coordinates)
+        positions = _numbers(heads, layout.coordinates)
     else:
         free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
-        positions = tuple(k for k in free if not (named and _says_nothing_new(heads, k)))
+        plain = set(map(_plain, heads))
+        positions = tuple(k for k in free if not (named and _says_nothing_new(heads[k], plain)))
     if not positions:
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
-    ignored = tuple(k for k in range(len(heads)) if k not in taken and k not in positions)
+    taken.update(positions)
+    ignored = tuple(k for k in range(len(heads)) if k not in taken)
     return Roles(time, positions, movement, label, ignored)
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
-    """A column by head or number; digits in a string count when no head reads so."""
-    if isinstance(column, str) and column in heads:
-        return list(heads).index(column)
+    return _numbers(heads, [column])[0]
+
+
+def _numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
+    """Columns by head or number; digits in a string count when no head reads so."""
+    exact, plain = _places(heads), _places(map(_plain, heads))
+    return tuple(_place(heads, one, exact, plain) for one in columns)
+
+
+def _places(heads: Iterable[str]) -> dict[str, list[int]]:
+    places: dict[str, list[int]] = {}
+    for k, head in enumerate(heads):
+        places.setdefault(head, []).append(k)
+    return places
+
+
+def _place(heads: Sequence[str], column: Column, exact: dict[str, list[int]], plain: dict[str, list[int]]) -> int:
     if isinstance(column, str):
-        plain = [_plain(head) for head in heads]
-        if plain.count(_plain(column)) == 1:
-            return plain.index(_plain(column))
+        if column in exact:
+            return exact[column][0]
+        if len(alike := plain.get(_plain(column), [])) == 1:
+            return alike[0]
     if isinstance(column, int) or column.isdecimal():
         k = int(column)
         if -len(heads) <= k < len(heads):
@@ -90,7 +108,7 @@ def _plain(head: str) -> str:
 
 
 def _listed(heads: Sequence[str]) -> str:
-    return "one column" if len(heads) == 1 else f"the columns {list(heads)}"
+    return "one column" if len(heads) == 1 else f"the columns {listed(heads)}"
 
 
 def _time(
@@ -136,7 +154,7 @@ def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
 
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
     if layout.keys is not None:
-        return tuple(_number(heads, one) for one in layout.keys)
+        return _numbers(heads, layout.keys)
     if not named:
         return ()
     kind = MOVEMENT_WORDS
@@ -145,10 +163,10 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
     )
 
 
-def _says_nothing_new(heads: Sequence[str], k: int) -> bool:
-    """A counter of samples, or the velocity or acceleration of another column."""
-    words = words_of(heads[k])
-    if not heads[k].strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+def _says_nothing_new(head: str, plain: set[str]) -> bool:
+    """A counter of samples, or the velocity or acceleration of another column, whose plain heads these are."""
+    words = words_of(head)
+    if not head.strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
         return True
-    derived = _DERIVATIVE.fullmatch(_plain(heads[k]))
-    return derived is not None and (derived[1] or derived[2]) in {_plain(head) for head in heads}
+    derived = _DERIVATIVE.fullmatch(_plain(head))
+    return derived is not None and (derived[1] or derived[2]) in plain

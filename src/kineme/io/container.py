@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.atomic import write_atomically
+from kineme.io.limits import check_expanded
+from kineme.io.npz import Npz
 
 FORMAT = "kineme"
 VERSION = 1
@@ -42,40 +45,25 @@ def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[
     return write_atomically(path, buffer.getvalue())
 
 
-def read_container(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Read a file of `write_container`.
+def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
+    """Read a file of `write_container`; an array is read when it is asked for.
 
     Raises
     ------
     FileNotFoundError
         There is no such file.
     DataError
-        The file is foreign, truncated or damaged, of another kind, or of a later version; the message says which.
+        The file is foreign, truncated or damaged, of another kind, of a later version, or larger than
+        `kineme.io.limits` allows; the message says which.
     """
-    arrays = read_arrays(path)
+    check_expanded(path.stat().st_size)
+    arrays = Npz(path.read_bytes(), path)
     try:
-        header = json.loads(arrays.pop(_HEADER).tobytes())
-    except (ValueError, KeyError) as error:
+        header = json.loads(arrays[_HEADER].tobytes())
+    except (ValueError, KeyError, RecursionError) as error:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
     _check_header(path, header, kind)
     return header, arrays
-
-
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read all arrays of an npz archive; arrays of Python objects are refused, not unpickled."""
-    return decode_arrays(path.read_bytes(), path)
-
-
-def decode_arrays(data: bytes, path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays in the bytes of an npz archive; the path is for the message."""
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except Exception as error:  # the readers of archives and of array headers raise many kinds on damaged files
-        raise DataError(
-            f"expected {path} to be an archive of arrays, got something foreign, truncated or damaged ({error}); "
-            "save it again, or take it from a backup"
-        ) from error
 
 
 def _check_header(path: Path, header: Any, kind: str) -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from itertools import islice
+from typing import NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.columns import is_time
 from kineme.io.dates import is_date
+from kineme.io.limits import check_expanded
 
 COMMENTS = ("#", "%", "//")
 _PEEK = 20  # samples to look at before deciding
+_CELL = 32  # bytes in Python that a cell may take, for each of its characters
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{_COMMA_NUMBER.pattern}(\s+{_COMMA_NUMBER.pattern})+\s*")  # between blanks
@@ -28,25 +30,60 @@ class Dialect(NamedTuple):
     first: int  # line of the first sample, counted from 0
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
 
+    def is_sample(self, line: str) -> bool:
+        """Whether a line holds a sample; a comment does not, but a name may begin as one.
+
+        A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
+        cells as there are columns, and those of numbers hold numbers.
+        """
+        if not is_skipped(line):
+            return True
+        if self.kinds[0] != "text" or not line.strip():
+            return False
+        cells = split(line, self.separator)
+        return len(cells) == len(self.kinds) and all(
+            is_number(cell, self.decimal_comma)
+            for cell, kind in zip(cells, self.kinds, strict=True)
+            if kind == "number"
+        )
+
 
 def is_skipped(line: str) -> bool:
-    """Whether a line holds no sample."""
+    """Whether a line is empty or begins as a comment."""
     stripped = line.strip()
     return not stripped or stripped.startswith(COMMENTS)
 
 
 def split(line: str, separator: str | None) -> list[str]:
     """The cells of a line."""
-    if '"' in line:
-        marks: dict[str, Any] = {"delimiter": separator or " ", "skipinitialspace": True}
-        return [cell.strip() for cell in next(csv.reader([line.strip() if separator is None else line], **marks))]
-    return [cell.strip() for cell in line.rstrip("\r\n").split(separator)]
+    plain = line.rstrip("\r\n")
+    cells = _quoted_cells(plain, separator) if '"' in line else plain.split(separator)
+    return [cell.strip() for cell in cells]
+
+
+def _quoted_cells(line: str, separator: str | None) -> list[str]:
+    """Cells of which some begin with a quote: up to the next one, what follows it included; two in a row stand for one.
+
+    Not by Python's csv, which has a limit on the length of cells for the whole process.
+    """
+    end = r"\s" if separator is None else re.escape(separator)
+    cell = re.compile(rf'[^\S{end}]*"([^"]*(?:""[^"]*)*)(?:"([^{end}]*))?|([^{end}]*)')
+    gap = re.compile(r"\s+" if separator is None else end)
+    line = line.strip() if separator is None else line
+    cells, at = [], 0
+    while found := cell.match(line, at):
+        cells.append(found[3] if found[1] is None else found[1].replace('""', '"') + (found[2] or ""))
+        if (between := gap.match(line, found.end())) is None:
+            break
+        at = between.end()
+    return cells
 
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
     """How a table is written, from its first lines; no more are taken than needed."""
     lines, kept = [], []
     for line in text:
+        check_expanded(_CELL * len(line), "lines")
         lines.append(line)
         if not is_skipped(line):
             kept.append(len(lines) - 1)
@@ -54,6 +91,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
             break
     if not kept:
         raise DataError("expected samples, got an empty file")
+    kept = _with_names_like_comments(lines, kept)
     separator = _separator([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
     comma = separator != "," and any(_COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
@@ -66,6 +104,24 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     if heads:
         return Dialect(separator, comma, tuple(heads), True, first, kinds)
     return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """Also those lines below the first one kept that begin as comments and yet are rows: ``#1,0.0,0.25,0.75``.
+
+    As long as the first cells of all other rows are no numbers; else a row was commented out.
+    """
+    separator = _separator([lines[kept[0]]])
+    rows = [split(lines[k], separator) for k in kept]
+    if separator is None or any(is_number(row[0], separator != ",") for row in rows):
+        return kept
+    below = (k for k in range(kept[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
+    marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
+    return sorted({*kept, *islice(marked, _PEEK)})[:_PEEK]
+
+
+def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
+    return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
 
 
 def _separator(lines: Sequence[str]) -> str | None:

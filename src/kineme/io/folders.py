@@ -8,12 +8,15 @@ from pathlib import Path
 
 from kineme.io.found import Problem
 
+_OUTSIDE = "a link that leads out of the folder; say follow_links to read it, or copy what it leads to"
 
-def files_under(folder: Path) -> tuple[list[Path], list[Problem]]:
-    """All files that are not hidden, sorted, and the folders that could not be listed.
+
+def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
+    """All files that are not hidden, sorted, and what is wrong with the others and with folders.
 
     Names that begin with a dot are passed over. Links to folders are followed after everything else, and no folder is
-    entered twice, so that links may lead anywhere.
+    entered twice. A link that leads out of the folder is a problem, and followed only with `follow_links`: a folder
+    that somebody sent must not fetch what lies elsewhere.
     """
     files: list[Path] = []
     problems: list[Problem] = []
@@ -32,11 +35,27 @@ def files_under(folder: Path) -> tuple[list[Path], list[Problem]]:
             continue
         for entry in entries:
             path = here / entry.name
-            if not entry.is_dir():
+            if entry.is_symlink() and not follow_links and _leads_out(path, folder):
+                problems.append(Problem(as_text(path.relative_to(folder)), None, _OUTSIDE))
+            elif not _is_folder(entry):
                 files.append(path)
             else:
                 (links if entry.is_symlink() else folders).append(path)
     return sorted(files, key=lambda path: path.relative_to(folder).parts), problems
+
+
+def _leads_out(link: Path, folder: Path) -> bool:
+    """Whether a link leads to something, and that lies elsewhere."""
+    target, top = os.path.realpath(link), os.path.realpath(folder)
+    return os.path.exists(target) and os.path.commonpath([target, top]) != top
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    """Not where nobody can tell, such as a link to itself: reading it as a file says why."""
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
 
 
 def as_text(path: Path | str) -> str:

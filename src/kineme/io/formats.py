@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kineme.errors import DataError
 from kineme.io.arrays import arrays_movements, join
-from kineme.io.container import decode_arrays
 from kineme.io.found import Found
 from kineme.io.layout import Layout
+from kineme.io.limits import check_expanded
 from kineme.io.matlab import read_demos
+from kineme.io.npz import Npz
 from kineme.io.parquet import read_parquet_table
 from kineme.io.table_movements import table_movements
 from kineme.io.text_table import read_text_table
+
+_NUMBER, _LIST = 32, 88  # bytes that one takes in Python
 
 
 class Format(NamedTuple):
@@ -34,14 +37,24 @@ def _read_parquet(data: bytes, layout: Layout) -> Found:
 
 
 def _read_npz(data: bytes, layout: Layout) -> Found:
-    return arrays_movements(decode_arrays(data, Path("it")), layout, "NPZ")
+    return arrays_movements(Npz(data, Path("it")), layout, "NPZ")
 
 
 def _read_json(data: bytes, layout: Layout) -> Found:
-    entries = json.loads(data)
+    lists = data.count(b"[") + data.count(b"{")
+    check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
+    entries = json.loads(data, object_pairs_hook=_each_once)
     if not isinstance(entries, dict):
         raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
     return arrays_movements(entries, layout, "JSON")
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
+        raise DataError(f"expected each entry once, got {twice!r} several times")
+    return entries
 
 
 def _read_matlab(data: bytes, layout: Layout) -> Found:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
 from kineme.validation import Array
+
+_SHOWN = 40  # names in a message
 
 
 class Problem(NamedTuple):
@@ -111,3 +113,9 @@ class Found(NamedTuple):
 
     detected: Detected
     block: Block
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a message; of very many the first."""
+    some = list(names)
+    return str(some) if len(some) <= _SHOWN else f"{some[:_SHOWN]} and {len(some) - _SHOWN} more"

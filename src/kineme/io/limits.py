@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import os
 from functools import cache
+from typing import BinaryIO
 
 from kineme.errors import DataError, SpecificationError
 
 VARIABLE = "KINEME_MAX_FILE_BYTES"
 
 _MOST = 4 * 2**30
+_CHUNK = 2**20
 
 
 def max_file_bytes() -> int:
@@ -49,6 +51,17 @@ def check_expanded(n_bytes: int, what: str = "a file") -> None:
             f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
             f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
         )
+
+
+def read_limited(stream: BinaryIO) -> bytes:
+    """All bytes of a stream that does not say how many there are."""
+    chunks: list[bytes] = []
+    n_bytes = 0
+    while chunk := stream.read(_CHUNK):
+        chunks.append(chunk)
+        n_bytes += len(chunk)
+        check_expanded(n_bytes, "a stream")
+    return b"".join(chunks)
 
 
 @cache

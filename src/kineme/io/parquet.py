@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
 from kineme.io.layout import Layout
+from kineme.io.limits import check_expanded
 from kineme.io.table import Table
 
 
@@ -35,10 +38,16 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         heads = tuple(file.schema_arrow.names)
         kinds = tuple(_kind(pa, kind) for kind in file.schema_arrow.types)
         roles = choose_roles(heads, kinds, layout)
-        needed = [k for k in range(len(heads)) if k not in roles.ignored]
-        table = file.read(columns=[heads[k] for k in needed])
+        needed = sorted({*range(len(heads))} - {*roles.ignored})
+        _check_memory(file.metadata, [heads[k] for k in needed])
+        _refuse_twins(heads, needed)
         texts = {*roles.movement, roles.label}
-        read = {k: _column(table.column(i), k in texts, heads[k]) for i, k in enumerate(needed)}
+        if nested := [k for k in needed if k in texts and pa.types.is_nested(file.schema_arrow.types[k])]:
+            raise DataError(f"expected names in {heads[nested[0]]!r}, got {file.schema_arrow.types[nested[0]]}")
+        named = [heads[k] for k in needed if k in texts]  # kept as they are stored: few different ones, many rows
+        file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
+        table = file.read(columns=[heads[k] for k in needed])
+        read = {k: (_texts if k in texts else _numbers)(table.column(heads[k]), heads[k]) for k in needed}
     except (pa.ArrowException, OSError) as error:
         if isinstance(error, DataError):
             raise
@@ -57,12 +66,43 @@ def _kind(pa: Any, kind: Any) -> str:
     return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
 
 
-def _column(column: Any, is_text: bool, head: str) -> Any:
-    if is_text:
-        known = column.unique().to_pylist()  # names are few, rows many
-        texts = np.array(["" if one is None else str(one) for one in known], dtype=object)
-        codes = {one: k for k, one in enumerate(known)}
-        return texts[np.fromiter((codes[one] for one in column.to_pylist()), np.intp, len(column))]
+def _check_memory(metadata: Any, needed: Sequence[str]) -> None:
+    """Refuse columns that would take more memory than the limit, as their pages or as numbers."""
+    groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
+    packed = [group.column(k) for group in groups for k in range(group.num_columns)]
+    heads = tuple(needed)
+    pages = sum(one.total_uncompressed_size for one in packed if one.path_in_schema.startswith(heads))
+    check_expanded(max(pages, 0) + 8 * max(metadata.num_rows, 0) * len(heads))
+
+
+def _refuse_twins(heads: Sequence[str], needed: Sequence[int]) -> None:
+    counts = Counter(heads)
+    if twins := [heads[k] for k in needed if counts[heads[k]] > 1]:
+        raise DataError(f"expected columns of different names, got {twins[0]!r} {counts[twins[0]]} times")
+
+
+def _texts(column: Any, head: str) -> Any:
+    """Names as texts, empty where there is none."""
+    import pyarrow as pa
+
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    parts = [np.empty(0, dtype=object)]
+    for chunk in column.chunks:
+        known = np.array([*(_text(one, head) for one in chunk.dictionary.to_pylist()), ""], dtype=object)
+        parts.append(known[chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()])
+    return np.concatenate(parts)
+
+
+def _text(one: Any, head: str) -> str:
+    if isinstance(one, bytes):
+        return one.decode("utf-8", "replace")
+    if one != one:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected names in {head!r}, got {one!r}")
+    return "" if one is None else str(one)
+
+
+def _numbers(column: Any, head: str) -> Any:
     values = column.to_numpy()
     if values.dtype.kind in "Mm":
         counts = values.astype(f"{values.dtype.kind}8[ns]")

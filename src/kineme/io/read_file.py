@@ -14,6 +14,7 @@ from kineme.io.folders import as_text
 from kineme.io.formats import FORMATS, Format
 from kineme.io.found import Block, Detected, Problem
 from kineme.io.layout import Layout
+from kineme.io.limits import check_expanded
 
 #: What readers raise on a file that is not what its name says; nested too deep and too large for the memory included.
 _UNREADABLE = (
@@ -58,8 +59,9 @@ def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
         known = os.stat(path)
         if not stat.S_ISREG(known.st_mode):  # reading a pipe would wait forever
             raise DataError("expected a file, got a pipe or a device")
+        check_expanded(known.st_size)
         data = path.read_bytes()
-    except OSError as error:
+    except (OSError, MemoryError) as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
     return read_bytes(data, relative, layout, known.st_mtime)
 
@@ -70,12 +72,13 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
     sha256 = hashlib.sha256(data).hexdigest()
     form = format_of(relative)
     try:
+        check_expanded(len(data))
         detected, block = form.read(data, layout)
         block, problems = check_block(block, name, layout.skip)
     except _UNREADABLE as error:
         return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
-    labels = [label if one is None else one for one in block.labels]
+    labels = [label if one is None else _storable(one) for one in block.labels]
     block = Block(block.positions, block.times, block.offsets, labels, block.places)  # lets go of the file's bytes
     return FileRead(name, sha256, len(data), mtime, detected, block, problems)
 
@@ -94,6 +97,11 @@ def format_of(path: Path) -> Format:
     return form
 
 
+def _storable(label: str) -> str:
+    """A label without halves of characters, which JSON can hold but nothing can store or print."""
+    return label.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def _plainly(error: BaseException) -> str:
     """What went wrong, on one line, whatever other libraries write."""
     return " ".join(_reason(error).splitlines())
@@ -102,6 +110,8 @@ def _plainly(error: BaseException) -> str:
 def _reason(error: BaseException) -> str:
     if isinstance(error, KinemeError):
         return str(error)
+    if isinstance(error, MemoryError):
+        return "expected a file that fits into the memory; split it"
     if isinstance(error, OSError):
         return error.strerror or str(error)
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__

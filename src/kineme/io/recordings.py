@@ -9,6 +9,7 @@ from kineme.errors import DataError
 from kineme.io.folders import files_under
 from kineme.io.join_files import Recordings, join_files
 from kineme.io.layout import Column, Layout
+from kineme.io.limits import max_file_bytes
 from kineme.io.read_file import format_of, read_bytes, read_file
 from kineme.trajectories.trajectory import Trajectory
 
@@ -24,13 +25,14 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     label: Column | None = None,
     units: str | float | None = None,
     skip: str = "movement",
+    follow_links: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
     """Read all movements of a folder or a file.
 
     In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
     in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
-    read.
+    read. A file that would take more memory than `kineme.io.limits` allows is not read.
 
     Parameters
     ----------
@@ -45,6 +47,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         number it is also the step between samples of files without time stamps.
     skip : {"movement", "sample"}, default "movement"
         Whether a missing or repeated sample costs its whole movement or is left out alone. Both are reported.
+    follow_links : bool, default False
+        Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
     progress : callable, optional
         Wraps the list of files, to show how far the reading is.
 
@@ -53,12 +57,13 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     DataError
         Nothing there, or nothing in it that can be read; the message gives the first problem.
     SpecificationError
-        An unknown unit or choice.
+        An unknown unit or choice, or a limit of memory that is no number.
     """
+    max_file_bytes()
     layout = Layout(time, columns, movement, label, units, skip)
     path = Path(path)
     if path.is_dir():
-        files, problems = files_under(path)
+        files, problems = files_under(path, follow_links)
         watched = files if progress is None else progress(files)
         return join_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
     if not path.exists():

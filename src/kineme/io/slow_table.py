@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from kineme.errors import DataError
 from kineme.io.dialect import Dialect, split
 
 _STRETCH = 1000  # lines that are tried together
-
-#: What programs write where there is no number.
-MISSING = frozenset(("", "na", "n/a", "null", "none", "nan", "-", "--", "?"))
 
 
 def read_slowly(
@@ -27,6 +25,8 @@ def read_slowly(
         faults.update({n_rows + row: reason for row, reason in wrong.items()})
         stretches.append(rows)
         n_rows += len(rows)
+    if not stretches:
+        raise DataError("expected samples, got none below the heads")
     return np.concatenate(stretches), faults
 
 
@@ -34,12 +34,14 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
     texts = [dtype[name].kind == "O" for name in dtype.names or ()]
     if not (dialect.decimal_comma and any(texts)):
         plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
-        if (read := _try(plain, dialect, dtype)) is not None:
+        quoted = any('"' in line for line in plain)
+        known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
+        if known and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
-        if not any(texts) and dialect.separator:  # the usual fault is an empty cell
+        if not quoted and not any(texts) and dialect.separator:  # the usual fault is an empty cell
             filled = [_filled(line, dialect.separator) for line in plain]
-            if (read := _try(filled, dialect, dtype)) is not None:
-                return read, _empty_cells(read, dialect)
+            if (read := try_rows(filled, dialect, dtype)) is not None:
+                return read, _empty_cells(lines, dialect)
     rows = np.empty(len(lines), dtype)
     faults = {}
     for k, line in enumerate(lines):
@@ -49,11 +51,30 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
     return rows, faults
 
 
-def _try(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+    """Lines by NumPy's parser, texts without blanks around them; None if one is not as the others."""
     try:
-        return np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
+        rows = np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
     except ValueError:
         return None
+    for name in dtype.names or ():
+        if dtype[name].kind == "O":
+            rows[name] = [cell.strip() for cell in rows[name].tolist()]
+    return rows
+
+
+def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
+    """Whether all quotes stand around whole cells of one line, which every parser understands in the same way."""
+    if dialect.separator is None:
+        return False
+    marks = np.frombuffer(b"\n" + text + b"\n", np.uint8)
+    quotes, ends = np.flatnonzero(marks == ord('"')), np.flatnonzero((marks == ord("\n")) | (marks == ord("\r")))
+    if len(quotes) % 2:
+        return False
+    first, last = quotes[::2], quotes[1::2]
+    beside = np.concatenate((marks[first - 1], marks[last + 1]))
+    in_one_line = np.searchsorted(ends, first) == np.searchsorted(ends, last)
+    return bool(np.isin(beside, [*b"\r\n", ord(dialect.separator)]).all() and in_one_line.all())
 
 
 def _filled(line: str, separator: str) -> str:
@@ -65,13 +86,10 @@ def _filled(line: str, separator: str) -> str:
     return f"{line}nan" if line.endswith(separator) else line
 
 
-def _empty_cells(rows: Any, dialect: Dialect) -> dict[int, str]:
+def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
     """Row -> which number is missing."""
-    missing = np.isnan(np.column_stack([rows[name] for name in rows.dtype.names]))
-    return {
-        int(k): f"expected a number in {dialect.heads[int(np.argmax(missing[k]))]!r}, got nothing"
-        for k in np.flatnonzero(missing.any(axis=1))
-    }
+    cells = ((k, [cell.strip() for cell in line.split(dialect.separator)]) for k, line in enumerate(lines))
+    return {k: f"expected a number in {dialect.heads[row.index('')]!r}, got nothing" for k, row in cells if "" in row}
 
 
 def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
@@ -89,7 +107,7 @@ def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[An
 
 
 def _number(cell: str, comma: bool) -> float | None:
-    if cell.lower() in MISSING or "_" in cell:
+    if "_" in cell:  # Python takes 1_000 for a number, no table does
         return None
     try:
         return float(cell.replace(",", ".") if comma else cell)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from functools import cache
 from itertools import chain, islice
@@ -13,18 +14,21 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
 from kineme.io.dates import seconds_of_dates
-from kineme.io.dialect import COMMENTS, Dialect, detect_dialect, is_skipped
+from kineme.io.dialect import COMMENTS, Dialect, detect_dialect
 from kineme.io.layout import Layout
-from kineme.io.slow_table import read_slowly
+from kineme.io.limits import check_expanded
+from kineme.io.slow_table import quotes_are_plain, read_slowly, try_rows
 from kineme.io.table import Table
+
+_NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes that a cell of a number, a cell of text and a column take
 
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """Read a table of samples by lines.
 
     Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
-    where the separator is another mark. Empty lines and lines that begin with one of `COMMENTS` are skipped. A head
-    may stand in the last comment, as `numpy.savetxt` writes it.
+    where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
+    in the last comment, as `numpy.savetxt` writes it.
 
     Raises
     ------
@@ -33,6 +37,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """
     encoding = _encoding(data)
     dialect = detect_dialect(_lines(data, encoding))
+    _check_memory(data, dialect)
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
@@ -73,7 +78,10 @@ def _encoding(data: bytes) -> str:
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
     try:
-        yield from io.TextIOWrapper(io.BytesIO(data), encoding=encoding)
+        for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
+            if encoding == "utf-16" and "\0" in line:
+                raise DataError("expected text, got bytes that are none")
+            yield line
     except UnicodeError as error:
         raise DataError(f"expected text, got bytes that are none ({error})") from error
 
@@ -81,25 +89,29 @@ def _lines(data: bytes, encoding: str) -> Iterator[str]:
 def _samples(data: bytes, encoding: str, dialect: Dialect) -> Iterator[tuple[int, str]]:
     """Line number, counted from 1, and text of every sample."""
     numbered = enumerate(islice(_lines(data, encoding), dialect.first, None), dialect.first + 1)
-    return ((k, line) for k, line in numbered if not is_skipped(line))
+    return ((k, line) for k, line in numbered if dialect.is_sample(line))
+
+
+def _check_memory(data: bytes, dialect: Dialect) -> None:
+    """Refuse a table that would take more memory than the limit, from the number of its lines and columns."""
+    n_lines = 1 + max(data.count(b"\n"), data.count(b"\r"))
+    row = sum(_TEXT if kind == "text" else _NUMBER for kind in dialect.kinds)
+    check_expanded(len(data) + _COLUMN * len(dialect.kinds) + n_lines * row)
 
 
 def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any]) -> Any:
-    """All samples as a structured array, or None if a line is not as the others."""
+    """All samples as a structured array, or None if a line is not as the others; as `read_slowly`, or not at all."""
     has_text = any(dtype[name].kind == "O" for name in dtype.names or ())
     if dialect.decimal_comma and has_text:
         return None  # a comma in a name is not a decimal mark
+    if b'"' in data and not (encoding != "utf-16" and quotes_are_plain(data.removeprefix(BOM_UTF8), dialect)):
+        return None
     lines: Iterator[str] = islice(_lines(data, encoding), dialect.first, None)
     if any(mark.encode() in data for mark in COMMENTS):
-        lines = (line for line in lines if not is_skipped(line))
+        lines = filter(dialect.is_sample, lines)
     if dialect.decimal_comma:
         lines = (line.replace(",", ".") for line in lines)
-    first = next((line for line in lines if not is_skipped(line)), None)
+    first = next(filter(dialect.is_sample, lines), None)
     if first is None:
         raise DataError("expected samples, got none below the heads")
-    try:
-        return np.loadtxt(
-            chain((first,), lines), dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1
-        )
-    except ValueError:
-        return None
+    return try_rows(chain((first,), lines), dialect, dtype)

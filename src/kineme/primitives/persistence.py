@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,7 +23,7 @@ STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 
 _LABEL_TYPES = (str, int, float, bool)
 
-Arrays = dict[str, NDArray[Any]]
+Arrays = Mapping[str, NDArray[Any]]
 B = TypeVar("B", bound=Batch)
 T = TypeVar("T")
 
@@ -43,14 +43,14 @@ def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays
     header, arrays = read_container(Path(path), kind)
     try:
         return build(header, arrays)
-    except (KeyError, TypeError, ValueError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
         reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
         raise DataError(
             f"expected {path} to hold complete {kind}, got a header that does not fit ({reason})"
         ) from error
 
 
-def pack(batch: Batch) -> tuple[dict[str, Any], Arrays]:
+def pack(batch: Batch) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """A batch as a header of plain data and arrays."""
     labels = None if batch.labels is None else np.asarray(batch.labels).tolist()
     if labels is not None and not all(isinstance(label, _LABEL_TYPES) for label in labels):
@@ -69,7 +69,7 @@ def unpack(cls: type[B], header: dict[str, Any], arrays: Arrays) -> B:
     sizes = {"N": dmp.n_basis} | dict(zip("nd", arrays[next(iter(cls.ROWS))].shape, strict=False))
     for name, letters in cls.ROWS.items():
         check_array(name, arrays[name], tuple(sizes[letter] for letter in letters))
-    labels, names = header["labels"], header["names"]
+    labels, names = (_one_each(sizes["n"], header, name) for name in ("labels", "names"))
     build: Callable[..., B] = cls
     return build(
         dmp,
@@ -77,6 +77,17 @@ def unpack(cls: type[B], header: dict[str, Any], arrays: Arrays) -> B:
         labels=None if labels is None else label_array(labels, sizes["n"]),
         names=None if names is None else tuple(names),
     )
+
+
+def _one_each(n: int, header: dict[str, Any], name: str) -> list[Any] | None:
+    """Labels or names of a header, one per movement."""
+    given = header[name]
+    allowed = (str, type(None)) if name == "names" else _LABEL_TYPES
+    if given is not None and (
+        not isinstance(given, list) or len(given) != n or not all(isinstance(one, allowed) for one in given)
+    ):
+        raise ValueError(f"{name} should be {n} texts")
+    return given
 
 
 def check_array(name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
