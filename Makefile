@@ -1,6 +1,7 @@
 # make demo   the paper's tables and figures, in out/
 # make test   formatter, linter, type checker, tests
 # make soak   faults of the action library, many times: minutes
+# make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
@@ -8,7 +9,7 @@
 
 PYTHON ?= python3
 
-.PHONY: demo test soak bench evaluate figures lock clean
+.PHONY: demo test soak fuzz bench evaluate figures lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -21,6 +22,9 @@ test: .venv-dev/ready
 
 soak: .venv-dev/ready
 	.venv-dev/bin/pytest soak -p no:cacheprovider
+
+fuzz: .venv-dev/ready
+	.venv-dev/bin/pytest fuzz -p no:cacheprovider
 
 .venv/ready: requirements/run.txt pyproject.toml
 	$(call environment,.venv,requirements/run.txt)

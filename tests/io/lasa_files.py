@@ -86,21 +86,25 @@ def long_parquet(folder):
 def numbered_npz(folder):
     arrays = {f"x_{k}": one.positions for k, one in enumerate(demonstrations())}
     times = {f"t_{k}": one.times for k, one in enumerate(demonstrations())}
-    np.savez(folder / "all.npz", **arrays, **times, labels=demonstrations().labels)
+    np.savez(folder / "all.npz", **arrays, **times, labels=demonstrations().labels.astype(str))
     return folder / "all.npz"
 
 
 def block_npz(folder):
     demos = demonstrations()
     positions, times = demos.positions.reshape(len(demos), -1, 2), demos.times.reshape(len(demos), -1)
-    np.savez(folder / "all.npz", positions=positions, times=times, labels=demos.labels)
+    np.savez(folder / "all.npz", positions=positions, times=times, labels=demos.labels.astype(str))
     return folder / "all.npz"
 
 
 def joined_npz(folder):
     demos = demonstrations()
     np.savez(
-        folder / "all.npz", positions=demos.positions, times=demos.times, offsets=demos.offsets, labels=demos.labels
+        folder / "all.npz",
+        positions=demos.positions,
+        times=demos.times,
+        offsets=demos.offsets,
+        labels=demos.labels.astype(str),
     )
     return folder / "all.npz"
 

@@ -175,7 +175,7 @@ def test_labels_must_be_of_one_type_to_join():
         kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, [label]))
         for label in ("a", 1)
     )
-    with pytest.raises(kineme.TrajectoryError, match="labels of one type, got <U1, int64"):
+    with pytest.raises(kineme.TrajectoryError, match="labels of one type, got texts, int64"):
         kineme.Primitives.join([a, b])
     assert len(kineme.Primitives.join(one for one in (a, a))) == 2
 

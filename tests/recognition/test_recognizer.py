@@ -203,7 +203,7 @@ def test_a_label_that_says_nothing(label):
 
 def test_labels_that_are_missing_or_too_few():
     demos = draw_shapes([1, 1, 1])
-    with pytest.raises(TrajectoryError, match=r"one label for each of the 3 movements, got shape \(2,\)"):
+    with pytest.raises(TrajectoryError, match=r"one label for each of the 3 movements, got labels of shape \(2,\)"):
         Recognizer().fit(demos, ["a", "b"])
     with pytest.raises(TrajectoryError, match="expected labeled demonstrations, got none"):
         Recognizer().fit(Demonstrations.from_arrays([one.positions for one in demos]))

@@ -15,6 +15,7 @@ from kineme.anchoring.tree import average_linkage, cuts
 from kineme.errors import SpecificationError
 from kineme.recognition.recognizer import Recognizer
 from kineme.sampling import evenly_spaced
+from kineme.trajectories.labels import label_array
 from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once
@@ -158,8 +159,8 @@ def _mean_within(K: Array) -> float:
 
 
 def _labeled(movements: Any, labels: ArrayLike, like: Recognizer | None) -> tuple[Seen, NDArray[np.intp], list[Any]]:
-    seen, known = see(movements, like), np.asarray(labels)
-    if known.shape != (len(seen),):
+    seen, known = see(movements, like), label_array(labels)
+    if len(known) != len(seen):
         raise SpecificationError(f"expected one label for each of the {len(seen)} movements, got shape {known.shape}")
     names, member = np.unique(known, return_inverse=True)
     return seen, np.asarray(member, dtype=np.intp), names.tolist()

@@ -13,6 +13,7 @@ from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DataError
 from kineme.io.recordings import read_recordings
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 
 #: Name -> shapes.
 PACKAGED = {"lasa": LASA_26, "lasa-letters": PAPER_LETTERS}
@@ -57,7 +58,7 @@ def load_data(data: str) -> DataSet:
             f"expected at least two folders of at least two recordings each in {data}, found "
             f"{dict(sizes) or 'no labels'}{_reasons(left_out)}"
         )
-    labels = np.array([label for label, keep in zip(read.labels, kept, strict=True) if keep])
+    labels = label_array([label for label, keep in zip(read.labels, kept, strict=True) if keep])
     chosen = read.demonstrations[np.flatnonzero(kept)].movements
     return DataSet(Path(data).resolve().name, Demonstrations.of_movements(replace(chosen, labels=labels)), left_out)
 

@@ -14,6 +14,7 @@ from kineme.io.found import Block, Detected, Problem
 from kineme.io.read_file import FileRead
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 
 
 class Source(NamedTuple):
@@ -127,7 +128,7 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Dem
     labels: Any = [source.label for source in sources]
     names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
-    labeled = None if None in labels else np.array(labels)
+    labeled = None if None in labels else label_array(labels, len(labels), names)
     return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names))
 
 

@@ -15,10 +15,10 @@ from kineme.anchoring.propose import propose
 from kineme.anchoring.revise import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.seen import see_rows
 from kineme.errors import SpecificationError
-from kineme.library import read
 from kineme.recognition.recognizer import Recognizer
 from kineme.sampling import evenly_spaced
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 
 if TYPE_CHECKING:
     from kineme.library.library import ActionLibrary
@@ -201,5 +201,5 @@ def some_of_each(library: ActionLibrary) -> tuple[Ids, NDArray[Any]]:
     symbols = [symbol for symbol in library.symbols() if len(symbol)]
     share = max(1, _KNOWN // max(1, len(symbols)))
     some = [one.members[evenly_spaced(len(one), share)] for one in symbols]
-    labels = np.repeat(read.as_objects([one.name for one in symbols]), [len(members) for members in some])
+    labels = np.repeat(label_array([one.name for one in symbols]), [len(members) for members in some])
     return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

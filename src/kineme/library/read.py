@@ -17,6 +17,7 @@ from kineme.library.store import Store
 from kineme.primitives.primitives import Primitives
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]
@@ -203,14 +204,7 @@ def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int)
 
 
 def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:
-    return as_objects(labels) if all(label is not None for label in labels) else None
-
-
-def as_objects(texts: Sequence[Any]) -> NDArray[Any]:
-    """Texts as an array of objects: in an array of texts each takes as much room as the longest."""
-    found = np.empty(len(texts), dtype=object)
-    found[:] = texts
-    return found
+    return label_array(labels) if all(label is not None for label in labels) else None
 
 
 def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:

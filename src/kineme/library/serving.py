@@ -18,6 +18,7 @@ from kineme.recognition.answer import Answer, Neighbor, answers, is_one
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.shortlist import Shortlist, Stored
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.labels import label_array
 
 Ids = NDArray[np.int64]
 
@@ -122,7 +123,7 @@ def members_of(store: Store) -> Members:
         named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
     if lost := set(keys.tolist()) - named.keys():
         raise damaged("symbol", (min(lost),))
-    names, place = np.unique(read.as_objects([named[int(key)] for key in keys]), return_inverse=True)
+    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
     owner = place[which]
     order = np.lexsort((pairs[:, 0], owner))
     return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.trajectories.labels import label_array
 
 
 class Batch:
@@ -35,6 +36,8 @@ class Batch:
             view = getattr(self, name).view()
             view.setflags(write=False)
             object.__setattr__(self, name, view)
+        if self.labels is not None and np.asarray(self.labels).dtype.kind not in "biufO":
+            object.__setattr__(self, "labels", label_array(self.labels))
 
     def __len__(self) -> int:
         return len(getattr(self, next(iter(self.ROWS))))
@@ -81,7 +84,8 @@ class Batch:
                 f"expected labels on every batch or on none, got them on {len(labels)} of {len(batches)}"
             )
         if len({known.dtype.kind for known in labels}) > 1:
-            raise TrajectoryError(f"expected labels of one type, got {', '.join(str(known.dtype) for known in labels)}")
+            types = ("texts" if known.dtype == object else str(known.dtype) for known in labels)
+            raise TrajectoryError(f"expected labels of one type, got {', '.join(types)}")
         named = any(batch.names is not None for batch in batches)
         return first._with(
             {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in cls.ROWS},

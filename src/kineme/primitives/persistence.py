@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, KinemeError
 from kineme.io.container import read_container, write_container
 from kineme.primitives.batch import Batch
+from kineme.trajectories.labels import label_array
 from kineme.trajectories.resample import Resample
 from kineme.trajectories.smooth import Smooth
 from kineme.trajectories.trim import TrimRest
@@ -73,7 +74,7 @@ def unpack(cls: type[B], header: dict[str, Any], arrays: Arrays) -> B:
     return build(
         dmp,
         **{name: arrays[name] for name in cls.ROWS},
-        labels=None if labels is None else np.asarray(labels),
+        labels=None if labels is None else label_array(labels, sizes["n"]),
         names=None if names is None else tuple(names),
     )
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.trajectories.demonstrations import Demonstrations, require_labels
+from kineme.trajectories.labels import label_array
 from kineme.validation import describe
 
 
@@ -20,13 +21,17 @@ def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
     TrajectoryError
         No labels, another number of them, an empty or missing one; the message names the movement.
     """
-    labels = require_labels(demos) if y is None else np.asarray(y)
-    if labels.shape != (len(demos),):
-        raise TrajectoryError(f"expected one label for each of the {len(demos)} movements, got shape {labels.shape}")
+    labels = require_labels(demos) if y is None else label_array(y, len(demos), demos.names)
     for i, label in enumerate(labels.tolist()):
-        if label is None or isinstance(label, (list, tuple, dict)) or (isinstance(label, str) and not label.strip()):
+        if isinstance(label, (list, tuple, dict)) or (isinstance(label, str) and not label.strip()):
             raise TrajectoryError(
                 f"{describe(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
                 "name the action, or leave the movement out"
             )
+    try:
+        np.sort(labels)
+    except TypeError as error:
+        raise TrajectoryError(
+            f"expected labels that are texts or numbers, as classes have an order, got {error}"
+        ) from None
     return labels

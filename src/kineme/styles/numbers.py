@@ -22,6 +22,7 @@ from kineme.errors import TrajectoryError
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import decoder
 from kineme.primitives.primitives import Primitives
+from kineme.trajectories.labels import label_array
 from kineme.validation import Array
 
 
@@ -45,7 +46,7 @@ def check_primitives(primitives: Any) -> None:
 def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) -> Primitives:
     """Primitives from theta (n, d, N + 3) and tau (n,) [s]; all of them get `label`, unless it is None."""
     path = map_rows(theta, path_matrix(dmp, dmp.n_points))
-    labels: NDArray[Any] | None = None if label is None else np.full(len(theta), label)
+    labels: NDArray[Any] | None = None if label is None else label_array([label] * len(theta))
     return Primitives(
         dmp,
         scaled_weights=np.ascontiguousarray(theta[:, :, :-3]),

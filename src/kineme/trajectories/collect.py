@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.trajectories.labels import label_array
 from kineme.trajectories.trajectory import Trajectory
 from kineme.validation import Array, as_positions, as_times, check_finite, check_times, describe, refuse_lossy
 
@@ -101,7 +102,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         offsets,
         times[offsets[1:] - 1] - times[offsets[:-1]],
         times,
-        _as_labels(labels, len(labels), names) if labeled else None,
+        label_array(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
     )
 
@@ -129,7 +130,7 @@ def collect_arrays(
         offsets,
         durations,
         stamps,
-        None if labels is None else _as_labels(labels, n, names),
+        None if labels is None else label_array(labels, n, names),
         None if names is None else tuple(names),
     )
 
@@ -198,14 +199,3 @@ def _join_times(
     stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
     check_times(stamps, offsets, names)
     return stamps
-
-
-def _as_labels(labels: Any, n: int, names: Sequence[str | None] | None) -> NDArray[Any]:
-    array = np.array(labels)
-    if array.shape != (n,):
-        raise TrajectoryError(f"expected one label for each of the {n} movements, got labels of shape {array.shape}")
-    if array.dtype == object and None in (known := array.tolist()):
-        raise TrajectoryError(
-            f"expected a label on every movement or on none, got none on {describe(known.index(None), names)}"
-        )
-    return array

@@ -1,0 +1,60 @@
+"""One limit on what a file may take in memory once it is read, whatever its format.
+
+A small file can expand to more than any memory holds: by compression, by a header that promises much, by numbers
+written in two characters each. Readers therefore ask here before they expand anything. The limit is
+the environment variable ``KINEME_MAX_FILE_BYTES``; by default 4 GiB, or half of the memory where that is less.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+
+from kineme.errors import DataError, SpecificationError
+
+VARIABLE = "KINEME_MAX_FILE_BYTES"
+
+_MOST = 4 * 2**30
+
+
+def max_file_bytes() -> int:
+    """The limit [bytes].
+
+    Raises
+    ------
+    SpecificationError
+        The environment variable is no whole number above 0.
+    """
+    given = os.environ.get(VARIABLE)
+    if given is None:
+        return _by_default()
+    if not given.strip().isdecimal() or not int(given):
+        raise SpecificationError(
+            f"expected the environment variable {VARIABLE} to be a whole number of bytes above 0, got {given!r}; "
+            "unset it for the default"
+        )
+    return int(given)
+
+
+def check_expanded(n_bytes: int, what: str = "a file") -> None:
+    """Refuse what would take more memory than the limit.
+
+    Raises
+    ------
+    DataError
+        The message names the limit and how to raise it.
+    """
+    if n_bytes > (most := max_file_bytes()):
+        raise DataError(
+            f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
+            f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
+        )
+
+
+@cache
+def _by_default() -> int:
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # not every system tells
+        return _MOST
+    return min(_MOST, memory // 2) if memory > 0 else _MOST

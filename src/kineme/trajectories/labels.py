@@ -1,0 +1,85 @@
+"""What names the action of each movement: texts as objects, numbers as numbers, never both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Number
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.validation import describe
+
+_NUMBERS = (Number, np.bool_)
+_ADVICE = "name the action, or leave the movement out"
+
+
+def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] | None = None) -> NDArray[Any]:
+    """One label per movement as an array of shape (n,).
+
+    Texts, and whatever else is no number, become an array of objects, texts as plain `str`. An array of fixed width
+    would make every label as large as the longest, and would merge labels that differ in trailing NULs. Numbers stay
+    an array of numbers.
+
+    Parameters
+    ----------
+    labels : array_like of shape (n,)
+    n : int, optional
+        How many there should be; by default as many as there are.
+    names : sequence of n str or None, optional
+        Names of the movements, for messages.
+
+    Raises
+    ------
+    TrajectoryError
+        Another number of labels, a missing one (None, NaN), or texts and numbers together; the message names the
+        movement.
+    """
+    array = labels if isinstance(labels, np.ndarray) else _as_objects(labels)
+    if array.ndim != 1 or (n is not None and len(array) != n):
+        many = f"each of the {n} movements" if n is not None else "each movement"
+        raise TrajectoryError(f"expected one label for {many}, got labels of shape {array.shape}")
+    known = array.tolist() if array.dtype.kind in "USTOfc" else []  # of the others every one is a label
+    kinds = set(map(type, known))
+    if kinds == {str}:
+        return _objects(known)
+    _check_each(known, names)
+    if kinds and issubclass(next(iter(kinds)), str):
+        return _objects([str.__str__(label) for label in known])  # plain, also where they are of a subclass
+    if array.dtype != object:
+        return array.copy()
+    return np.array(known) if known and isinstance(known[0], _NUMBERS) else _objects(known)
+
+
+def _as_objects(labels: Any) -> NDArray[Any]:
+    """Not `np.asarray`, which turns numbers beside texts into texts; a frame's column becomes an array by itself."""
+    return np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
+
+
+def _objects(texts: Sequence[Any]) -> NDArray[Any]:
+    array = np.empty(len(texts), dtype=object)
+    array[:] = texts
+    return array
+
+
+def _check_each(labels: Sequence[Any], names: Sequence[str | None] | None) -> None:
+    """Refuse the first label that is missing, neither text nor number, or of another kind than the first."""
+    for i, label in enumerate(labels):
+        if label is None:
+            raise TrajectoryError(
+                f"expected a label on every movement or on none, got none on {describe(i, names)}; "
+                f"expected text or a number, got None; {_ADVICE}"
+            )
+        if isinstance(label, _NUMBERS) and label != label:  # noqa: PLR0124 - only NaN differs from itself
+            raise TrajectoryError(f"{describe(i, names)}: expected a label, got {label!r}, which names none; {_ADVICE}")
+        if _kind(label) != _kind(labels[0]):
+            raise TrajectoryError(
+                f"{describe(i, names)}: expected labels that are all texts or all numbers, got {label!r} beside "
+                f"{labels[0]!r}; pass [str(label) for label in labels]"
+            )
+
+
+def _kind(label: Any) -> str:
+    return "text" if isinstance(label, str) else "number" if isinstance(label, _NUMBERS) else "other"
