@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 
 from kineme.errors import DataError
 from kineme.io.atomic import write_atomically
+from kineme.text import printable_lines
 
 #: Okabe and Ito's palette, from dark to light.
 BLUE, ORANGE, GREEN, PURPLE, GRAY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#777777"
@@ -51,9 +53,20 @@ FORMATS: dict[str, dict[str, Any]] = {
 
 
 def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
-    """The figure as the bytes of a file of that kind, see `FORMATS`."""
+    """The figure as the bytes of a file of that kind, see `FORMATS`.
+
+    Names that came from files are written out like those on a terminal, if `drawable` has not done it: SVG keeps them
+    in comments, where XML allows no control characters.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if (shown := printable_lines(text.get_text())) != text.get_text():
+            text.set_text(shown)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=dpi, **FORMATS[kind])
+    with warnings.catch_warnings():  # a box stands for a letter that the font lacks
+        warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
+        figure.savefig(buffer, format=kind, dpi=dpi, **FORMATS[kind])
     return buffer.getvalue()
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from html import escape
 from typing import Any
+
+from kineme.text import in_markup
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -25,8 +26,8 @@ footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid
 def picture(svg: bytes, caption: str, head: str = "") -> str:
     """A figure element with the drawing inside; `head` stands before the visible caption."""
     return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/svg+xml;base64,{b64encode(svg).decode()}">'
-        f"<figcaption>{escape(head + caption)}</figcaption></figure>"
+        f'<figure><img alt="{in_markup(caption)}" src="data:image/svg+xml;base64,{b64encode(svg).decode()}">'
+        f"<figcaption>{in_markup(head + caption)}</figcaption></figure>"
     )
 
 
@@ -42,11 +43,11 @@ def page(title: str, heading: str, body: str, facts: dict[str, Any]) -> str:
     facts : dict
         Settings and versions, printed at the end.
     """
-    listed = "; ".join(f"{escape(str(key))} {escape(str(value))}" for key, value in facts.items())
+    listed = "; ".join(f"{in_markup(key)} {in_markup(value)}" for key, value in facts.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title><style>{_STYLE}</style></head><body>
-<h1>{escape(heading)}</h1>
+<title>{in_markup(title)}</title><style>{_STYLE}</style></head><body>
+<h1>{in_markup(heading)}</h1>
 {body}
 <footer>{listed}</footer>
 </body></html>

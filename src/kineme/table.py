@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 from statistics import fmean
 from textwrap import fill, wrap
 from typing import NamedTuple
+
+from kineme.text import in_markup, printable, printable_lines
 
 
 class Table(NamedTuple):
@@ -25,12 +26,13 @@ def spread(values: Sequence[float]) -> str:
 
 def to_text(table: Table, width: int = 160) -> str:
     """Columns aligned for a terminal; the last one is wrapped to stay within `width`."""
-    lines = [table.columns, *table.rows]
+    lines = [tuple(map(printable, row)) for row in (table.columns, *table.rows)]
     widths = [max(len(row[k]) for row in lines) for k in range(len(table.columns))]
     widths[-1] = max(24, min(widths[-1], width - sum(widths[:-1]) - 2 * len(widths)))
     rendered = [line for row in lines for line in _wrapped(row, widths)]
     rule = "-" * max(map(len, rendered))
-    return "\n".join(filter(None, [table.title, rule, rendered[0], rule, *rendered[1:], fill(table.reading, 110)]))
+    title, reading = printable_lines(table.title), fill(printable_lines(table.reading), 110)
+    return "\n".join(filter(None, [title, rule, rendered[0], rule, *rendered[1:], reading]))
 
 
 def _wrapped(row: tuple[str, ...], widths: list[int]) -> list[str]:
@@ -41,13 +43,15 @@ def _wrapped(row: tuple[str, ...], widths: list[int]) -> list[str]:
 
 def to_html(table: Table) -> str:
     """A table element with caption."""
-    head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in table.columns)
+    head = "".join(f'<th scope="col">{in_markup(cell)}</th>' for cell in table.columns)
     body = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>' + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:]) + "</tr>"
+        f'<tr><th scope="row">{in_markup(row[0])}</th>'
+        + "".join(f"<td>{in_markup(cell)}</td>" for cell in row[1:])
+        + "</tr>"
         for row in table.rows
     )
-    reading = f"<p>{escape(table.reading)}</p>" if table.reading else ""
+    reading = f"<p>{in_markup(table.reading)}</p>" if table.reading else ""
     return (
-        f"<figure><table><caption>{escape(table.title)}</caption><thead><tr>{head}</tr></thead>"
+        f"<figure><table><caption>{in_markup(table.title)}</caption><thead><tr>{head}</tr></thead>"
         f"<tbody>{body}</tbody></table>{reading}</figure>"
     )

@@ -13,6 +13,7 @@ from kineme.anchoring.space import ConceptualSpace
 from kineme.errors import SpecificationError
 from kineme.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.primitives.primitives import Primitives
+from kineme.text import drawable
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -68,7 +69,7 @@ def draw_map(space: ConceptualSpace, prototypes: Any) -> Figure:
         plot_paths(axes, drawn[None], BLUE, linewidth=1.3)
         mark_start(axes, drawn[None], ORANGE, 3.5)
         axes.annotate(
-            str(name).replace("$", r"\$"), (place[0], drawn[1].min()), (0, -4), textcoords="offset points",
+            drawable(name), (place[0], drawn[1].min()), (0, -4), textcoords="offset points",
             ha="center", va="top", fontsize=6.5, color=GRAY, annotation_clip=False,
         )  # fmt: skip
     bare(axes, 2)

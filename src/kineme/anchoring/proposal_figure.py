@@ -11,6 +11,7 @@ from kineme.anchoring.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.proposals import Proposal, check_members
 from kineme.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.recognition.recognizer import Recognizer
+from kineme.text import drawable
 from kineme.trajectories.demonstrations import Demonstrations
 
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
@@ -47,7 +48,7 @@ def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Rec
     mark_start(inset, drawn, ORANGE, 2.0)
     bare(inset, demos.n_dims)
     inset.set_title("as recorded", fontsize=7, color=GRAY)
-    axes.set_title(title or words(proposal))
+    axes.set_title(drawable(title) or words(proposal))
     axes.set_xlabel(_ABOUT.get(demos.n_dims, "widest view of the medoid"))
     return figure
 

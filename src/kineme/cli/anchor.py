@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option
-from kineme.cli.output import count, printable, say
+from kineme.cli.output import count, say, write
+from kineme.text import printable
 
 _SHOWN = 5  # movements left over, written out
 
@@ -81,7 +82,7 @@ def anchor(folder: Path, **options: Any) -> None:
         }
         alone = _named(library, proposals.left_over)
         if interactive:
-            click.echo(_text(data, alone))
+            write(_text(data, alone))
             Session(library, proposals, pictures[1:]).run()
             return
         data["accepted"] = _accept(library, proposals, accepted, names)

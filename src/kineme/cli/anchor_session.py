@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.output import count, printable
+from kineme.cli.output import ask, confirm, count, write
 from kineme.errors import KinemeError
+from kineme.text import printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
@@ -48,22 +49,22 @@ class Session:
     def run(self) -> None:
         """Until the list is empty, /quit, or the end of the input."""
         if self.items:
-            click.echo("Give each a name; /help says what else there is.")
+            write("Give each a name; /help says what else there is.")
         while self.items:
             item = self.items[0]
-            click.echo(self._summary(item))
+            write(self._summary(item))
             try:
-                line = click.prompt("name", default="", show_default=False)
+                line = ask("name")
             except click.Abort:
-                click.echo()
+                write()
                 break
             try:
                 if not self._answer(item, line):
                     break
             except KinemeError as error:
-                click.echo(f"  {printable(error)}")
+                write(f"  {printable(error)}")
         left = len(self.library.unlabeled())
-        click.echo(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
+        write(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
 
     def _answer(self, item: Item, line: str) -> bool:
         """Do what the person says; whether to go on."""
@@ -71,7 +72,7 @@ class Session:
         if command in {"/quit", "/q"}:
             return False
         if command == "/help":
-            click.echo(HELP)
+            write(HELP)
         elif command == "/members":
             self._members(item)
         elif command == "/split":
@@ -82,7 +83,7 @@ class Session:
         elif command == "/name":
             self._accept(item, rest)
         elif command.startswith("/"):
-            click.echo(f"  expected a name or one of /split, /reject, /members, /name, /quit, got {printable(command)}")
+            write(f"  expected a name or one of /split, /reject, /members, /name, /quit, got {printable(command)}")
         elif line:
             self._accept(item, line)
         else:
@@ -90,17 +91,17 @@ class Session:
         return True
 
     def _accept(self, item: Item, name: str) -> None:
-        if name in self.library and not click.confirm(f"  join {printable(name)}, which exists?", default=True):
+        if name in self.library and not confirm(f"  join {printable(name)}, which exists?", default=True):
             return
         self.library.accept(item.proposal, name)
         self.items.popleft()
         symbol = self.library[name]
-        click.echo(f"  {printable(symbol.name)}: {count(len(symbol), 'movement')} ({symbol.id})")
+        write(f"  {printable(symbol.name)}: {count(len(symbol), 'movement')} ({symbol.id})")
 
     def _split(self, item: Item) -> None:
         parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
         if len(parts) < 2:
-            click.echo("  no two kinds of two movements or more in it")
+            write("  no two kinds of two movements or more in it")
             return
         self.items.popleft()
         for k in reversed(range(len(parts))):
@@ -109,7 +110,7 @@ class Session:
     def _members(self, item: Item) -> None:
         names = self.library.movements(ids=item.proposal.members).names or ()
         for key, name in zip(item.proposal.members.tolist(), names, strict=False):
-            click.echo(f"  {key}  {printable(name or '')}")
+            write(f"  {key}  {printable(name or '')}")
 
     def _summary(self, item: Item) -> str:
         one = item.proposal

@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from kineme.cli.output import write
+
 # The names of the tables in kineme.evaluation, written out so that --help loads nothing; a test compares them.
 PROTOCOL_NAMES = ("few-shot", "leave-one-out", "cross-validation", "robustness", "any-angle", "open-set", "earliness")
 METHOD_NAMES = (
@@ -50,12 +52,12 @@ def evaluate(data: str, protocols: tuple[str, ...], methods: tuple[str, ...], **
     settings = Settings(splits, options["seed"], tuple(options["shots"]))
     read = load_data(data)
     for name, reason in read.left_out.items():
-        click.echo(f"left out {name}: {reason}", err=True)
+        write(f"left out {name}: {reason}", err=True)
     done = run(read, (asked, contenders), settings, options["out"], Runner(options["jobs"] or n_threads(), _progress))
-    click.echo("\n\n".join(map(to_text, done.tables)))
+    write("\n\n".join(map(to_text, done.tables)))
     for name, reason in (done.results.absent | done.results.skipped).items():
-        click.echo(f"{name}: {reason}")
-    click.echo(f"\nopen {done.files[0]}")
+        write(f"{name}: {reason}")
+    write(f"\nopen {done.files[0]}")
 
 
 def _progress(items: Any, total: int) -> Any:

@@ -9,7 +9,8 @@ import click
 from click.core import ParameterSource
 
 from kineme.cli.options import Numbers, SymbolName, json_option, library_option_of
-from kineme.cli.output import printable
+from kineme.cli.output import write_bytes
+from kineme.text import printable
 
 
 @click.command(short_help="Move again: a symbol or a recording, to a new goal.")
@@ -114,6 +115,6 @@ def _write(output: Path, made: Any, ending: str) -> None:
     from kineme.io.movements import encode_movement, write_movement
 
     if str(output) == "-":
-        click.echo(encode_movement(made, ending), nl=False)
+        write_bytes(encode_movement(made, ending))
     else:
         write_movement(output, made)

@@ -8,8 +8,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option
-from kineme.cli.output import printable, say
+from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
+from kineme.text import printable
 
 
 @click.command(short_help="Show what a set of recordings holds.")

@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option
-from kineme.cli.output import count, printable, say
+from kineme.cli.output import count, say
 from kineme.cli.reading import layout_options, read
+from kineme.text import printable
 
 _SHOWN = 10  # problems written out
 

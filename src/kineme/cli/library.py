@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from kineme.cli.options import SymbolName, json_option, library_option
-from kineme.cli.output import count, in_words, printable, say
+from kineme.cli.output import confirm, count, in_words, say
+from kineme.text import printable
 
 
 @click.group()
@@ -107,7 +108,7 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
         raise click.UsageError("expected a SYMBOL, or --movement ID, and not both")
     what = printable(symbol) if symbol is not None else count(len(movements), "movement")
     if not yes:
-        click.confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
+        confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
     with opened(folder, read_only=False) as actions:
         actions.delete(symbol if symbol is not None else list(movements))
         data = {"deleted": symbol if symbol is not None else list(movements), "version": actions.version}
@@ -146,7 +147,11 @@ def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
         problems = [str(problem) for problem in actions.verify()]
         n = len(actions)
     data = {"ok": not problems, "movements": n, "problems": problems}
-    say(as_json, data, lambda: "\n".join(problems) if problems else f"{count(n, 'movement')}, nothing wrong")
+    say(
+        as_json,
+        data,
+        lambda: "\n".join(map(printable, problems)) if problems else f"{count(n, 'movement')}, nothing wrong",
+    )
     ctx.exit(1 if problems else 0)
 
 

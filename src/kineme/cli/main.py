@@ -14,12 +14,13 @@ from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
-from kineme.cli.output import printable
+from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.revise import COMMANDS as REVISING
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
+from kineme.text import printable, printable_lines
 
 
 class _OneLineErrors(click.Group):
@@ -30,8 +31,11 @@ class _OneLineErrors(click.Group):
             sys.stdout.reconfigure(errors="backslashreplace")  # what its encoding lacks is written out
         try:
             return super().invoke(ctx)
+        except click.ClickException as error:
+            error.message = printable_lines(error.message)  # type: ignore[misc] # click prints it
+            raise
         except (KinemeError, OSError) as error:
-            click.echo(f"kineme: {printable(error)}", err=True)
+            write(f"kineme: {printable(error)}", err=True)
             sys.exit(1)
 
 

@@ -9,12 +9,34 @@ from typing import Any
 
 import click
 
+from kineme.text import printable_lines
+
 _LISTED = 12  # items of a list, written out
 
 
 def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
     """Print `data` as one JSON document, or the text."""
-    click.echo(to_json(data, sys.stdout.encoding or "utf-8") if as_json else text())
+    write(to_json(data, sys.stdout.encoding or "utf-8") if as_json else text())
+
+
+def write(text: Any = "", *, err: bool = False) -> None:
+    """Print lines, without anything that a terminal would obey; what comes from a file may hold that."""
+    click.echo(printable_lines(text), err=err)
+
+
+def write_bytes(data: bytes) -> None:
+    """Print a file as it is, for the program that reads it."""
+    click.echo(data, nl=False)
+
+
+def ask(question: str) -> str:
+    """A line from the person at the terminal; empty for none."""
+    return str(click.prompt(printable_lines(question), default="", show_default=False))
+
+
+def confirm(question: str, **options: Any) -> bool:
+    """Yes or no from the person at the terminal."""
+    return click.confirm(printable_lines(question), **options)
 
 
 def to_json(data: Any, encoding: str = "utf-8") -> str:
@@ -25,13 +47,8 @@ def to_json(data: Any, encoding: str = "utf-8") -> str:
     except UnicodeEncodeError:
         shown = False
     else:
-        shown = text.replace("\n", "").isprintable()
+        shown = printable_lines(text) == text
     return text if shown else json.dumps(data, allow_nan=False, indent=1)
-
-
-def printable(name: Any) -> str:
-    """A name as a terminal may show it: control characters, which a terminal would obey, are written out."""
-    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in str(name))
 
 
 def count(number: int, what: str) -> str:

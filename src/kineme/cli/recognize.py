@@ -9,8 +9,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option
-from kineme.cli.output import printable, say
+from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
+from kineme.text import printable
 
 
 @click.command(short_help="Say which symbol a recording shows, if any.")

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from kineme.cli.output import write
+
 
 @click.command(short_help="Repeat the paper's tables and figures.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
@@ -30,5 +32,5 @@ def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     result = run(out, draws or (3 if quick else 12), seed, quick, progress)
     from kineme.table import to_text
 
-    click.echo("\n\n".join(map(to_text, result.tables)))
-    click.echo(f"\n{len(result.files)} files in {out}; open {out / 'report.html'}")
+    write("\n\n".join(map(to_text, result.tables)))
+    write(f"\n{len(result.files)} files in {out}; open {out / 'report.html'}")

@@ -8,7 +8,8 @@ import click
 
 from kineme.cli.library import brief, opened
 from kineme.cli.options import SymbolName, json_option, library_option
-from kineme.cli.output import count, printable, say
+from kineme.cli.output import count, say
+from kineme.text import printable
 
 
 @click.command()

@@ -11,7 +11,8 @@ import click
 
 from kineme.cli.library import opened
 from kineme.cli.options import SymbolName, json_option, library_option
-from kineme.cli.output import count, printable, say, to_json
+from kineme.cli.output import count, say, to_json
+from kineme.text import printable
 
 
 @click.command(short_help="Write a symbol for a planner, as JSON.")

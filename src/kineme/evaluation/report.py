@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 from kineme.evaluation.data import DataSet
@@ -12,6 +11,7 @@ from kineme.evaluation.protocols import PROTOCOLS
 from kineme.evaluation.results import Results
 from kineme.page import page, picture
 from kineme.table import Table, spread, to_html
+from kineme.text import in_markup
 from kineme.trajectories.demonstrations import require_labels
 
 _MEASURES = {"accuracy": "accuracy", "auroc": "AUROC", "rejected": "unknown rejected"}
@@ -71,11 +71,11 @@ def rivals_ahead(protocol: str, results: Results) -> str:
 
 def write_report(data: DataSet, results: Results, tables: dict[str, Table], facts: dict[str, Any]) -> str:
     """HTML with tables and drawings."""
-    parts = [f'<p class="lead">{escape(_lead(data))}</p>']
+    parts = [f'<p class="lead">{in_markup(_lead(data))}</p>']
     for name, table in tables.items():
         drawn = draw_protocol(name, results)
         shown = "" if drawn is None else picture(drawn, f"{PROTOCOLS[name].title}: mean over splits.")
-        parts.append(f"<h2>{escape(PROTOCOLS[name].title)}</h2>{to_html(table)}{shown}")
+        parts.append(f"<h2>{in_markup(PROTOCOLS[name].title)}</h2>{to_html(table)}{shown}")
     missing = {METHODS[name].title: why for name, why in results.absent.items()}
     missing |= {PROTOCOLS[name].title: why for name, why in results.skipped.items()} | data.left_out
     if missing:

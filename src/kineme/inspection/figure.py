@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from kineme.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.inspection.inspect import labels_in_order
 from kineme.io.join_files import Recordings
+from kineme.text import drawable
 from kineme.trajectories.axes import axis_names
 from kineme.trajectories.trajectory import Trajectory
 
@@ -43,7 +44,7 @@ def draw_recordings(recordings: Recordings) -> Figure:
     first = ", ".join(recordings.detected[0][0].columns[:3]) if recordings.detected else ", ".join(axis_names(n_dims))
     across = f"{first} over time [s]" if n_dims == 1 else f"{first} of {n_dims} dimensions" if n_dims > 3 else first
     more = f"; the first {_PANELS} of {len(labels)} labels" if len(labels) > _PANELS else ""
-    figure.legend(handles=_key(across + more), loc="outside lower center", ncols=3, handletextpad=0.3)
+    figure.legend(handles=_key(drawable(across) + more), loc="outside lower center", ncols=3, handletextpad=0.3)
     return figure
 
 
@@ -59,7 +60,7 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
     axes.plot(*ends.T, "*", color=ORANGE, markersize=5.5, markeredgewidth=0, zorder=4)
     name = "no label" if label is None else label
     name = name if len(name) <= _NAME else name[: _NAME - 1] + "…"
-    axes.set_title(f"{name.replace('$', chr(92) + '$')} ({len(chosen)})", pad=3)
+    axes.set_title(f"{drawable(name)} ({len(chosen)})", pad=3)
     if paths[0].shape[1] > 2:
         _tidy_space(axes)
     elif recordings.demonstrations.n_dims == 1:

@@ -8,6 +8,7 @@ from typing import Any
 from kineme.inspection.inspect import Inspection, LabelSummary, Range
 from kineme.io.found import Detected
 from kineme.table import Table, to_text
+from kineme.text import printable
 
 _SHOWN = 20  # problems, duplicates and kinds of files that are written out
 
@@ -31,7 +32,7 @@ def as_data(found: Inspection) -> dict[str, Any]:
     }
 
 
-def as_words(found: Inspection, printable: Names = str) -> str:
+def as_words(found: Inspection, printable: Names = printable) -> str:
     """A table of labels, how files were understood, what is double, what could not be read."""
     rows = [_row(one, printable) for one in found.labels]
     title = (

@@ -18,6 +18,8 @@ from kineme.library.rows import ALIVE, Row, among, check_size, damage, damaged, 
 from kineme.library.schema import COLUMNS, MAX_TEXT
 from kineme.library.store import Change, Moment, Store
 
+_ALIKE = 100  # characters by which names are alike: the search takes their square
+
 #: How a movement came to its symbol.
 HOW = ("label", "anchored", "recognized")
 
@@ -102,7 +104,7 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
         if found:
             return found[0]
     names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {ALIVE}", {"v": version})]
-    like = difflib.get_close_matches(str(who), names, 3) or sorted(names)[:5]
+    like = difflib.get_close_matches(str(who)[:_ALIKE], [name[:_ALIKE] for name in names], 3) or sorted(names)[:5]
     known = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
     raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {known}")
 

@@ -13,6 +13,7 @@ from kineme.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.primitives.primitives import Primitives
 from kineme.styles.learn import learn_styles
 from kineme.styles.model import StyleModel
+from kineme.text import drawable
 from kineme.validation import Array, check_count
 
 
@@ -53,7 +54,7 @@ def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figu
     corners = np.concatenate([x.reshape(-1, 2) for x in shown])
     for axes, title in ((left, "(a) demonstrated"), (middle, "(b) from one style to the other")):
         axes.update_datalim(corners)  # the same scale in both
-        axes.set(title=title, xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+        axes.set(title=title, xlabel=f"x [{drawable(unit)}]", ylabel=f"y [{drawable(unit)}]")
         axes.set_aspect("equal", adjustable="datalim")
     _plane(right, model, second, route, colors)
     figure.legend(handles=_key(), loc="outside lower center", ncols=4)
