@@ -17,6 +17,7 @@ SUBJECTS = (
     "rhythm",
     "control",
     "recognize",
+    "one_shot",
     "library",
     "binning",
     "anchoring",

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-_PRINTED = re.compile(r"^ *print\(.*\)  # (.+)$", re.MULTILINE)
+_PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
 
 class Step(NamedTuple):
@@ -37,13 +37,40 @@ def walk(page: Path, folder: Path) -> Iterator[Step]:
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)
 
 
+def otherwise(step: Step) -> str | None:
+    """What a command or block really answers, where that is not what the page shows; None where it is.
+
+    In what a page shows, ``...`` alone on a line is any lines, and within a line any text.
+    """
+    answer = "".join(f"{_normal(line)}\n" for line in step.answer)
+    lines = [
+        r"(?:.*\n)*?" if line.strip() == "..." else re.escape(_normal(line)).replace(r"\.\.\.", ".*?") + "\n"
+        for line in step.shown
+    ]
+    return None if re.fullmatch("".join(lines), answer) else answer
+
+
+def _normal(line: str) -> str:
+    """A line without what differs from run to run: ids of symbols, times of day, and the width of rules."""
+    line = re.sub(r"sym-[0-9a-f]{12}", "sym-ID", line.rstrip())
+    line = re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d", "TIME", line)
+    return re.sub(r"^-{5,}$", "-----", line)
+
+
 def _run_python(text: str, name: str, folder: Path, names: dict[str, Any]) -> Step:
-    """What a page shows of a block is the comment behind each ``print`` that has one."""
     printed = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
         exec(compile(text, name, "exec"), names)
-    shown = [line for comment in _PRINTED.findall(text) for line in ("...", comment)]
-    return Step(text, [*shown, "..."] if shown else [], printed.getvalue().splitlines(), 0)
+    return Step(text, shown_by(text), printed.getvalue().splitlines(), 0)
+
+
+def shown_by(text: str) -> list[str]:
+    """What a Python block shows of its output: the comment behind a ``print``, or below it; ``...`` where none is."""
+    shown: list[str] = []
+    for behind, below in _PRINTED.findall(text):
+        lines = [line.strip().removeprefix("# ") for line in below.split("\n") if line]
+        shown += [behind] if behind else lines or ["..."]
+    return shown
 
 
 def _run_console(text: str, folder: Path) -> Iterator[Step]:

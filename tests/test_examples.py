@@ -1,5 +1,6 @@
-"""Everything shown is executed: the README's Python blocks, and the examples in docstrings."""
+"""Everything shown is executed, and what it prints is compared: pages, and the examples in docstrings."""
 
+import ast
 import doctest
 import importlib
 import pkgutil
@@ -7,6 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
+from walk_through import otherwise, shown_by, walk
 
 import kineme
 
@@ -19,18 +21,34 @@ MODULES = [
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_python_blocks_of_pages_run(page, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    namespace = {}
-    for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
-        exec(compile(block, page.name, "exec"), namespace)
+def test_pages_run_and_print_what_they_show(page, tmp_path):
+    steps = list(walk(page, tmp_path))
+    others = {step.source: answer for step in steps if (answer := otherwise(step)) is not None}
+    assert not others
 
 
-def test_the_readme_shows_its_own_result(capsys):
-    block = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)[1]
-    claimed = float(re.search(r"\.mean\(\)\)\s+# ([\d.]+)", block)[1])
-    exec(compile(block, "README.md", "exec"), {})
-    assert float(capsys.readouterr().out.split()[0]) == claimed
+@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=lambda page: page.name)
+def test_pages_show_what_every_print_prints(page):
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    for block in blocks:
+        prints = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.Call) and _name(node) == "print"]
+        shown = shown_by(block)
+        assert len(shown) >= len(prints)
+        assert "..." not in shown, block
+
+
+def _name(call):
+    return getattr(call.func, "id", None)
+
+
+def test_a_page_that_shows_another_result_is_found_out(tmp_path):
+    page = tmp_path / "page.md"
+    for shown, right in (("2", True), ("3", False), ("", True)):
+        page.write_text(f"```python\nprint(1 + 1){f'  # {shown}' if shown else ''}\nprint('a\\nb')\n# a\n# b\n```\n")
+        (step,) = walk(page, tmp_path)
+        assert (otherwise(step) is None) is right
+    page.write_text("```python\nprint(1)  # 1\nprint(2)\n# 2\n```\n")
+    assert next(walk(page, tmp_path)).shown == ["1", "2"]
 
 
 @pytest.mark.parametrize("name", MODULES)

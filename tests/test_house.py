@@ -55,6 +55,20 @@ def test_test_files_have_names_of_their_own():
     assert [one for one, other in pairwise(names) if one == other] == []
 
 
+_BRITISH = re.compile(
+    r"\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi)s(?:e[ds]?|ing|ation)\b"
+    r"|neighbour|colour|behaviour|favour|\bcentre[ds]?\b|\bgrey|label(?:led|ling)|modell(?:ed|ing)",
+    re.IGNORECASE,
+)
+
+
+def test_spelling_is_american():
+    pages = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "pyproject.toml")]
+    pages += [*(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").glob("*.py"), *SOURCES]
+    found = {str(page.relative_to(ROOT)): _BRITISH.findall(page.read_text(encoding="utf-8")) for page in pages}
+    assert not {page: words for page, words in found.items() if words}
+
+
 def _tracked():
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode:

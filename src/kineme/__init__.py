@@ -1,4 +1,4 @@
-"""kineme: learn movements as Dynamical Movement Primitives, recognise them, name them, move again.
+"""kineme: learn movements as Dynamical Movement Primitives, recognize them, name them, move again.
 
 The names below load on first use, so that ``import kineme`` costs next to nothing.
 """

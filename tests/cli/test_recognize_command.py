@@ -151,3 +151,15 @@ def _completed(words):
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env={"PATH": "", **environment}
     )
     return [line.partition(",")[2] for line in done.stdout.splitlines() if line]
+
+
+@pytest.mark.parametrize(("shown", "guess"), [(1, True), (5, False)])
+def test_an_answer_that_is_a_guess_says_so(tmp_path, asked, shown, guess):
+    demos = kineme.load_lasa(["CShape", "GShape", "NShape", "Angle", "Sine"])
+    with kineme.ActionLibrary(tmp_path / "a", create=True) as library:
+        library.learn(demos[np.arange(len(demos)) % 7 < shown])
+    said = answer("recognize", asked / "c.csv", "-l", tmp_path / "a")["movements"][0]
+    assert said["calibrated"] is not guess
+    text = run("recognize", asked / "c.csv", "-l", tmp_path / "a").stdout
+    assert ("p-values are a guess" in text) is guess
+    assert ("two or more of each symbol, 19 in all, to keep --error-rate 0.05" in text) is guess

@@ -121,16 +121,29 @@ def test_a_protocol_that_nobody_can_answer_is_reported(data, tmp_path):
     assert result.results.skipped == {"earliness": "none of the methods answers before the end"}
 
 
-def outcome(**accuracies):
+def outcome(absent=None, **accuracies):
     measured = {name: {UNTOUCHED: {"accuracy": [value]}} for name, value in accuracies.items()}
-    return Results({"few-shot": measured}, {}, {}, {})
+    return Results({"few-shot": measured}, {}, absent or {}, {})
 
 
 def test_a_rival_that_is_ahead_is_named():
     said = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.95, euclidean=0.9))
     assert said == "Ahead of kineme: DTW 1-NN, as recorded (0.950 over 0.900)."
-    assert rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.9)).startswith("No rival is ahead")
+    equal = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.9))
+    assert equal == "No rival is ahead of kineme anywhere in this table; rivals here: DTW 1-NN."
     assert rivals_ahead("few-shot", outcome(dtw=0.9)) == ""
+
+
+@pytest.mark.parametrize("theirs", [0.95, 0.8])
+def test_a_rival_that_did_not_take_part_is_named_beside_what_is_concluded(theirs):
+    absent = {"dtw": "not installed: dtaidistance", "hmm": "not installed: hmmlearn"}
+    said = rivals_ahead("few-shot", outcome(absent, kineme=0.9, euclidean=theirs))
+    assert ("Ahead of kineme" in said) is (theirs > 0.9)
+    assert ("No rival is ahead" in said) is (theirs < 0.9)
+    assert said.endswith(". Not compared: DTW 1-NN (not installed: dtaidistance), HMM (not installed: hmmlearn).")
+    alone = rivals_ahead("few-shot", outcome(absent, kineme=0.9))
+    assert alone.startswith("No rival took part. Not compared: DTW 1-NN")
+    assert rivals_ahead("few-shot", outcome(kineme=0.9)) == "No rival took part."
 
 
 def test_a_folder_that_cannot_be_written_is_found_out_first(data, tmp_path):

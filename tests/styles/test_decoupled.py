@@ -32,6 +32,18 @@ def test_the_goal_acts_later_than_in_the_other_formulations_and_wins_in_all():
         assert goal[-1] == pytest.approx(1.0, abs=1e-4)
 
 
+def test_the_docstring_says_how_far_a_change_of_the_goal_has_gone_through():
+    said = " ".join(late_shape_weight.__doc__.split())
+    shares = {name: decoder(DMP(name), 101, 1.0).goal[0] for name in ("decoupled", "bio-inspired")}
+    at_30, of_30, at_40, of_40, at_end, of_end = (
+        round(100 * float(share[k])) for k in (30, 40, 100) for share in shares.values()
+    )
+    assert (
+        f"to {at_30} % at 30 % of the time, against {of_30} % in Eq. (4), to {at_40} % at 40 % of the time, "
+        f"against {of_40} %, and to {at_end} % at the end, against {of_end} %"
+    ) in said
+
+
 def test_a_new_goal_changes_the_first_third_of_a_movement_less(make_movement):
     x = make_movement(41)[1]
     change = {}

@@ -27,7 +27,8 @@ from kineme.text import printable
 def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:
     """Recognize the movements in RECORDINGS, a file or a folder, or - for CSV from the standard input.
 
-    A movement that is like no symbol is unknown. What cannot be read is listed.
+    A movement that is like no symbol is unknown. What cannot be read is listed. With one demonstration of each symbol
+    p-values are a guess, and the answer says so.
 
     Example: kineme recognize new.csv --library actions/
     """
@@ -41,7 +42,7 @@ def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_js
         "movements": [_as_data(source, one, stored, top) for source, one in zip(found.sources, answers, strict=True)],
         "problems": [str(problem) for problem in found.problems],
     }
-    say(as_json, data, lambda: _text(data))
+    say(as_json, data, lambda: _text(data, error_rate))
 
 
 def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[str, Any]:
@@ -52,6 +53,7 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
         "symbol": answer.label,
         "id": None if answer.label is None else ids[answer.label],
         "confidence": answer.confidence,
+        "calibrated": answer.calibrated,
         "ranked": [{"symbol": str(name), "p_value": answer.p_values.get(name)} for name in answer.ranked[:top]],
         "like": [{"movement": one.index, "name": one.name, "similarity": one.similarity} for one in answer.nearest],
         "transform": {
@@ -65,7 +67,7 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
     }
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text(data: dict[str, Any], error_rate: float) -> str:
     from kineme.table import Table, to_text
 
     rows = []
@@ -79,6 +81,12 @@ def _text(data: dict[str, Any]) -> str:
         )  # fmt: skip
     heads = ("recording", "symbol", "confidence", "ranked, with p-values", "most like", "relative to it")
     lines = [to_text(Table("", heads, rows))]
+    if not all(one["calibrated"] for one in data["movements"]):
+        needed = math.ceil(1 / error_rate - 1 - 1e-9)
+        lines.append(
+            "Confidence and p-values are a guess: too few demonstrations tell how much movements of one symbol differ; "
+            f"learn two or more of each symbol, {needed} in all, to keep --error-rate {error_rate:g}"
+        )
     return "\n".join(lines + [f"not read: {printable(problem)}" for problem in data["problems"]])
 
 

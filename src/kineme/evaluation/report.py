@@ -55,18 +55,30 @@ def _cell(values: list[float] | None, n_columns: int) -> str:
 
 
 def rivals_ahead(protocol: str, results: Results) -> str:
-    """A sentence that names every condition and measure in which a rival's mean is above ours."""
-    if OURS not in results.outcomes[protocol] or len(results.outcomes[protocol]) < 2:
+    """Where a rival's mean is above ours, among the rivals that took part; and who did not."""
+    if OURS not in results.outcomes[protocol]:
         return ""
+    rivals = [name for name in results.outcomes[protocol] if name != OURS]
+    if not rivals:
+        return f"No rival took part. {_not_compared(results)}".rstrip()
     found = []
     for condition, measure in _columns(protocol, results):
         ours = results.mean(protocol, OURS, condition, measure)
-        for rival in results.outcomes[protocol]:
+        for rival in rivals:
             theirs = results.mean(protocol, rival, condition, measure)
             if ours is not None and theirs is not None and round(theirs, 3) > round(ours, 3):
                 what = "" if measure == "accuracy" else f" in {_MEASURES[measure]}"
                 found.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
-    return f"Ahead of kineme: {'; '.join(found)}." if found else "No rival is ahead of kineme anywhere in this table."
+    ahead = f"Ahead of kineme: {'; '.join(found)}."
+    names = ", ".join(METHODS[rival].title for rival in rivals)
+    none = f"No rival is ahead of kineme anywhere in this table; rivals here: {names}."
+    return f"{ahead if found else none} {_not_compared(results)}".rstrip()
+
+
+def _not_compared(results: Results) -> str:
+    """Whom the conclusion does not speak of, and why."""
+    absent = [f"{METHODS[name].title} ({why})" for name, why in results.absent.items() if name != OURS]
+    return f"Not compared: {', '.join(absent)}." if absent else ""
 
 
 def write_report(data: DataSet, results: Results, tables: dict[str, Table], facts: dict[str, Any]) -> str:

@@ -21,8 +21,8 @@ _PANEL = 128
 def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, sums: Rows) -> None:
     """``sums[i, j] = sum_k term(A[i, k], B[j, k], c)`` for C-contiguous arrays.
 
-    The rows of B are packed feature by feature, so that the innermost loop runs over neighbouring
-    columns of the Gram matrix: it vectorises without reordering a sum, hence a pair's value does not
+    The rows of B are packed feature by feature, so that the innermost loop runs over neighboring
+    columns of the Gram matrix: it vectorizes without reordering a sum, hence a pair's value does not
     depend on its place in the tile. Four features at a time share one load and store of the strip.
     """
     p = A.shape[1]

@@ -45,13 +45,13 @@ class RBF(Kernel):
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         # ‖a - b‖² = ‖a‖² + ‖b‖² - 2 a·b is one matrix product, but loses the digits that the norms
-        # and the distance do not share: so centre first, and sum the differences themselves where
+        # and the distance do not share: so center first, and sum the differences themselves where
         # more than a quarter of the digits of the exponent would go.
         assert self.sigma is not None
-        centre = (A if B is None else B).mean(axis=0, dtype=np.float64).astype(A.dtype)
+        center = (A if B is None else B).mean(axis=0, dtype=np.float64).astype(A.dtype)
         with np.errstate(over="ignore"):  # then the differences decide
-            a = (A - centre) / A.dtype.type(self.sigma)
-            b = a if B is None else (B - centre) / A.dtype.type(self.sigma)
+            a = (A - center) / A.dtype.type(self.sigma)
+            b = a if B is None else (B - center) / A.dtype.type(self.sigma)
             a2, b2 = np.einsum("ij,ij->i", a, a) / 2, np.einsum("ij,ij->i", b, b) / 2
         if max(a2.max(), b2.max()) * float(np.finfo(A.dtype).eps) ** 0.25 <= 1:
             _exp_of_product(a, b, a2, b2, gram)

@@ -225,7 +225,8 @@ class ActionLibrary:
         movements : one movement or many
             A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. See `kineme.recognition.conformal.Calibration`.
+            Share of true movements that may be called unknown. It is kept where an answer is `calibrated`; with one
+            demonstration of each symbol p-values are a guess. See `kineme.recognition.conformal.Calibration`.
 
         Returns
         -------

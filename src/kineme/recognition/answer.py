@@ -45,6 +45,9 @@ class Answer:
         (Vovk et al. 2005, section 3.4).
     p_values : mapping from label to float
         How many members of the class would look as strange or stranger; see `Calibration`.
+    calibrated : bool
+        Whether enough demonstrations were left out and scored, for every class compared with, that the error rate is
+        kept. If not, as with one demonstration of each class, p-values and confidence are a guess.
     ranked : tuple of labels
         Best first, in the order of the classifier.
     nearest : tuple of Neighbor
@@ -58,13 +61,15 @@ class Answer:
     label: Any
     confidence: float
     p_values: Mapping[Any, float]
+    calibrated: bool
     ranked: tuple[Any, ...]
     nearest: tuple[Neighbor, ...]
     transform: Transform
     responsibilities: Mapping[str, float]
 
     def __repr__(self) -> str:
-        return f"Answer(label={self.label!r}, confidence={self.confidence:.3g}, like={self.nearest[0]})"
+        sure = f"confidence={self.confidence:.3g}, calibrated={self.calibrated}"
+        return f"Answer(label={self.label!r}, {sure}, like={self.nearest[0]})"
 
 
 def is_one(X: Any) -> bool:
@@ -103,7 +108,8 @@ def answers_to(
     nearest = np.maximum.reduceat(logs, recognizer.first_, axis=1)
     classifier = recognizer.classifier_
     scores = nearest if isinstance(classifier, Nearest) else classifier.scores(recognizer, seen)
-    p = recognizer.calibration().p_values(nearest, error_rate)
+    calibration = recognizer.calibration()
+    p, calibrated = calibration.p_values(nearest, error_rate), bool(calibration.calibrated(error_rate).all())
     labels = known_labels(recognizer.classes_, scores, p, error_rate)
     classes = recognizer.classes_.tolist()
     ranks = np.argsort(-scores, axis=1, kind="stable")
@@ -122,6 +128,7 @@ def answers_to(
             labels[i],
             1.0 - float(others[i].max()),
             dict(zip(classes, p[i].tolist(), strict=True)),
+            calibrated,
             tuple(classes[c] for c in ranks[i]),
             like[i],
             transforms[i],

@@ -42,6 +42,8 @@ def distances(logs: Array) -> Array:
 class Calibration:
     """What the demonstrations say about how far members of each class are from their nearest demonstration.
 
+    One demonstration of each class says nothing about that: p-values are then a guess, see 3. below.
+
     The nonconformity of a movement to class c is ``a_c = d_c / s_c``: its distance d_c to the nearest demonstration of
     the class, ``d = sqrt(-2 log K)``, over the scale s_c of the class. Each demonstration gets the same score with
     itself left out, and ``p_c = (1 + #{scores >= a_c}) / (number of scores + 1)``. Whatever the distribution,
@@ -53,9 +55,10 @@ class Calibration:
     2. Those of all classes. The rate holds for members of all classes together. Each is scored against as many
        demonstrations of its class as class c has, so that unequal classes compare; and scaled by a mean from which
        it is left out.
-    3. None: ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c. An
-       assumption: the rate is no longer guaranteed. On handwriting shown once, with everything perturbed, 0 to 11 %
-       of members were called unknown, 4 % on average.
+    3. None: ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c. A guess: it
+       takes how much members differ from how far the classes are apart. With one demonstration of each class, 0 to
+       79 % of true members were rejected at 0.05, the more the more they differed (``python -m bench --only
+       one_shot``). `calibrated` tells which classes this is about.
 
     The scale s_c is the mean left-out distance of the class, drawn towards that of all classes as if by four more,
     since the mean of two or three is little known. With one demonstration of every class no distance within a class is
@@ -77,15 +80,26 @@ class Calibration:
         scores = self.scores(nearest)
         result = np.exp(-0.25 * math.pi * scores**2)
         ordered: dict[int, Array] = {}  # classes share what is pooled
-        for c, choices in enumerate(zip(self.own, self.pooled, strict=True)):
-            enough = [one for one in choices if (len(one) + 1) * error_rate > 1 - 1e-12]
-            if enough:
-                if id(enough[0]) not in ordered:
-                    ordered[id(enough[0])] = np.sort(enough[0])
-                calibrating = ordered[id(enough[0])]
+        for c, counted in enumerate(self._counted(error_rate)):
+            if counted is not None:
+                if id(counted) not in ordered:
+                    ordered[id(counted)] = np.sort(counted)
+                calibrating = ordered[id(counted)]
                 above = len(calibrating) - np.searchsorted(calibrating, scores[:, c])
                 result[:, c] = (1.0 + above) / (len(calibrating) + 1.0)
         return result
+
+    def calibrated(self, error_rate: float) -> NDArray[np.bool_]:
+        """Whether p-values of each class keep `error_rate`, shape (C,); elsewhere they are a guess.
+
+        They keep it where at least ``1 / error_rate - 1`` left-out scores count. One demonstration has none.
+        """
+        return np.array([counted is not None for counted in self._counted(error_rate)])
+
+    def _counted(self, error_rate: float) -> list[Array | None]:
+        """Of each class the scores that count: its own, else those of all, else none."""
+        choices = zip(self.own, self.pooled, strict=True)
+        return [next((one for one in pair if (len(one) + 1) * error_rate > 1 - 1e-12), None) for pair in choices]
 
 
 def calibrate(recognizer: Recognizer) -> Calibration:

@@ -165,7 +165,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         X : one movement or many
             A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. See `Calibration` for when it is guaranteed.
+            Share of true movements that may be called unknown. It is kept where the answer is `calibrated`, which
+            takes at least ``1 / error_rate - 1`` demonstrations of classes shown twice or more. With one demonstration
+            of each class p-values are a guess, and the share may be anything; see `Calibration`.
 
         Returns
         -------
@@ -177,7 +179,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return found[0] if is_one(X) else found
 
     def p_values(self, X: Any, error_rate: float = 0.05) -> Array:
-        """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`."""
+        """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`.
+
+        With one demonstration of each class they are a guess, not a promise: ``calibration().calibrated(error_rate)``
+        tells which classes keep the rate, see `Calibration`.
+        """
         check_error_rate(error_rate)
         return self.calibration().p_values(self._nearest(X), error_rate)
 
