@@ -19,6 +19,8 @@ from kineme.errors import SpecificationError, TrajectoryError
 Array = NDArray[np.float64]
 
 MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
+LARGEST = 1e100  # of parameters and wishes: the squares and cubes of larger numbers, and of 1 over them, are no numbers
+MOST_NUMBERS = 50_000_000  # samples times basis functions: what generates a movement then takes some gigabytes
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -126,24 +128,62 @@ def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array
 
 def check_choice(name: str, value: str, choices: Sequence[str]) -> None:
     """Refuse a value that is not in a table's keys; list what is."""
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         raise SpecificationError(f"expected {name} to be one of {list(choices)}, got {value!r}")
 
 
-def check_number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> None:
-    """Refuse a parameter that is not a finite number in its range."""
+def check_number(
+    name: str,
+    value: Any,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    most: float = LARGEST,
+    smallest: float = 1 / LARGEST,
+) -> None:
+    """Refuse a parameter that is not a finite number in its range, or too close to 0 to be divided by."""
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
     number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     outside = (above is not None and number <= above) or (least is not None and number < least)
     if not math.isfinite(number) or outside:
         raise SpecificationError(f"expected {name} to be a number{bound}, got {value!r}")
+    if not (number == 0 or smallest <= abs(number) <= most):
+        raise SpecificationError(f"expected {name} to be a number from {smallest:g} to {most:g}, got {value!r}")
 
 
-def check_count(name: str, value: Any, least: int) -> None:
-    """Refuse a parameter that is not a whole number from `least` on."""
+def check_count(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """A parameter as a plain number, refused where it is not a whole one from `least` to `most`."""
     try:
-        number = operator.index(value)
+        number = least - 1 if isinstance(value, bool) else operator.index(value)
     except TypeError:
         number = least - 1
     if number < least:
         raise SpecificationError(f"expected {name} to be a whole number of at least {least}, got {value!r}")
+    if most is not None and number > most:
+        raise SpecificationError(f"expected {name} to be at most {most:,}, got {value!r}")
+    return number
+
+
+def check_samples(n_samples: float, n_basis: int, wish: str) -> int:
+    """A number of samples, refused where what generates them does not fit into memory; `wish` asked for so many."""
+    most = MOST_NUMBERS // int(n_basis)
+    if not n_samples <= most:
+        raise SpecificationError(
+            f"expected {wish} to ask for at most {most:,} samples with {n_basis} basis functions, got {n_samples:.3g}; "
+            "lower it, or generate the movement in parts"
+        )
+    return math.ceil(n_samples)
+
+
+def check_seed(name: str, value: Any) -> None:
+    """Refuse what is not a whole number from 0, or a sequence of such."""
+    several = isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim == 1)
+    numbers = value if several and len(value) else [value]
+    for number in numbers:
+        check_count(name, number, 0)
+
+
+def check_switch(name: str, value: Any) -> None:
+    """Refuse what is neither true nor false."""
+    if not isinstance(value, bool | np.bool_):
+        raise SpecificationError(f"expected {name} to be True or False, got {value!r}")

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from kineme import DMP, Trajectory
 from kineme.primitives.fits import forcing_target
 from kineme.primitives.formulations import FORMULATIONS
+from kineme.primitives.response import spring_damper_response
 
 SPRINGS = {"critical": (100.0, None), "underdamped": (100.0, 3.0), "overdamped": (50.0, 40.0)}
 
@@ -117,3 +118,15 @@ def test_the_shape_attractor_is_the_term_of_eq_4(make_movement, agree):
     s = 0.01 ** np.linspace(0, 1, 100)[:, None]
     x, x0 = learned.rollout(n_samples=100).positions, learned.starts[:, None]
     agree(learned.shape_attractor(100), s * 100.0 * (learned.forcing(100) / s + x0 - x), 1e-9)
+
+
+@pytest.mark.parametrize("n_basis", [10, 40])
+@pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
+def test_the_kink_at_the_end_of_the_demonstration_falls_into_no_quadrature(formulation, n_basis, agree):
+    """Past u = 1 an ungated f fades: steps that end at u = 1 and steps that straddle it give the same."""
+    dmp = DMP(formulation, n_basis=n_basis)
+    straddling, ending = (
+        spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, 1.36, n)) for n in (9, 137)
+    )
+    agree(straddling.Phi, ending.Phi[:, ::17], 1e-12)
+    agree(straddling.goal, ending.goal[:, ::17], 1e-12)

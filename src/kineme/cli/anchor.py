@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import json_option, library_option
+from kineme.cli.options import json_option, library_option, whole
 from kineme.cli.output import count, say, write
 from kineme.text import printable
 
@@ -35,8 +35,8 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
 @library_option
 @click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
               help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip
-@click.option("--clusters", type=click.IntRange(1), help="How many kinds.  [default: as many as fit]")
-@click.option("--min-members", type=click.IntRange(2), default=3, show_default=True, help="That make a kind.")
+@click.option("--clusters", type=whole(1), help="How many kinds.  [default: as many as fit]")
+@click.option("--min-members", type=whole(2), default=3, show_default=True, help="That make a kind.")
 @click.option("--join/--no-join", default=True, show_default=True,
               help="First let movements join the symbols that they are recognized as.")  # fmt: skip
 @click.option("--accept", type=Choice(), help="Name these proposals, without asking.")

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.options import whole
 from kineme.cli.output import write
 
 # The names of the tables in kineme.evaluation, written out so that --help loads nothing; a test compares them.
@@ -23,11 +24,11 @@ _QUICK_SPLITS = 2
               help="What to ask; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
 @click.option("--method", "methods", multiple=True, type=click.Choice(METHOD_NAMES),
               help="Whom to ask; may be repeated.  [default: all]")  # fmt: skip
-@click.option("--splits", type=click.IntRange(1), default=10, show_default=True, help="Random splits per protocol.")
-@click.option("--shots", multiple=True, type=click.IntRange(1), default=(1, 3, 5), show_default=True,
+@click.option("--splits", type=whole(1), default=10, show_default=True, help="Random splits per protocol.")
+@click.option("--shots", multiple=True, type=whole(1), default=(1, 3, 5), show_default=True,
               help="Training movements per class; may be repeated.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of splits and perturbations.")
-@click.option("--jobs", type=click.IntRange(1), default=None, help="Processes.  [default: the processors]")
+@click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of splits and perturbations.")
+@click.option("--jobs", type=whole(1), default=None, help="Processes.  [default: the processors]")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for evaluation.html and evaluation.json.")  # fmt: skip
 @click.option("--quick", is_flag=True, help="At most two splits, without the rivals that are slow.")

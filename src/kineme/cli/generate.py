@@ -8,7 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import Numbers, SymbolName, json_option, library_option_of
+from kineme.cli.options import Finite, Numbers, SymbolName, json_option, library_option_of, whole
 from kineme.cli.output import write_bytes
 from kineme.text import printable
 
@@ -18,15 +18,15 @@ from kineme.text import printable
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
 @click.option("--start", type=Numbers(), help="Where to start.  [default: as demonstrated]")
 @click.option("--goal", type=Numbers(), help="Where to go.  [default: as demonstrated]")
-@click.option("--duration", type=float, help="Seconds.  [default: as demonstrated]")
-@click.option("--rate", type=float, default=100.0, show_default=True, help="Samples per second, at least.")
-@click.option("--settle", type=float, help="Go on past the duration until this close to the goal.")
+@click.option("--duration", type=Finite(), help="Seconds.  [default: as demonstrated]")
+@click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second, at least.")
+@click.option("--settle", type=Finite(), help="Go on past the duration until this close to the goal.")
 @click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="A point to steer around; repeatable.")
-@click.option(
-    "--index", type=click.IntRange(0), default=0, show_default=True, help="Which of several saved primitives."
-)
+@click.option("--index", type=whole(0), default=0, show_default=True, help="Which of several saved primitives.")
 @click.option("--formulation", default="bio-inspired", show_default=True, help="For a recording: how to learn it.")
-@click.option("--n-basis", type=int, default=40, show_default=True, help="For a recording: basis functions.")
+@click.option(
+    "--n-basis", type=whole(2, 2_000), default=40, show_default=True, help="For a recording: basis functions."
+)
 @click.option(
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Keep the primitive in this .kineme file."
 )

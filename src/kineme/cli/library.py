@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
 from kineme.cli.output import confirm, count, in_words, say
 from kineme.text import printable
 
@@ -26,7 +26,7 @@ def opened(folder: Path, *, read_only: bool = True) -> Any:
 
 @library.command("list")
 @library_option
-@click.option("--at", "version", type=click.IntRange(0), help="As it was at this version.")
+@click.option("--at", "version", type=ID, help="As it was at this version.")
 @json_option
 def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     """List the symbols of a library."""
@@ -95,7 +95,7 @@ def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
 
 @library.command(short_help="Delete a symbol or movements; earlier versions keep them.")
 @click.argument("symbol", type=SymbolName(), required=False)
-@click.option("--movement", "movements", type=int, multiple=True, help="Delete this movement; may be repeated.")
+@click.option("--movement", "movements", type=ID, multiple=True, help="Delete this movement; may be repeated.")
 @click.option("--yes", "-y", is_flag=True, help="Do not ask.")
 @library_option
 @json_option
@@ -117,7 +117,7 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
 
 @library.command()
 @library_option
-@click.option("--limit", "-n", type=click.IntRange(1), default=20, show_default=True, help="Only the last ones.")
+@click.option("--limit", "-n", type=whole(1), default=20, show_default=True, help="Only the last ones.")
 @json_option
 def history(folder: Path, limit: int, as_json: bool) -> None:
     """List what changed, when."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,30 @@ from click.shell_completion import CompletionItem
 _PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that are one word to every shell, and no option
 
 
+_MOST = 1_000_000  # of what is counted: more is a slip of the finger
+_LARGEST_ID = 2**62 - 2  # of versions and movements
+
+
+def whole(least: int, most: int = _MOST) -> click.IntRange:
+    """A whole number from `least`, none so large that a computer would not come back."""
+    return click.IntRange(least, most)
+
+
+#: Id of a movement, or number of a version.
+ID = whole(0, _LARGEST_ID)
+
+
+class Finite(click.FloatRange):
+    """A number in a range; neither NaN nor infinity is one."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        """Text as a number."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"expected a number, got {value!r}", param, ctx)
+        return number
+
+
 class Numbers(click.ParamType):  # type: ignore[type-arg]
     """Numbers separated by commas: one per dimension."""
 
@@ -21,9 +46,12 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
     def convert(self, value: Any, param: Any, ctx: Any) -> list[float]:
         """Text as numbers."""
         try:
-            return [float(part) for part in value.split(",")]
+            numbers = [float(part) for part in value.split(",")]
         except ValueError:
             self.fail(f"expected numbers separated by commas, as 0.4,0.2, got {value!r}", param, ctx)
+        if not all(map(math.isfinite, numbers)):
+            self.fail(f"expected finite numbers, got {value!r}", param, ctx)
+        return numbers
 
 
 class SymbolName(click.ParamType):  # type: ignore[type-arg]

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import json_option, library_option
+from kineme.cli.options import Finite, json_option, library_option, whole
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
 from kineme.text import printable
@@ -18,10 +18,10 @@ from kineme.text import printable
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @library_option
 @click.option(
-    "--error-rate", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
+    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
     help="Share of true movements that may be called unknown.",
 )  # fmt: skip
-@click.option("--top", type=click.IntRange(1), default=3, show_default=True, help="Symbols listed per movement.")
+@click.option("--top", type=whole(1), default=3, show_default=True, help="Symbols listed per movement.")
 @layout_options
 @json_option
 def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:

@@ -6,15 +6,16 @@ from pathlib import Path
 
 import click
 
+from kineme.cli.options import whole
 from kineme.cli.output import write
 
 
 @click.command(short_help="Repeat the paper's tables and figures.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for report.html, results.json, tables.txt and the figures.")  # fmt: skip
-@click.option("--draws", type=click.IntRange(1), default=None,
+@click.option("--draws", type=whole(1), default=None,
               help="Random draws of three demonstrations per shape.  [default: 12, with --quick 3]")  # fmt: skip
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the draws.")
+@click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of the draws.")
 @click.option("--quick", is_flag=True, help="Fewer draws, coarse pictures, no SVM on the 26 shapes.")
 def reproduce(out: Path, draws: int | None, seed: int, quick: bool) -> None:
     """Reproduce the paper on the LASA handwriting recordings.

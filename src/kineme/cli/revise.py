@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from kineme.cli.library import brief, opened
-from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.options import ID, SymbolName, json_option, library_option
 from kineme.cli.output import count, say
 from kineme.text import printable
 
@@ -27,7 +27,7 @@ def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> N
 
 @click.command()
 @click.argument("symbol", type=SymbolName())
-@click.option("--movement", "movements", type=int, multiple=True, required=True, help="Goes over; may be repeated.")
+@click.option("--movement", "movements", type=ID, multiple=True, required=True, help="Goes over; may be repeated.")
 @click.option("--into", required=True, help="Name of the new symbol.")
 @library_option
 @json_option

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from kineme.cli.library import opened
-from kineme.cli.options import SymbolName, json_option, library_option
+from kineme.cli.options import SymbolName, json_option, library_option, whole
 from kineme.cli.output import count, say, to_json
 from kineme.text import printable
 
@@ -42,7 +42,7 @@ def schema() -> None:
 
 @click.command()
 @click.argument("symbol", type=SymbolName())
-@click.option("-k", type=click.IntRange(1), default=3, show_default=True, help="How many.")
+@click.option("-k", type=whole(1), default=3, show_default=True, help="How many.")
 @library_option
 @json_option
 def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:

@@ -11,9 +11,10 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError
 from kineme.kernels import TruncatedEuclidean
-from kineme.validation import Array, check_count, check_number
+from kineme.validation import Array, check_count, check_number, check_seed
 
 _COLUMNS = np.iinfo(np.int32).max
+_MOST_SHIFTS = 100_000
 
 
 class RandomBinning(TransformerMixin, BaseEstimator):
@@ -68,16 +69,18 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         """Draw the grids and count their bins."""
         rows = _rows(X)
         check_number("sigma", self.sigma, above=0.0)
-        check_count("n_shifts", self.n_shifts, 1)
+        check_count("n_shifts", self.n_shifts, 1, most=_MOST_SHIFTS)
+        check_seed("seed", self.seed)
         kernel = TruncatedEuclidean(self.m, self.sigma).fit(rows)
         self.m_ = float(kernel.m)  # type: ignore[arg-type]
         self.n_features_in_ = rows.shape[1]
         self.pitch_ = self.m_ * min(1.0, float(self.sigma))
         draws = np.random.default_rng(self.seed).uniform(size=(rows.shape[1], self.n_shifts))
         self.shifts_ = draws * self.pitch_
-        low, high = (np.floor((edge[:, None] + self.shifts_) / self.pitch_) for edge in (rows.min(0), rows.max(0)))
+        with np.errstate(over="ignore"):  # then there are too many bins, too
+            low, high = (np.floor((edge[:, None] + self.shifts_) / self.pitch_) for edge in (rows.min(0), rows.max(0)))
         counts = (high - low + 1).ravel()
-        if counts.sum() > _COLUMNS:
+        if not counts.sum() <= _COLUMNS:
             raise SpecificationError(
                 f"expected fewer than {_COLUMNS} bins, got {counts.sum():.3g}: m={self.m_:g} is tiny against the "
                 "spread of the data; raise m"

@@ -61,10 +61,21 @@ def generate(primitive: Primitives, wishes: Wishes) -> Columns:
     Raises
     ------
     SpecificationError
-        A wish that cannot be met; among them obstacles that keep the movement from its goal.
+        A wish that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
+        into memory, and numbers that are not finite: a robot gets no movement that was not checked.
     """
-    if wishes.obstacles is not None:
-        return _around_obstacles(primitive, wishes, wishes.obstacles)
+    with np.errstate(over="ignore", invalid="ignore"):  # refused below
+        made = (_undisturbed if wishes.obstacles is None else _around_obstacles)(primitive, wishes)
+    for name, column in made.items():
+        if not np.isfinite(column).all():
+            raise SpecificationError(
+                f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
+                "goal and a duration nearer to those demonstrated"
+            )
+    return made
+
+
+def _undisturbed(primitive: Primitives, wishes: Wishes) -> Columns:
     made = primitive.rollout(wishes.start, wishes.goal, wishes.duration, rate=wishes.rate, settle=wishes.settle)
     return {
         "times": made.times[0],
@@ -74,7 +85,8 @@ def generate(primitive: Primitives, wishes: Wishes) -> Columns:
     }
 
 
-def _around_obstacles(primitive: Primitives, wishes: Wishes, obstacles: Array) -> Columns:
+def _around_obstacles(primitive: Primitives, wishes: Wishes) -> Columns:
+    obstacles = np.asarray(wishes.obstacles)
     if obstacles.ndim != 2 or obstacles.shape[1] != primitive.n_dims or primitive.n_dims < 2:
         raise SpecificationError(
             f"expected obstacles in the {primitive.n_dims} dimensions of the movement, two or more, got shape "

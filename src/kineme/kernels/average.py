@@ -16,6 +16,7 @@ from kineme.parallel import for_tiles
 
 # Bytes of per-dimension similarities that exist at a time.
 _SCRATCH = 2**24
+_MOST_DIMS = 10_000
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,16 @@ class Averaged(Kernel):
     mean: str = "arithmetic"
 
     def __post_init__(self) -> None:
-        if isinstance(self.n_dims, bool) or not isinstance(self.n_dims, int | np.integer) or self.n_dims < 1:
-            raise SpecificationError(f"expected n_dims to be a whole number from 1, got {self.n_dims!r}")
+        if (
+            isinstance(self.n_dims, bool)
+            or not isinstance(self.n_dims, int | np.integer)
+            or not 1 <= self.n_dims <= _MOST_DIMS
+        ):
+            raise SpecificationError(
+                f"expected n_dims to be a whole number from 1, got {self.n_dims!r}; at most {_MOST_DIMS:,}"
+            )
         object.__setattr__(self, "n_dims", int(self.n_dims))
-        if self.mean not in MEANS:
+        if not isinstance(self.mean, str) or self.mean not in MEANS:
             raise SpecificationError(f"expected mean to be one of {tuple(MEANS)}, got {self.mean!r}")
         for kernel in self._kernels():
             if not isinstance(kernel, Kernel):

@@ -174,8 +174,7 @@ def _aligned_in_space(A: NDArray[Any], B: NDArray[Any], max_angle: float) -> Arr
 def _filler(n_operations: int) -> Callable[[NDArray[Any], float, Array], None]:
     """What writes the best products (n, m) of a block of products (3 n, 3 m)."""
     if use_compiled(n_operations):
-        from kineme.kernels._rotation import fill_best_products
-
+        fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
         return lambda products, max_angle, best: fill_best_products(products, *half_angle(max_angle), best)
 
     def fill(products: NDArray[Any], max_angle: float, best: Array) -> None:

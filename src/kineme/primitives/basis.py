@@ -12,6 +12,7 @@ from kineme.primitives.phase import ExponentialPhase
 from kineme.validation import Array, check_choice, check_count, check_number
 
 GATINGS = ("none", "phase")
+MOST_BASIS = 2_000  # the response to N functions is made of 32 N^2 numbers
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class GaussianBasis:
     phase: ExponentialPhase
 
     def __post_init__(self) -> None:
-        check_count("n_basis", self.n_basis, 2)
+        check_count("n_basis", self.n_basis, 2, most=MOST_BASIS)
         check_number("overlap", self.overlap, above=0.0)
         if self.overlap >= 1:
             raise SpecificationError(f"expected overlap to be below 1, got {self.overlap!r}")

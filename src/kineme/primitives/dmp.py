@@ -16,6 +16,8 @@ from kineme.validation import check_choice, check_count
 if TYPE_CHECKING:
     from kineme.primitives.primitives import Primitives
 
+MOST_POINTS = 10_000  # a fit with T points is made of matrices of T^2 numbers
+
 
 @dataclass(frozen=True)
 class DMP(SpringDamper):
@@ -33,7 +35,7 @@ class DMP(SpringDamper):
     formulation : {"original", "bio-inspired", "amplitude-scaled", "decoupled"}, default "bio-inspired"
         The transformation system; see `kineme.primitives.formulations.FORMULATIONS`.
     n_basis : int, default 80
-        Number N of basis functions.
+        Number N of basis functions, at most 2,000.
     stiffness : float, default 100.0
         Spring constant K, in units of 1 / tau^2.
     damping : float, optional
@@ -52,7 +54,7 @@ class DMP(SpringDamper):
     overlap : float, default 0.3
         Value of a basis function at its neighbor's center; sets the widths h_i.
     n_points : int, default 200
-        Points T that each movement is resampled to before the fit.
+        Points T that each movement is resampled to before the fit, at most 10,000.
     preprocessing : tuple of steps, default ()
         Steps applied before learning, as `TrimRest` and `Smooth`; they are part of the specification.
 
@@ -87,7 +89,7 @@ class DMP(SpringDamper):
         check_choice("fit", self.fit, FITS)
         check_choice("regression", self.regression, REGRESSIONS)
         self._check_spring_damper()
-        check_count("n_points", self.n_points, 10)
+        check_count("n_points", self.n_points, 10, most=MOST_POINTS)
         if self.fit == "trajectory":
             check_count("n_basis", self.n_basis, 3)
         object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))

@@ -27,7 +27,7 @@ class ExponentialPhase:
     end: float = 0.01
 
     def __post_init__(self) -> None:
-        check_number("phase_end", self.end, above=0.0)
+        check_number("phase_end", self.end, above=0.0, smallest=0.0)
         if not _SMALLEST <= self.end <= _LARGEST:
             raise SpecificationError(
                 f"expected phase_end to be between {_SMALLEST:g} and {_LARGEST:g}, got {self.end!r}"

@@ -15,7 +15,7 @@ from kineme.primitives.batch import Batch
 from kineme.primitives.dmp import DMP
 from kineme.primitives.operators import forcing_matrix
 from kineme.primitives.rollout import Rollout, rollout, samples_at_rate, settled_end
-from kineme.validation import Array, check_count
+from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
     from kineme.control.controller import Controller
@@ -97,7 +97,7 @@ class Primitives(Batch):
         as s vanishes.
         """
         term = self._scaled_forcing(n_samples)
-        s = self.dmp.basis.phase(np.linspace(0.0, 1.0, n_samples))
+        s = self.dmp.basis.phase(np.linspace(0.0, 1.0, term.shape[2]))
         coupling = self.dmp.system.coupling(self.dmp.K, s)
         if coupling.any():
             term += coupling * self._relative_path(n_samples)
@@ -127,7 +127,8 @@ class Primitives(Batch):
         velocity : array_like of shape (d,) or (n, d), optional
             Initial velocity, per second; by default the demonstrated one, in proportion to the tempo.
         rate : float, optional
-            Samples per second, at least; all movements of a batch get the same number of samples.
+            Samples per second, at least; all movements of a batch get the same number of samples, at most 50 million
+            over the number of basis functions.
         n_samples : int, optional
             Samples per movement; by default the specification's `n_points`. Give this or `rate`.
         settle : float, optional
@@ -152,10 +153,10 @@ class Primitives(Batch):
         if rate is not None and n_samples is not None:
             raise SpecificationError("expected either rate or n_samples, got both")
         if rate is not None:
-            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp.K)
+            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp)
         elif n_samples is None:
             n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
-        check_count("n_samples", n_samples, 2)
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return replace(movement, n_samples=n_samples, end=end)
 
     def controller(self, dt: float, **options: Any) -> Controller:
@@ -191,7 +192,7 @@ class Primitives(Batch):
         return self.dmp.system.scale(self.dmp.K, amplitude)[:, :, None]
 
     def _scaled_forcing(self, n_samples: int) -> Array:
-        check_count("n_samples", n_samples, 2)
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T
 
     def _relative_path(self, n_samples: int) -> Array:

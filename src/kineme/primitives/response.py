@@ -12,6 +12,7 @@ from kineme.primitives.formulations import Formulation
 from kineme.validation import Array
 
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_NUMBERS_AT_ONCE = 500_000  # of the forcing term: eight nodes of each stay far from filling the memory
 _STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at least
 
 
@@ -48,9 +49,10 @@ def spring_damper_response(
     # An acceleration at a node reaches the end of the step through the second column.
     impulse = transition(stiffness, damping, h - nodes)[:, :, 1] * (0.5 * h * _NODE_WEIGHTS)[:, None]  # (8, 2)
     starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
-    at_nodes = (starts[:, None] + nodes).ravel()
-    forcing = _forcing(basis, formulation, stiffness, at_nodes).reshape(len(starts), len(nodes), -1)
-    driven = np.einsum("qz,kqf->kzf", impulse, forcing)  # what each step adds to (x, x')
+    driven = np.empty((len(starts), 2, basis.n_basis + 1))  # what each step adds to (x, x')
+    for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * basis.n_basis // _NUMBERS_AT_ONCE)):
+        forcing = _forcing(basis, formulation, stiffness, (starts[some, None] + nodes).ravel())
+        driven[some] = np.einsum("qz,kqf->kzf", impulse, forcing.reshape(len(some), len(nodes), -1))
     at_end = np.flatnonzero((starts < 1.0) & (starts + h > 1.0))
     for k in at_end:  # one step at most: an ungated f has a kink at u = 1, which quadrature must not straddle
         driven[k] = 0.0

@@ -15,14 +15,16 @@ from kineme.parallel import for_tiles
 from kineme.primitives.batch import Batch
 from kineme.primitives.operators import decoder
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import Array, check_number, describe
+from kineme.validation import LARGEST, Array, check_number, check_samples, describe
 
 if TYPE_CHECKING:
+    from kineme.primitives.dmp import DMP
     from kineme.primitives.primitives import Primitives
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
 _LONGEST = 10.0  # durations after which a movement that has not settled will not
 _SETTLING_SAMPLES = 400
+_LONGEST_TIME = 1e50  # seconds; accelerations divide by its square
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,9 +141,7 @@ def rollout(
         return np.broadcast_to(value, (n, *value.shape[1:]))
 
     durations = fill("duration", primitives.durations)
-    if (durations <= 0).any():
-        i = int(np.argmax(durations <= 0))
-        raise SpecificationError(f"expected duration above 0 seconds, got {durations[i]:g} for movement {i}")
+    check_durations("duration", durations)
     starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
     # A faster movement starts faster, unless the user says how it starts.
     tempo = primitives.durations / durations
@@ -149,6 +149,16 @@ def rollout(
     return Rollout(
         primitives, _ratio(primitives, goals - starts), starts, goals, velocities, durations, primitives.dmp.n_points
     )
+
+
+def check_durations(name: str, durations: Array) -> None:
+    """Refuse durations of 0 seconds or less, and those whose squares leave the range of numbers."""
+    usable = (durations >= 1 / _LONGEST_TIME) & (durations <= _LONGEST_TIME)
+    if usable.all():
+        return
+    i = int(np.argmin(usable))
+    between = "" if durations[i] <= 0 else f" and from {1 / _LONGEST_TIME:g} to {_LONGEST_TIME:g}"
+    raise SpecificationError(f"expected {name} above 0 seconds{between}, got {durations[i]:g} for movement {i}")
 
 
 def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
@@ -172,6 +182,8 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
         raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(wish)}")
     if not np.isfinite(value).all():
         raise TrajectoryError(f"expected finite numbers for {name}, got {wish!r}")
+    if np.abs(value).max(initial=0.0) > LARGEST:
+        raise TrajectoryError(f"expected numbers up to {LARGEST:g} for {name}, got {wish!r}; choose another unit")
     return value
 
 
@@ -199,11 +211,12 @@ def _ratio(primitives: Primitives, amplitudes: Array) -> Array:
     return ratio
 
 
-def samples_at_rate(rate: float, durations: Array, stiffness: float) -> int:
+def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
     """Samples per movement so that none is sampled more coarsely than `rate` [Hz]."""
     check_number("rate", rate, above=0.0)
-    n_samples = math.ceil(float(durations.max()) * rate * (1 - 1e-12)) + 1
-    least = math.ceil(2 * math.sqrt(stiffness)) + 1
+    wanted = float(durations.max()) * rate * (1 - 1e-12) + 1
+    n_samples = check_samples(wanted, dmp.n_basis, "rate times duration")
+    least = math.ceil(2 * math.sqrt(dmp.K)) + 1
     if n_samples < least:
         raise SpecificationError(
             f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that "

@@ -86,12 +86,16 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
     SpecificationError
         Not one finite number from 0 for each of the n representations, or all 0.
     """
-    array = np.asarray(weights, dtype=np.float64)
+    try:
+        array = np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
     if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise SpecificationError(
             f"expected weights to be 'auto', 'equal' or {n} numbers from 0, not all 0, one for each representation, "
             f"got {weights!r}"
         )
+    array = array / array.max()  # the sum of what is left is a number, however large the weights are
     return np.asarray(array / array.sum())
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.recognition.hypotheses import Early, Hypotheses, known_hypotheses
+from kineme.recognition.hypotheses import Early, Hypotheses, as_early, known_hypotheses
 from kineme.recognition.labels import check_labels
 from kineme.recognition.prefixes import beginnings, smooth_paths
 from kineme.trajectories.arc_length import arc_length_phase
@@ -31,7 +31,7 @@ def partial_shares(recognizer: Recognizer, X: Any, early: Early | None = None) -
             f"expected movements of {recognizer.n_dims_} dimensions as in fit, got {demos.n_dims}; "
             "select the dimensions"
         )
-    stored = known_hypotheses(recognizer, early or Early())
+    stored = known_hypotheses(recognizer, as_early(early))
     step = max(1, _TILE // len(stored.stored.lengths))
     return np.concatenate(
         [_shares(stored, demos[start : start + step], recognizer.cutoff) for start in range(0, len(demos), step)]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.prefixes import Prefixes, beginnings, smooth_paths
 from kineme.recognition.similarity import LOG_MEANS
@@ -24,6 +25,7 @@ _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 #: An unknown movement is as far as a typical impostor, and as unlikely in size, duration and timing as a true one.
 _LOG_UNKNOWN = -0.5 / _WIDTH**2 - 1.5
 _EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
+_MOST_PROGRESS = 1000  # beginnings of one movement
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
 
 
@@ -55,10 +57,22 @@ class Early:
     max_angle: float | None = None
 
     def __post_init__(self) -> None:
-        check_count("n_progress", self.n_progress, 2)
+        check_count("n_progress", self.n_progress, 2, most=_MOST_PROGRESS)
         for name in ("size_spread", "duration_spread", "timing_spread"):
-            if getattr(self, name) != math.inf:
-                check_number(name, getattr(self, name), above=0.0)
+            value = getattr(self, name)
+            if not (isinstance(value, float) and value == math.inf):
+                check_number(name, value, above=0.0)
+        if self.max_angle is not None:
+            check_number("max_angle", self.max_angle, least=0.0)
+
+
+def as_early(early: Any) -> Early:
+    """What a user passed, or the defaults for None."""
+    if early is not None and not isinstance(early, Early):
+        raise SpecificationError(
+            f"expected early to be kineme.recognition.hypotheses.Early(...) or None, got {early!r}"
+        )
+    return early or Early()
 
 
 class Hypotheses(NamedTuple):

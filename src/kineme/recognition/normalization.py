@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kineme.validation import Array, check_choice
+from kineme.validation import Array, check_choice, check_switch
 
 SCALES = ("path", "per-dimension", "none")
 _FLAT = 1e-6  # of the whole extent; a dimension flatter than this is not blown up
@@ -30,6 +30,7 @@ class Normalization:
     scale: str = "path"
 
     def __post_init__(self) -> None:
+        check_switch("translation", self.translation)
         check_choice("scale", self.scale, SCALES)
 
     def apply(self, paths: Array) -> Array:

@@ -12,11 +12,12 @@ from kineme.trajectories.arc_length import resample_by_phase
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.resample import relative_rows
-from kineme.validation import Array, check_number
+from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards
 _FINE = 1000  # samples between which the warp interpolates linearly, so that it leaves no kinks
 _SPEED_KNOTS = 4
+_STRONGEST = 100.0  # already beyond all sense; powers of much stronger ones are no numbers
 _STREAMS = ("shift", "scale", "rotation", "warp", "noise")  # each has random numbers of its own
 
 
@@ -55,7 +56,7 @@ class Perturbation:
 
     def __post_init__(self) -> None:
         for name in _STREAMS:
-            check_number(name, getattr(self, name), least=0.0)
+            check_number(name, getattr(self, name), least=0.0, most=_STRONGEST)
 
     def in_dimensions(self, n_dims: int) -> Perturbation:
         """The same, without the rotation that movements of neither two nor three dimensions cannot have."""
@@ -78,6 +79,7 @@ class Perturbation:
         n, d = len(demonstrations), demonstrations.n_dims
         if self.rotation > 0 and d not in (2, 3):
             raise SpecificationError(f"expected rotation=0 for movements of {d} dimensions, got {self.rotation!r}")
+        check_seed("seed", seed)
         random = {name: np.random.default_rng([k, *np.atleast_1d(seed)]) for k, name in enumerate(_STREAMS)}
         paths = self._warped(demonstrations, random["warp"])
         if self.rotation > 0:

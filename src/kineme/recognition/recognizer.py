@@ -20,10 +20,11 @@ from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, cho
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.labels import check_labels
 from kineme.recognition.normalization import Normalization
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
 from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
 from kineme.recognition.views import tile_movements, view, view_tile
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array, check_choice, check_number
 
 _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
@@ -110,8 +111,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """
         check_choice("mean", self.mean, list(LOG_MEANS))
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
+        Normalization(self.translation, self.scale)  # checks its own parameters
         if self.cutoff is not None:
-            check_number("cutoff", self.cutoff, above=0.0)
+            Smooth(self.cutoff)  # checks its own parameter
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
         self.n_dims_ = demos.n_dims
@@ -156,6 +158,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         scores = self.decision_function(X)
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+
+    def score(self, X: Any, y: Any = None, sample_weight: Any = None) -> float:
+        """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
+        demos = Demonstrations.of(X)
+        return float(super().score(demos, check_labels(demos, y), sample_weight))
 
     def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
         """What each movement is, or that it is unknown, and why.
@@ -261,11 +268,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             How much size, duration and timing may vary.
         """
         from kineme.recognition.decision import Decision
-        from kineme.recognition.hypotheses import Early
+        from kineme.recognition.hypotheses import as_early
         from kineme.recognition.stream import Live
 
         check_is_fitted(self)
-        return Live(self, Decision(confidence, patience), early or Early())
+        return Live(self, Decision(confidence, patience), as_early(early))
 
     def over(self, stored: Any, labels: NDArray[Any], views: tuple[Prepared, ...], calibration: Calibration) -> Self:
         """A recognizer that compares in the same way, by the nearest, with other movements that were seen already.
@@ -292,13 +299,13 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """Look at the demonstrations, set the widths and the weights, and keep the representations with weight."""
         choosing = self._chooses(per_class)
         given = CANDIDATES if choosing else DEFAULT_REPRESENTATIONS
-        looks = given if self.representations is None else tuple(self.representations)
+        looks = given if self.representations is None else check_representations(self.representations)
         self.representations_ = looks
         views = self._view(self.demonstrations_)
         widths = impostor_widths(self.procrustes_, views, self.labels_)
         weights = np.full(len(looks), 1.0 / len(looks))
         if choosing:
-            n_usual = len(looks) if self.representations else len(DEFAULT_REPRESENTATIONS)
+            n_usual = len(looks) if self.representations is not None else len(DEFAULT_REPRESENTATIONS)
             equal = AveragedSimilarity(self.procrustes_, widths)
             weights = chosen_weights(equal, views, self.labels_, n_usual)
         elif not isinstance(self.weights, str):
@@ -324,6 +331,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def _angle(self, n_dims: int) -> float:
         if self.max_angle is not None:
+            check_number("max_angle", self.max_angle, least=0.0)
             return float(self.max_angle)
         return math.pi / 3 if n_dims in (2, 3) else 0.0
 

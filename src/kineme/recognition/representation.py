@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
-from kineme.primitives.dmp import DMP
+from kineme.errors import SpecificationError
+from kineme.primitives.basis import MOST_BASIS
+from kineme.primitives.dmp import DMP, MOST_POINTS
 from kineme.primitives.operators import encoder, forcing_matrix
 from kineme.trajectories.arc_length import resample_by_arc_length
 from kineme.trajectories.spline import spline_matrix
-from kineme.validation import Array, check_choice, check_number
+from kineme.validation import Array, check_choice, check_count, check_number
 
 QUANTITIES = ("positions", "forcing")
 
@@ -42,6 +45,12 @@ class Representation:
     def __post_init__(self) -> None:
         check_choice("quantity", self.quantity, QUANTITIES)
         check_number("arc_share", self.arc_share, least=0.0)
+        if self.arc_share > 1:  # a phase that turns back
+            raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
+        check_count("n_points", self.n_points, 2, most=MOST_POINTS)
+        check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
+        check_number("stiffness", self.stiffness, above=0.0)
+        check_number("ridge", self.ridge, least=0.0)
 
     @property
     def name(self) -> str:
@@ -76,6 +85,20 @@ DEFAULT_REPRESENTATIONS = (
     Representation("forcing", arc_share=1.0),
     Representation("forcing", arc_share=0.0),
 )
+
+
+def check_representations(representations: Any) -> tuple[Representation, ...]:
+    """Refuse what is not one representation or several."""
+    try:
+        given = tuple(representations)
+    except TypeError:
+        given = ()
+    if not given or not all(isinstance(one, Representation) for one in given):
+        raise SpecificationError(
+            "expected representations to be a tuple of kineme.recognition.representation.Representation, one or more, "
+            f"or None for the usual ones, got {representations!r}"
+        )
+    return given
 
 
 @lru_cache(maxsize=32)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kineme.errors import SpecificationError
+from kineme.primitives.basis import MOST_BASIS
 from kineme.validation import Array, check_count, check_number
 
 _PER_GAP = 128  # samples between two centers; resolves overlaps down to 1e-6
@@ -36,7 +37,7 @@ class VonMisesBasis:
     overlap: float
 
     def __post_init__(self) -> None:
-        check_count("n_basis", self.n_basis, 3)
+        check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
         check_number("overlap", self.overlap, above=0.0)
         if self.overlap >= 1:
             raise SpecificationError(f"expected overlap to be below 1, got {self.overlap!r}")

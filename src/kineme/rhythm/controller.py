@@ -9,17 +9,18 @@ from numpy.typing import ArrayLike
 
 from kineme.control.inputs import usable
 from kineme.control.state import Status
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.response import transition
-from kineme.primitives.rollout import per_movement
+from kineme.primitives.rollout import check_durations, per_movement
 from kineme.rhythm.rhythmic_dmp import RhythmicDMP
-from kineme.rhythm.rollout import check_periods, cycle
+from kineme.rhythm.rollout import cycle
 from kineme.validation import Array, check_number
 
 if TYPE_CHECKING:
     from kineme.rhythm.primitives import RhythmicPrimitives
 
 _NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(4)
+_MOST_PERIODS = 1000.0  # in one step: the forcing is followed all the way
 _LONGEST_STEP = 0.5  # of the distance between two centers, for one quadrature
 
 
@@ -151,7 +152,11 @@ class RhythmicController:
     @period.setter
     def period(self, value: ArrayLike) -> None:
         period = self._numbers(value, "period")
-        check_periods(period)
+        check_durations("period", period)
+        if self._dt > _MOST_PERIODS * period.min():
+            raise SpecificationError(
+                f"expected dt of at most {_MOST_PERIODS:g} periods of {period.min():g} s, got {self._dt:g} s"
+            )
         self._period = period
         self._stepping = _stepping(self._primitives.dmp, self._dt / period)
 

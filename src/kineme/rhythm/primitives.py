@@ -12,7 +12,7 @@ from kineme.primitives.batch import Batch
 from kineme.rhythm.operators import forcing_matrix
 from kineme.rhythm.rhythmic_dmp import RhythmicDMP
 from kineme.rhythm.rollout import RhythmicRollout, rollout
-from kineme.validation import Array, check_count
+from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
     from kineme.rhythm.controller import RhythmicController
@@ -80,7 +80,7 @@ class RhythmicPrimitives(Batch):
 
     def shape_attractor(self, n_samples: int = 100) -> Array:
         """The term as it acts in the equation, ``r f(phi)``, at `n_samples` (S) even phases, shape (n, S, d)."""
-        check_count("n_samples", n_samples, 2)
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return (self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T).transpose(0, 2, 1)
 
     def rollout(  # noqa: PLR0913 - a wish per parameter

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from kineme.primitives.dmp import MOST_POINTS
 from kineme.primitives.fits import FITS
 from kineme.primitives.spring_damper import SpringDamper
 from kineme.rhythm.basis import VonMisesBasis
@@ -102,7 +103,7 @@ class RhythmicDMP(SpringDamper):
         if self.align_on is not None:
             check_count("align_on", self.align_on, 0)
         _ = self.basis  # checks its own parameters
-        check_count("n_points", self.n_points, 2 * self.n_basis)
+        check_count("n_points", self.n_points, 2 * self.n_basis, most=MOST_POINTS)
         object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,15 +11,16 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.primitives.response import transition
-from kineme.primitives.rollout import as_demonstrations, broadcast_length, per_movement
+from kineme.primitives.rollout import as_demonstrations, broadcast_length, check_durations, per_movement
 from kineme.rhythm.harmonics import as_real, waves
 from kineme.rhythm.operators import limit_cycle
 from kineme.rhythm.periods import SAMPLES_PER_PERIOD
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import Array, check_count, check_number
+from kineme.validation import Array, check_count, check_number, check_samples
 
 if TYPE_CHECKING:
     from kineme.rhythm.primitives import RhythmicPrimitives
+    from kineme.rhythm.rhythmic_dmp import RhythmicDMP
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,7 +127,7 @@ def rollout(
 
     check_number("n_periods", n_periods, above=0.0)
     periods = fill("period", primitives.periods)
-    check_periods(periods)
+    check_durations("period", periods)
     return RhythmicRollout(
         primitives,
         fill("amplitude", primitives.amplitudes) / primitives.amplitudes,
@@ -137,18 +137,11 @@ def rollout(
         given["start"],
         given["velocity"],
         float(n_periods),
-        _samples(primitives.dmp.n_points, n_periods, periods, rate, n_samples),
+        _samples(primitives.dmp, float(n_periods), periods, rate, n_samples),
     )
 
 
-def check_periods(periods: Array) -> None:
-    """Refuse a period of 0 seconds or less."""
-    if (periods <= 0).any():
-        i = int(np.argmax(periods <= 0))
-        raise SpecificationError(f"expected period above 0 seconds, got {periods[i]:g} for movement {i}")
-
-
-def _samples(n_points: int, n_periods: float, periods: Array, rate: float | None, n_samples: int | None) -> int:
+def _samples(dmp: RhythmicDMP, n_periods: float, periods: Array, rate: float | None, n_samples: int | None) -> int:
     if rate is not None and n_samples is not None:
         raise SpecificationError("expected either rate or n_samples, got both")
     if rate is not None:
@@ -159,8 +152,8 @@ def _samples(n_points: int, n_periods: float, periods: Array, rate: float | None
                 f"expected a rate of at least {least:.3g} Hz, that is {SAMPLES_PER_PERIOD} samples per period, got "
                 f"{rate:g} Hz"
             )
-        return max(2, math.ceil(float(periods.max()) * n_periods * rate * (1 - 1e-12)) + 1)
+        wanted = float(periods.max()) * n_periods * rate * (1 - 1e-12) + 1
+        return max(2, check_samples(wanted, dmp.n_basis, "rate times periods"))
     if n_samples is None:
-        return max(2, math.ceil(n_periods * n_points * (1 - 1e-12)) + 1)
-    check_count("n_samples", n_samples, 2)
-    return n_samples
+        return max(2, check_samples(n_periods * dmp.n_points * (1 - 1e-12) + 1, dmp.n_basis, "n_periods"))
+    return check_samples(check_count("n_samples", n_samples, 2), dmp.n_basis, "n_samples")

@@ -12,6 +12,7 @@ from kineme.segmentation.bouts import Rows, consecutive
 from kineme.segmentation.motion import Motion
 from kineme.validation import check_count, check_number
 
+_MOST_POINTS = 10_000
 _MIN_POINTS = 5  # even points per piece
 
 
@@ -32,7 +33,7 @@ class ChangePoints:
     n_pieces : int, optional
         The number of pieces, where you know it; resting pieces count.
     n_points : int, default 1000
-        Time resolution; the cost grows with its square.
+        Time resolution; the cost grows with its square. At most 10,000.
 
     References
     ----------
@@ -46,7 +47,7 @@ class ChangePoints:
 
     def __post_init__(self) -> None:
         check_number("penalty", self.penalty, above=0.0)
-        check_count("n_points", self.n_points, 2 * _MIN_POINTS)
+        check_count("n_points", self.n_points, 2 * _MIN_POINTS, most=_MOST_POINTS)
         if self.n_pieces is not None:
             check_count("n_pieces", self.n_pieces, 1)
             if self.n_pieces * _MIN_POINTS > self.n_points:

@@ -15,7 +15,7 @@ from kineme.segmentation.segmentation import Segmentation
 from kineme.segmentation.table import SEGMENTERS, Segmenter
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import MIN_SAMPLES, check_choice
+from kineme.validation import MIN_SAMPLES, check_choice, check_switch
 
 
 def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any) -> Segmentation:
@@ -56,6 +56,7 @@ def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False
     array([[1., 2.],
            [3., 4.]])
     """
+    check_switch("cover", cover)
     method = as_segmenter(by, parameters)
     whole = as_recording(recording)
     motion = observe(whole, method.resolution)

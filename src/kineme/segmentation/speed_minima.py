@@ -72,8 +72,9 @@ class SpeedMinima:
             corners = np.interp(even, t, corners)
             cuts = np.union1d(cuts, find_peaks(corners, height=least, distance=3)[0])
             slowness = np.maximum(slowness - slowness.min(), corners)
-        apart = self.min_movement
-        if apart is None:
+        if self.min_movement is not None:
+            apart = float(self.min_movement)
+        else:
             apart = _MIN_MOVEMENT * typical_duration(np.diff(even[np.concatenate(([0], cuts, [-1]))]))
         chosen = _apart(cuts, slowness[cuts], apart * (len(t) - 1) / t[-1])
         rows = np.searchsorted(t, even[chosen])

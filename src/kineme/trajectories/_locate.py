@@ -20,7 +20,7 @@ def locate(u, interval, local):  # type: ignore[no-untyped-def]
     interval[:] = 0
     for j in range(1, last):
         target = int(np.ceil(u[j] * per_step))
-        interval[min(target, n_points - 1)] += 1
+        interval[max(0, min(target, n_points - 1))] += 1  # also of NaN: never beside the array
     j = 0
     for p in range(n_points):
         j += interval[p]

@@ -20,12 +20,16 @@ class Step(Protocol):
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     """Refuse what is not an iterable of steps; a step's class without parentheses is not a step."""
-    found = tuple(steps) if isinstance(steps, Iterable) else ()
-    wrong = [step for step in found if isinstance(step, type) or not callable(getattr(step, "apply", None))]
-    if wrong or not isinstance(steps, Iterable):
+    try:
+        found = tuple(steps)
+    except TypeError:
         raise SpecificationError(
-            "expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), "
-            f"got {wrong[0] if wrong else steps!r}"
+            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {steps!r}"
+        ) from None
+    wrong = [step for step in found if isinstance(step, type) or not callable(getattr(step, "apply", None))]
+    if wrong:
+        raise SpecificationError(
+            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {wrong[0]!r}"
         )
     return found
 

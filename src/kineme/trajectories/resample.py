@@ -12,6 +12,8 @@ from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.spline import spline_matrix, spline_rows
 from kineme.validation import MIN_SAMPLES, Array, check_count
 
+_MOST = 1_000_000  # samples of a movement
+
 
 @dataclass(frozen=True)
 class Resample:
@@ -20,7 +22,7 @@ class Resample:
     Parameters
     ----------
     n_points : int, default 200
-        Samples per movement afterwards.
+        Samples per movement afterwards, at most a million.
 
     Notes
     -----
@@ -33,7 +35,7 @@ class Resample:
     n_points: int = 200
 
     def __post_init__(self) -> None:
-        check_count("n_points", self.n_points, MIN_SAMPLES)
+        check_count("n_points", self.n_points, MIN_SAMPLES, most=_MOST)
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements, evenly sampled."""

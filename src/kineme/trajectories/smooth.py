@@ -17,6 +17,7 @@ from kineme.validation import Array, check_number
 
 _OPERATIONS_PER_SAMPLE = 40  # elementary operations that the banded system costs per sample and dimension
 _TILE_MOVEMENTS = 256
+_CUTOFFS = 1e-9, 1e9  # cycles per movement, smallest and largest: the fourth powers are far from overflow
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Smooth:
     cutoff: float = 20.0
 
     def __post_init__(self) -> None:
-        check_number("cutoff", self.cutoff, above=0.0)
+        check_number("cutoff", self.cutoff, above=0.0, smallest=_CUTOFFS[0], most=_CUTOFFS[1])
 
     def apply(self, demonstrations: Demonstrations) -> Movements:
         """The movements, smoothed."""

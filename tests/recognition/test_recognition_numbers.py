@@ -1,0 +1,156 @@
+"""Numbers that the documentation gives for recognition: each falls here if it is changed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from movement_samples import draw_shapes
+
+import kineme
+from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.kernels.procrustes import Prepared
+from kineme.recognition.choice import CANDIDATES, aligned_weights
+from kineme.recognition.conformal import calibrate
+from kineme.recognition.decision import Decision
+from kineme.recognition.hypotheses import Early, known_hypotheses
+from kineme.recognition.perturbations import Perturbation
+from kineme.recognition.prefixes import beginnings, smooth_paths
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
+from kineme.recognition.spotting import _recognized
+
+
+def test_of_four_demonstrations_the_own_scale_counts_half():
+    """Drawn towards that of all classes as if by four more."""
+    recognizer = Recognizer(classifier="nearest").fit(draw_shapes([4] * 6, seed=2))
+    logs = recognizer.log_similarity(recognizer.demonstrations_)
+    np.fill_diagonal(logs, -np.inf)
+    own = np.array([logs[i, i // 4 * 4 : i // 4 * 4 + 4].max() for i in range(24)])
+    means = np.sqrt(-2.0 * own).reshape(6, 4).mean(axis=1)
+    np.testing.assert_allclose(calibrate(recognizer).scales, 0.5 * means + 0.5 * means.mean(), rtol=1e-3)
+
+
+def test_a_typical_impostor_counts_exp_of_minus_four():
+    recognizer = Recognizer(classifier="nearest").fit(draw_shapes([3] * 6, seed=1))
+    logs = recognizer.similarity_.logs(recognizer.views_, recognizer.views_)
+    logs[:, recognizer.labels_[:, None] == recognizer.labels_] = -np.inf
+    np.testing.assert_allclose(np.median(logs.max(axis=2), axis=1), -4.08, atol=0.05)
+
+
+def test_usual_representations_keep_half_of_the_weight():
+    """Whatever is chosen on movements that differ in timing only; the new ones may differ in anything."""
+    u, random = np.linspace(0.0, 1.0, 80), np.random.default_rng(0)
+    movements = []
+    for power in (2.0, 0.5):
+        for _ in range(10):
+            bend = 1 + 0.3 * random.normal()
+            movements.append(np.column_stack((u**power, bend * np.sin(3 * u**power))))
+    recognizer = Recognizer().fit(movements, np.repeat(["late", "early"], 10))
+    share = dict(zip(recognizer.representations_, recognizer.weights_, strict=True))
+    assert all(share.get(one, 0.0) >= 1 / 6 - 1e-12 for one in DEFAULT_REPRESENTATIONS)
+
+
+def test_shares_that_say_less_than_a_fiftieth_are_left_out_and_larger_ones_kept():
+    shares = []
+    for seed in range(6):
+        recognizer = Recognizer(CANDIDATES, weights="equal").fit(draw_shapes([8] * 4, seed=seed, spread=0.8))
+        shares.append(aligned_weights(recognizer.similarity_, recognizer.views_, recognizer.labels_))
+    nonzero = np.concatenate(shares)[np.concatenate(shares) > 0]
+    assert 0.02 <= nonzero.min() < 0.05
+
+
+class _Known:
+    """Two kernels of which the labels are 0.99 and 0.01 parts."""
+
+    def __init__(self, labels):
+        random = np.random.default_rng(0)
+        noise = random.uniform(0.1, 0.9, (len(labels), len(labels)))
+        same = (labels[:, None] == labels).astype(float)
+        other = noise + noise.T
+        self._logs = np.log(np.stack(((same - 0.01 * other + 0.1) / 0.99, other)))
+
+    def logs(self, A, B):
+        return self._logs
+
+
+def test_a_hundredth_is_left_out():
+    labels = np.repeat(["a", "b"], 10)
+    rows = Prepared(np.zeros((20, 1)), np.zeros(20))
+    np.testing.assert_array_equal(aligned_weights(_Known(labels), (rows, rows), labels), [1.0, 0.0])
+
+
+def test_three_percent_of_noise_are_smoothed_away_and_shapes_are_not():
+    """A cutoff of 30 cycles leaves 85 % of the movements recognized, one of 3 cycles 96 %."""
+    demos = kineme.load_lasa()
+    noisy = Perturbation(noise=0.03, scale=1, rotation=0.3, warp=0.35).apply(demos, 0)
+    assert Recognizer().fit(noisy[::7]).score(noisy, demos.labels) >= 0.975
+
+
+def _stretched(factor):
+    """A demonstration done slower, as one piece of a recording."""
+    demos = draw_shapes([1, 1, 1])
+    demos = Demonstrations([Trajectory(np.linspace(0, 2, 80), x.positions, x.label) for x in demos])
+    whole = Trajectory(np.linspace(0.0, 2.0 * factor, 80), demos[0].positions)
+    best, p, score = _recognized(Recognizer().fit(demos), whole, np.array([[0, 80]]), 0.05)
+    return int(best[0]), float(p[0, best[0]]), float(score[0])
+
+
+def test_a_spotted_movement_counts_its_duration_less_half_a_typical_one():
+    best, p, score = _stretched(1.0)
+    assert best == 0
+    assert p > 0.99
+    assert score == pytest.approx(2.0 - 0.5 * 2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("factor", [1.5, 2.0, 2.9, 1 / 2.9])
+def test_another_tempo_counts_against_it_as_a_normal_density(factor):
+    """A ratio of 1.5 is one standard deviation; log K of a typical impostor is -4."""
+    _, p, score = _stretched(factor)
+    closeness = 1.0 - 0.5 * (math.log(factor) / math.log(1.5)) ** 2 / 4.0
+    assert p > 0.99
+    assert score == pytest.approx(2.0 * factor * closeness - 1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("factor", [3.1, 1 / 3.1])
+def test_beyond_three_times_the_duration_nothing_is_looked_for(factor):
+    assert _stretched(factor)[1:] == (0.0, 0.0)
+
+
+def _evidence(recognizer, early, size=1.0, slower=1.0, late=0.0):
+    """How much the best hypothesis loses when the same movement is larger, slower or late on its way, in logarithms."""
+    known = known_hypotheses(recognizer, early)
+    paths = smooth_paths(recognizer.demonstrations_[:1], None)
+    plain = beginnings(paths, np.ones(1))
+    moved = beginnings(size * paths, np.ones(1))
+    moved = moved._replace(timing=moved.timing + late / math.sqrt(moved.timing.shape[1]))
+    durations = recognizer.demonstrations_.durations[:1]
+    whole = len(known.progress) - 1  # the hypothesis that it is this movement, all of it
+    before, after = (
+        known.log_evidence(plain, durations)[0, whole],
+        known.log_evidence(moved, slower * durations)[0, whole],
+    )
+    return float(after - before)
+
+
+def test_how_much_size_duration_and_timing_may_vary_by_default():
+    """A size four times as large and a duration twice as long are two standard deviations; 0.05 is one of timing."""
+    recognizer = Recognizer(cutoff=None).fit(draw_shapes([1, 1, 1]))
+    assert _evidence(recognizer, Early(), size=4.0) == pytest.approx(-0.5 * (math.log(4.0) / 0.7) ** 2, abs=1e-3)
+    assert _evidence(recognizer, Early(), slower=0.5) == pytest.approx(-0.5 * (math.log(2.0) / 0.35) ** 2, abs=1e-3)
+    assert _evidence(recognizer, Early(), late=0.05) == pytest.approx(-math.log(1.5), abs=1e-3)
+    sized = Recognizer(cutoff=None, scale="none").fit(draw_shapes([1, 1, 1]))
+    assert _evidence(sized, Early(), size=1.2) == pytest.approx(-0.5 * (math.log(1.2) / 0.1) ** 2, abs=1e-3)
+
+
+def test_a_label_is_decided_when_nine_tenths_were_held_for_a_twentieth_of_the_time():
+    live = Recognizer().fit(draw_shapes([1, 1])).stream()._decision
+    for decision in (Decision(), live):
+        decision.clear()
+        assert decision.update(1.0, 0, 0.89) is None
+        assert decision.update(1.02, 0, 0.91) is None
+        assert decision.update(1.06, 0, 0.91) is None  # 0.04 of 1.06
+        assert decision.update(1.08, 0, 0.91) == 0
+        assert decision.update(1.10, 1, 0.95) == 0  # another needs twice as long
+        assert decision.update(1.20, 1, 0.95) == 0
+        assert decision.update(1.25, 1, 0.95) == 1
