@@ -55,7 +55,7 @@ class Procrustes:
     max_angle: float = math.pi / 3
 
     def __post_init__(self) -> None:
-        check_number("max_angle", self.max_angle, least=0.0)
+        check_number("max_angle", self.max_angle, least=0.0, smallest=0.0)
         if self.max_angle > math.pi + 1e-12:
             raise SpecificationError(f"expected max_angle of at most pi, got {self.max_angle!r}; angles are in radians")
         if self.n_dims > 3 and self.max_angle > 0:
