@@ -1,5 +1,7 @@
 # make demo   the paper's tables and figures, in out/
 # make test   formatter, linter, type checker, tests
+# make test-pythons  the same with every Python that is found here
+# make test-lowest   the tests with the lowest versions of what kineme depends on
 # make soak   faults of the action library, many times: minutes
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
@@ -8,35 +10,63 @@
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
+# Those that kineme promises to work with; name others, or by their paths, with: make test-pythons PYTHONS="..."
+PYTHONS ?= python3.11 python3.12 python3.13 python3.14
+DEV ?= .venv-dev
 
-.PHONY: demo test soak fuzz bench evaluate figures lock clean
+.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
 
-test: .venv-dev/ready
-	.venv-dev/bin/ruff format --check .
-	.venv-dev/bin/ruff check .
-	.venv-dev/bin/mypy
-	.venv-dev/bin/pytest -n 2 --dist loadscope
+test: $(DEV)/ready
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
+	$(DEV)/bin/pytest -n 2 --dist loadscope
 
-soak: .venv-dev/ready
-	.venv-dev/bin/pytest soak -p no:cacheprovider
+# Each Python with an environment of its own; all are tried, though one fails.
+test-pythons:
+	@found=; missing=; failed=; \
+	for python in $(PYTHONS); do \
+	  if ! $$python -c '' 2>/dev/null; then missing="$$missing $$python"; continue; fi; \
+	  found="$$found $$python"; echo "== $$python"; \
+	  $(MAKE) test PYTHON=$$python DEV=.venv-dev-$$(basename $$python) || failed="$$failed $$python"; \
+	done; \
+	echo "tested:$${found:- none}; not found:$${missing:- none}; failed:$${failed:- none}"; \
+	test -n "$$found" && test -z "$$failed"
 
-fuzz: .venv-dev/ready
-	.venv-dev/bin/pytest fuzz -p no:cacheprovider
+test-lowest: .venv-lowest/ready
+	.venv-lowest/bin/pytest -p no:cacheprovider
 
-.venv/ready: requirements/run.txt pyproject.toml
+soak: $(DEV)/ready
+	$(DEV)/bin/pytest soak -p no:cacheprovider
+
+fuzz: $(DEV)/ready
+	$(DEV)/bin/pytest fuzz -p no:cacheprovider
+
+.venv/ready: requirements/run.txt pyproject.toml .venv/python
 	$(call environment,.venv,requirements/run.txt)
 
-.venv-dev/ready: requirements/dev.txt pyproject.toml
-	$(call environment,.venv-dev,requirements/dev.txt)
+$(DEV)/ready: requirements/dev.txt pyproject.toml $(DEV)/python
+	$(call environment,$(DEV),requirements/dev.txt)
+
+.venv-lowest/ready: requirements/lowest.txt pyproject.toml .venv-lowest/python
+	$(call environment,.venv-lowest,requirements/lowest.txt)
+
+# Which Python an environment was made with; it is made anew when PYTHON names another one.
+%/python: always
+	@mkdir -p $(@D)
+	@now=$$($(PYTHON) -c 'import sys; print(sys.executable, sys.version)' 2>&1 || echo none); \
+	test "$$now" = "$$(cat $@ 2>/dev/null)" || echo "$$now" > $@
 
 # The packages of a lock file, each checked against its hash, then this project on top.
 define environment
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "kineme needs Python 3.11 or later, found " + sys.version.split()[0] + "; choose one with: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import ensurepip' || { echo "This Python cannot create environments; on Debian: apt-get install python3-venv"; exit 1; }
+	@cp $(1)/python $(1).python
 	$(PYTHON) -m venv --clear $(1)
+	@mv $(1).python $(1)/python
 	$(1)/bin/pip install --quiet --require-hashes -r $(2)
 	$(1)/bin/pip install --quiet --no-deps --no-build-isolation --editable .
 	touch $@
@@ -55,18 +85,19 @@ bench: .venv-bench/ready
 evaluate: .venv-rivals/ready
 	.venv-rivals/bin/kineme evaluate lasa --out out/
 
-.venv-rivals/ready: bench/rivals.txt pyproject.toml
+.venv-rivals/ready: bench/rivals.txt pyproject.toml .venv-rivals/python
 	$(call environment,.venv-rivals,bench/rivals.txt)
 
-figures: .venv-dev/ready
-	.venv-dev/bin/python docs/make_figures.py
+figures: $(DEV)/ready
+	$(DEV)/bin/python docs/make_figures.py
 
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
+	uv pip compile pyproject.toml --group dev --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
 	uv pip compile bench/peers.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-bench .venv-rivals out
+	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-bench .venv-rivals out

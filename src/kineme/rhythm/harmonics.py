@@ -59,7 +59,8 @@ def fit_harmonics(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> 
     coefficients = np.linalg.solve(gram, both.transpose(0, 2, 1)).transpose(0, 2, 1)[:, :, top:]
     coefficients[:, :, 0] = coefficients[:, :, 0].real
     doubled = coefficients * np.where(np.arange(top + 1) == 0, 1.0, 2.0)
-    return HarmonicFit(coefficients, (doubled @ half.transpose(0, 2, 1)).real)
+    waves: Array = (doubled @ half.transpose(0, 2, 1)).real
+    return HarmonicFit(coefficients, waves)
 
 
 def as_real(coefficients: Complex) -> Array:
