@@ -228,3 +228,14 @@ def test_a_limit_that_is_no_number_is_told_before_anything_is_read(tmp_path, mon
     monkeypatch.setenv(VARIABLE, "much")
     with pytest.raises(kineme.SpecificationError, match=VARIABLE):
         read_recordings(tmp_path)
+
+
+@pytest.mark.parametrize("skip", ["movement", "sample"])
+def test_stamps_of_infinite_span_are_refused(skip):
+    good = "a,0,0\na,1,1\na,2,4\na,3,9\n"
+    bad = "b,-1.5e308,0\nb,0,1\nb,1,2\nb,2,3\nb,1.5e308,4\n"
+    found = read(f"id,t,x\n{good}{bad}".encode(), "a.csv", units="s", skip=skip)
+    assert found.demonstrations.lengths.tolist() == ([4] if skip == "movement" else [4, 4])
+    assert "expected times that span a finite duration, got -1.5e+308 and 1.5e+308 s" in found.problems[0].reason
+    with pytest.raises(kineme.TrajectoryError, match="trajectory 0: expected times that span a finite duration"):
+        kineme.Demonstrations.from_arrays([np.zeros((4, 1))], times=[np.array([-1.5e308, 0, 1, 1.5e308])])
