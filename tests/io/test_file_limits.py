@@ -239,3 +239,34 @@ def test_stamps_of_infinite_span_are_refused(skip):
     assert "expected times that span a finite duration, got -1.5e+308 and 1.5e+308 s" in found.problems[0].reason
     with pytest.raises(kineme.TrajectoryError, match="trajectory 0: expected times that span a finite duration"):
         kineme.Demonstrations.from_arrays([np.zeros((4, 1))], times=[np.array([-1.5e308, 0, 1, 1.5e308])])
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "ns"])
+def test_dates_that_are_none_are_missing_samples(unit):
+    dates = np.datetime64("2024-05-06T07:08:09", unit) + np.arange(6) * np.timedelta64(10**9, "ns").astype(
+        f"m8[{unit}]"
+    )
+    dates[0] = "NaT"
+    data = npz(positions=X, times=dates)
+    with pytest.raises(kineme.DataError, match="expected finite times, got nan at sample 0"):
+        read(data)
+    assert read(data, skip="sample").demonstrations.lengths.tolist() == [5]
+
+
+@pytest.mark.parametrize("dates", [np.arange(6) * 10**17, np.arange(6) * 10**10])
+@pytest.mark.parametrize("kind", ["M", "m"])
+def test_dates_that_wrap_around_are_refused(dates, kind):
+    with pytest.raises(kineme.DataError, match="expected dates from 1678 to 2262 or durations of that size"):
+        read(npz(positions=X, times=dates.astype(f"{kind}8[s]")))
+
+
+def test_numbers_beyond_float64_are_infinite():
+    with pytest.raises(kineme.DataError, match="expected finite positions, got"):
+        read(npz(positions=X.astype(np.longdouble) + np.longdouble("1e4000"), times=T))
+    with pytest.raises(kineme.DataError, match="expected finite times, got inf"):
+        read(b"t,x\n1e308,1\n1.1e308,2\n1.2e308,3\n1.3e308,4\n", "a.csv", units=100.0)
+
+
+def test_labels_that_are_records_are_refused():
+    with pytest.raises(kineme.DataError, match="expected labels that are texts or numbers, got"):
+        read(npz(positions=np.stack((X, X)), labels=np.zeros(2, [("a", "f8")])))
