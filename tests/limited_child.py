@@ -72,6 +72,7 @@ class LimitedChild:
             code = self._end()
             return Outcome("died", f"exit code {code}")
         if answer == "hung":
+            self._process.kill()
             self._end()
             return Outcome("hung", f"no answer within {self.seconds} s")
         return Outcome(*answer)

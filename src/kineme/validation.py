@@ -92,6 +92,14 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
+    with np.errstate(over="ignore"):
+        spans = times[offsets[1:] - 1] - times[offsets[:-1]]
+    if np.isinf(spans).any():
+        i = int(np.argmax(np.isinf(spans)))
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected times that span a finite duration, got {times[offsets[i]]:.9g} to "
+            f"{times[offsets[i + 1] - 1]:.9g} s"
+        )
     increasing = times[1:] > times[:-1]
     increasing[offsets[1:-1] - 1] = True  # from one movement to the next
     if increasing.all():

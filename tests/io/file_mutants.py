@@ -239,7 +239,8 @@ def _mat_mutant(rng, data):
 
 def read_mutant(name, data):
     """Read a file of that name through the public door, and check what comes; called in a child process."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
         path = Path(folder) / name
         path.write_bytes(data)
         if name in _SAVED:

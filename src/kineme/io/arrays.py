@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
+from kineme.io.dates import nanoseconds
 from kineme.io.found import Block, Detected, Found, listed
 from kineme.io.layout import Layout
 from kineme.io.time_units import in_seconds, unit_by_size
@@ -113,7 +114,7 @@ def _numbers(values: Any) -> Array:
     if array.dtype.kind == "c":
         raise DataError(f"expected real numbers, got {array.dtype}; save both parts as columns")
     if array.dtype.kind in "mM":
-        array = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64)
+        return nanoseconds(array)
     return array.astype(np.float64, copy=False)
 
 
@@ -181,7 +182,7 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
 
 def _label(one: Any) -> str | None:
     """A label as text; None where there is none."""
-    if isinstance(one, (list, dict)) or one != one:  # noqa: PLR0124 - only NaN differs from itself
+    if isinstance(one, (list, dict, tuple)) or one != one:  # noqa: PLR0124 - only NaN differs from itself
         raise DataError(f"expected labels that are texts or numbers, got {one!r}")
     if isinstance(one, bytes):
         return one.decode("utf-8", "replace") or None

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import secrets
+import stat
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+_IDLE = 3600.0  # seconds since the last write, after which a file whose writer is gone from this machine is nobody's
 
 
 def write_atomically(path: Path, data: bytes) -> Path:
@@ -25,8 +31,12 @@ def write_atomically(path: Path, data: bytes) -> Path:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write to; if all goes well, that file is brought to the disk and takes its place."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    """A name beside `path` to write to; if all goes well, that file is brought to the disk and takes its place.
+
+    What killed processes left of earlier tries is removed.
+    """
+    remove_leftovers(path)
+    beside = name_beside(path)
     try:
         yield beside
         with beside.open("rb+") as file:
@@ -34,3 +44,42 @@ def replaced(path: Path) -> Iterator[Path]:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def name_beside(path: Path) -> Path:
+    """A hidden name beside `path` that no other writer has, and from which `remove_leftovers` tells the process."""
+    return path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove files of `name_beside` that killed processes left beside `path`, companions of databases included.
+
+    A file goes if it is this user's, its process is gone, and nobody wrote to it for an hour: in a folder that several
+    machines share, the process may be at work on another one. What cannot be removed stays.
+    """
+    pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
+    with suppress(OSError):
+        for entry in os.scandir(path.parent):
+            if (found := pattern.fullmatch(entry.name)) and not _is_at_work(int(found[1])):
+                with suppress(OSError):
+                    _remove_if_idle(Path(entry.path))
+
+
+def _remove_if_idle(path: Path) -> None:
+    known = path.lstat()
+    own = not hasattr(os, "getuid") or known.st_uid == os.getuid()
+    if own and stat.S_ISREG(known.st_mode) and time.time() - known.st_mtime > _IDLE:
+        path.unlink()
+
+
+def _is_at_work(process: int) -> bool:
+    """Whether a process of that number runs on this machine; where nobody can tell, yes."""
+    if os.name != "posix":  # elsewhere the signal 0 is one that ends processes
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # another user's, or no number of a process
+        return True
+    return True

@@ -51,8 +51,10 @@ def _unusable(block: Block, skip: str) -> Flags:
         odd |= np.isin(np.arange(total) if block.rows is None else block.rows, list(block.faults))
     if block.times is None or not total:
         return odd
-    odd |= ~np.isfinite(block.times)
+    lengths = np.diff(block.offsets)
+    elapsed = block.times - np.repeat(block.times[block.offsets[:-1][lengths > 0]], lengths[lengths > 0])
     step = np.diff(block.times, prepend=-np.inf)
+    odd |= ~np.isfinite(block.times) | (np.isinf(elapsed) & np.isfinite(block.times))
     step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
     late = ~(step > 0)
     if skip == "sample" and (odd | late).any():
@@ -93,6 +95,9 @@ def _reason(block: Block, i: int, k: int) -> str:
     assert times is not None
     if not np.isfinite(times[k]):
         return f"expected finite times, got {times[k]}{at}"
+    first = times[block.offsets[i]]
+    if np.isinf(times[k] - first):
+        return f"expected times that span a finite duration, got {first:.9g} and {times[k]:.9g} s{at}"
     before = times[k - 1]
     what = "duplicate" if times[k] == before else "decreasing"
     return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}"

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kineme.errors import DataError
 from kineme.validation import Array
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
@@ -28,3 +31,19 @@ def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
         except (ValueError, OverflowError):
             others[row] = cell
     return seconds, others
+
+
+def nanoseconds(stamps: NDArray[Any]) -> Array:
+    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN where there is none.
+
+    Raises
+    ------
+    DataError
+        Dates so far that nanoseconds cannot count them; NumPy would wrap them around silently.
+    """
+    counts = stamps.astype(f"{stamps.dtype.kind}8[ns]")
+    missing = np.isnat(stamps)
+    far = (counts.astype(stamps.dtype) != stamps) & ~missing
+    if far.any():
+        raise DataError(f"expected dates from 1678 to 2262 or durations of that size, got {stamps[far][0]}")
+    return np.where(missing, np.nan, counts.astype(np.int64))

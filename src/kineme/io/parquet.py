@@ -11,6 +11,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
+from kineme.io.dates import nanoseconds
 from kineme.io.layout import Layout
 from kineme.io.limits import check_expanded
 from kineme.io.table import Table
@@ -105,8 +106,7 @@ def _text(one: Any, head: str) -> str:
 def _numbers(column: Any, head: str) -> Any:
     values = column.to_numpy()
     if values.dtype.kind in "Mm":
-        counts = values.astype(f"{values.dtype.kind}8[ns]")
-        return np.where(np.isnat(counts), np.nan, counts.astype(np.int64))
+        return nanoseconds(values)
     try:
         return values.astype(np.float64)
     except (TypeError, ValueError) as error:

@@ -8,6 +8,8 @@ import stat
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from kineme.errors import DataError, KinemeError
 from kineme.io.check_block import check_block
 from kineme.io.folders import as_text
@@ -73,8 +75,9 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
     form = format_of(relative)
     try:
         check_expanded(len(data))
-        detected, block = form.read(data, layout)
-        block, problems = check_block(block, name, layout.skip)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found to be infinite
+            detected, block = form.read(data, layout)
+            block, problems = check_block(block, name, layout.skip)
     except _UNREADABLE as error:
         return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None

@@ -1,0 +1,28 @@
+"""A small part of `make fuzz`, always the same: damaged files of every format, in a child with little memory."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+from file_mutants import mutant, samples
+
+from limited_child import MIB, LimitedChild
+
+ROUNDS = 40
+
+
+@pytest.fixture(scope="module")
+def child():
+    with LimitedChild(("kineme", "file_mutants", "pyarrow.parquet"), memory=512 * MIB, seconds=20.0) as child:
+        yield child
+
+
+@pytest.mark.parametrize("name", samples())
+def test_whole_files_are_read_and_damaged_ones_refused_in_words(child, name):
+    assert child.call("file_mutants:read_mutant", name, samples()[name]).how == "done"
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    found = [child.call("file_mutants:read_mutant", name, mutant(rng, samples()[name], name)) for _ in range(ROUNDS)]
+    assert [one for one in found if not one.is_good] == []
+    assert any(one.how == "refused" for one in found)
