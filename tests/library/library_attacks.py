@@ -116,6 +116,11 @@ ROWS = {
     ),
     "t0 is infinite": (["UPDATE movement SET t0 = -9e999 WHERE id = 2"], "t0 is not a finite number"),
     "t0 is bytes": (["UPDATE movement SET t0 = x'00' WHERE id = 2"], "t0 is not a finite number"),
+    "t0 of text beside stamps": (["UPDATE movement SET t0 = 'x' WHERE id = 8"], "t0 is not a finite number"),
+    "samples of text beside stamps": (
+        ["UPDATE movement SET n_samples = 'x' WHERE id = 8"],
+        "n_samples is not a whole number",
+    ),
     "no samples": (["UPDATE movement SET n_samples = 0 WHERE id = 2"], "n_samples is not a whole number from 4"),
     "samples below zero": (
         ["UPDATE movement SET n_samples = -8 WHERE id = 2"],

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import io
+import zlib
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.io.atomic import write_atomically
 from kineme.library import read
@@ -17,6 +20,7 @@ from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.recognition.shortlist import Stored
 from kineme.sampling import evenly_spaced
+from kineme.validation import Array
 
 if TYPE_CHECKING:
     from kineme.library.serving import Members
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
 FILE = "calibration.cache"
 
 _FORMAT = "1"
+_SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
 
 
@@ -38,10 +43,10 @@ def sample_recognizer(store: Store, members: Members) -> Recognizer:
 def calibrate(store: Store, members: Members, recognizer: Recognizer, stored: Stored) -> Calibration:
     """The calibration of a recognizer on all members, taken from the cache if that is of the same ones."""
     path, key = store.folder / FILE, _key(store, members)
-    try:
-        return _unpacked(path.read_bytes(), key)
-    except (OSError, ValueError):
-        made = calibrate_sample(recognizer, stored)
+    if path.is_file():  # a pipe would keep us waiting
+        with suppress(*_SPOILED):
+            return _unpacked(path.read_bytes(), key, len(members.names))
+    made = calibrate_sample(recognizer, stored)
     if not store.read_only:
         with suppress(OSError):  # no room, no permission: it is made again next time
             write_atomically(path, _packed(made, key))
@@ -72,12 +77,28 @@ def _seal(data: bytes, key: str) -> bytes:
     return hashlib.sha256(key.encode() + data).digest()
 
 
-def _unpacked(data: bytes, key: str) -> Calibration:
+def _unpacked(data: bytes, key: str, n: int) -> Calibration:
+    """The calibration of n classes; a ValueError or KeyError if this is none: the checksum has no key."""
     data, seal = data[32:], data[:32]
     if seal != _seal(data, key):
         raise ValueError("damaged, or of other members")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        which = arrays["which"]
-        pooled = [arrays[f"pooled {k}"] for k in range(int(which.max()) + 1)]
-        own = tuple(np.split(arrays["own"], arrays["ends"][:-1]))
-        return Calibration(arrays["scales"], own, tuple(pooled[k] for k in which))
+        which, ends = _whole(arrays["which"], n, n), _whole(arrays["ends"], n, len(data))
+        pooled = [_real(arrays[f"pooled {k}"]) for k in range(int(which.max()) + 1)]
+        scales, own = _real(arrays["scales"]), _real(arrays["own"])
+    sound = scales.shape == (n,) and ((scales > 0) & np.isfinite(scales)).all()
+    if not sound or (np.diff(ends) < 0).any() or ends[-1] != len(own):
+        raise ValueError("no calibration")
+    return Calibration(scales, tuple(np.split(own, ends[:-1])), tuple(pooled[k] for k in which))
+
+
+def _whole(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:
+    if array.shape != (n,) or array.dtype.kind not in "iu" or (array < 0).any() or (array > end).any():
+        raise ValueError("no calibration")
+    return array
+
+
+def _real(array: NDArray[Any]) -> Array:
+    if array.ndim != 1 or array.dtype != np.float64 or not (array >= 0).all():  # NaN is not
+        raise ValueError("no calibration")
+    return array

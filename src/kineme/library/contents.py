@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.library.checks import GOOD
 from kineme.library.rows import Row, parsed
 from kineme.validation import Array
 
@@ -87,7 +88,7 @@ def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) ->
     """As the functions of `CONTENTS`, for ascending rows of the table `raw`: beside its movement each makes sense."""
     yield from _not_finite(rows, 1, np.float64)
     yield from _not_finite(rows, 2, np.float32)
-    query = "SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ?"
+    query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
     about = {row[0]: row[1:] for row in connection.execute(query, (rows[0][0], rows[-1][0]))}
     fitting = [row for row in rows if row[0] in about and len(row[2]) == 4 * n_dims * about[row[0]][0]]
     if not fitting:

@@ -166,6 +166,8 @@ def _tie(store: Store, version: int) -> dict[str, Any]:
 
 def _load(store: Store, path: Path) -> Index | None:
     """The index in a file; None if there is none to be trusted."""
+    if not path.is_file():  # a pipe would keep us waiting
+        return None
     try:
         buffer: Any = np.memmap(path, np.uint8, "r")
         header = json.loads(bytes(buffer[:_HEADER]).rstrip(b"\0"))
@@ -173,6 +175,19 @@ def _load(store: Store, path: Path) -> Index | None:
         n = int(header["n"])
         fits = all(header[key] == value for key, value in tie.items()) and tie["at"] is not None
         whole = len(buffer) == _HEADER + _layout(store, n)[1] and zlib.crc32(buffer[_HEADER:]) == header["crc"]
-    except (OSError, ValueError, KeyError, TypeError, sqlite3.Error):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError, sqlite3.Error):
         return None
-    return _view(store, buffer, n) if fits and whole and n else None
+    if not (fits and whole and n > 0):
+        return None
+    index = _view(store, buffer, n)
+    return index if _makes_sense(index) else None
+
+
+def _makes_sense(index: Index) -> bool:
+    """Whether these could be codes: a checksum has no key, and anybody can write a file with the right one."""
+    return (
+        bool((index.ids == np.arange(1, len(index.ids) + 1)).all())
+        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in index.bases)
+        and all(bool(np.isfinite(part).all()) for code in index.blocks[0] for part in code)
+        and all(bool((code.squares >= 0).all() and (code.rests >= 0).all()) for code in index.blocks[0])
+    )

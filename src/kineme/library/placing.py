@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from kineme.library.schema import APPLICATION_ID
+
 LOGS = ("-wal", "-journal")  # ends of the names of the files beside a database from which SQLite changes it
+_DAY = 86400.0  # seconds
+_LEFT = re.compile(r"\..+\.[0-9a-f]{8}")
 _COMPANIONS = ("", *LOGS, "-shm")
 
 
@@ -23,6 +29,7 @@ def placed(target: Path) -> Iterator[Path]:
     """
     if target.exists():
         raise FileExistsError(target)
+    _sweep(target.parent)
     beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
     try:
         yield beside
@@ -33,6 +40,24 @@ def placed(target: Path) -> Iterator[Path]:
     finally:
         for end in _COMPANIONS:
             beside.with_name(beside.name + end).unlink(missing_ok=True)
+
+
+def _sweep(folder: Path) -> None:
+    """Delete what processes left that were killed here more than a day ago; nobody would ever read it."""
+    for path in folder.glob(".*"):
+        with suppress(OSError):  # another process was faster, or it is not ours to delete
+            if _LEFT.fullmatch(path.name) and time.time() - path.lstat().st_mtime > _DAY and _is_ours(path):
+                for end in _COMPANIONS:
+                    path.with_name(path.name + end).unlink(missing_ok=True)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether this begins as a library does."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(72)
+    return head[:16] == b"SQLite format 3\0" and head[68:] == APPLICATION_ID.to_bytes(4, "big")
 
 
 def _name(beside: Path, target: Path) -> None:

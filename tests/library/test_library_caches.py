@@ -1,0 +1,140 @@
+"""Caches that somebody has made to harm, under right checksums: built again, whatever they say."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zlib
+
+import numpy as np
+import pytest
+from library_samples import draw_movements
+
+from kineme import ActionLibrary
+from kineme.library import calibrated, index
+from kineme.library.serving import Serving, members_of
+
+CODES, CALIBRATION = index.FILE, calibrated.FILE
+LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
+
+
+def _answers(library):
+    found = Serving(library.store, exhaustive=0).recognize(library.movements())
+    return [(a.label, a.ranked, a.confidence, dict(a.p_values), [n.index for n in a.nearest]) for a in found]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    """A library that has answered, its answers, and its caches."""
+    folder = tmp_path_factory.mktemp("served") / "actions"
+    with ActionLibrary(folder, create=True) as library:
+        library.learn(draw_movements(12, n_samples=12, labels=LABELS[0]))
+        expected = _answers(library)
+    return folder, expected, {name: (folder / name).read_bytes() for name in (CODES, CALIBRATION)}
+
+
+@pytest.mark.parametrize("labels", LABELS)
+def test_a_good_cache_is_believed(tmp_path, monkeypatch, labels):
+    with ActionLibrary(tmp_path, create=True) as library:
+        library.learn(draw_movements(12, n_samples=12, labels=labels))
+        expected = _answers(library)
+        monkeypatch.setattr(calibrated, "calibrate_sample", None)
+        monkeypatch.setattr(index, "_write", None)
+        assert _answers(library) == expected
+
+
+def _header(data, **changes):
+    """Codes with another header, and the checksum that fits."""
+    header = json.loads(data[: index._HEADER].rstrip(b"\0")) | changes
+    return json.dumps(header).encode().ljust(index._HEADER, b"\0") + data[index._HEADER :]
+
+
+def _codes(change):
+    """Codes changed as floats and as whole numbers, with the checksum that fits."""
+
+    def spoil(data, _):
+        body = bytearray(data[index._HEADER :])
+        change(body)
+        return _header(data[: index._HEADER] + bytes(body), crc=zlib.crc32(body))
+
+    return spoil
+
+
+def _archive(**changes):
+    """A calibration with other arrays, under the key of the library."""
+
+    def spoil(data, key):
+        with np.load(io.BytesIO(data[32:])) as arrays:
+            kept = dict(arrays) | changes
+        file = io.BytesIO()
+        np.savez(file, **{name: array for name, array in kept.items() if array is not None})
+        return calibrated._seal(file.getvalue(), key) + file.getvalue()
+
+    return spoil
+
+
+def _zeros(body, start, stop, kind, value):
+    body[start:stop] = np.full((stop - start) // np.dtype(kind).itemsize, value, kind).tobytes()
+
+
+HOSTILE = {
+    "ids backwards": (CODES, _codes(lambda body: _zeros(body, 0, 96, np.int64, 5))),
+    "ids far away": (CODES, _codes(lambda body: _zeros(body, 88, 96, np.int64, 1 << 40))),
+    "functions of NaN": (CODES, _codes(lambda body: _zeros(body, 128, 136, np.float64, np.nan))),
+    "functions of zeros": (CODES, _codes(lambda body: _zeros(body, 128, 128 + 9600, np.float64, 0.0))),
+    "codes of NaN": (CODES, _codes(lambda body: _zeros(body, 9728, 9728 + 1152, np.float32, np.nan))),
+    "sizes below zero": (CODES, _codes(lambda body: _zeros(body, 9728 + 1152, 9728 + 1200, np.float32, -1.0))),
+    "no codes": (CODES, lambda data, _: _header(data, n=0)),
+    "codes below zero": (CODES, lambda data, _: _header(data, n=-12)),
+    "codes without end": (CODES, lambda data, _: _header(data, n=1 << 60)),
+    "an endless number": (CODES, lambda data, _: _header(data, n=float("inf"))),
+    "an endless version": (CODES, lambda data, _: _header(data, version=1 << 80)),
+    "a nested header": (CODES, lambda data, _: (b"[" * index._HEADER) + data[index._HEADER :]),
+    "a header that is a list": (CODES, lambda data, _: b"[]".ljust(index._HEADER, b"\0") + data[index._HEADER :]),
+    "an empty file": (CODES, lambda data, _: b""),
+    "no archive": (CALIBRATION, lambda data, key: calibrated._seal(b"evil", key) + b"evil"),
+    "an empty archive": (CALIBRATION, lambda data, key: calibrated._seal(b"", key)),
+    "scales of NaN": (CALIBRATION, _archive(scales=np.full(3, np.nan))),
+    "scales of zero": (CALIBRATION, _archive(scales=np.zeros(3))),
+    "scales of text": (CALIBRATION, _archive(scales=np.array(["a", "b", "c"]))),
+    "too few scales": (CALIBRATION, _archive(scales=np.ones(2))),
+    "no scales": (CALIBRATION, _archive(scales=None)),
+    "no such scores": (CALIBRATION, _archive(which=np.array([0, 1, 99]))),
+    "scores below zero": (CALIBRATION, _archive(which=np.array([-1, 0, 0]))),
+    "scores of NaN": (CALIBRATION, _archive(own=np.full(12, np.nan))),
+    "ends backwards": (CALIBRATION, _archive(ends=np.array([12, 3, 12]))),
+    "ends far away": (CALIBRATION, _archive(ends=np.array([3, 7, 1 << 60]))),
+    "ends of halves": (CALIBRATION, _archive(ends=np.array([3.5, 7.0, 12.0]))),
+}
+
+
+@pytest.mark.parametrize("attack", HOSTILE)
+def test_a_hostile_cache_is_built_again(served, attack):
+    folder, expected, caches = served
+    for name, data in caches.items():
+        (folder / name).write_bytes(data)
+    name, spoil = HOSTILE[attack]
+    with ActionLibrary(folder) as library:
+        hostile = spoil(caches[name], calibrated._key(library.store, members_of(library.store)))
+        assert hostile != caches[name]
+        (folder / name).write_bytes(hostile)
+        assert _answers(library) == expected
+        assert (folder / name).read_bytes() != hostile
+
+
+@pytest.mark.parametrize("name", [CODES, CALIBRATION])
+@pytest.mark.parametrize(
+    "make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to(path), lambda path: path.symlink_to("/dev/zero")]
+)
+def test_what_is_no_file_is_no_cache(served, name, make):
+    folder, expected, caches = served
+    for each, data in caches.items():
+        (folder / each).unlink(missing_ok=True)
+        (folder / each).write_bytes(data)
+    (folder / name).unlink()
+    make(folder / name)
+    with ActionLibrary(folder) as library:
+        assert _answers(library) == expected
+    if (folder / name).is_dir():
+        (folder / name).rmdir()
