@@ -32,12 +32,14 @@ def measure(quick: bool) -> list[Row]:
 
 def _options() -> dict[str, dict[str, Any]]:
     """Name -> parameters of `Recognizer` that differ from the defaults; "width" is a share of the typical distance."""
-    found: dict[str, dict[str, Any]] = {f"{one.name} alone": {"representations": (one,)} for one in THREE}
-    found |= {f"mean {mean}": {"mean": mean} for mean in ("geometric", "harmonic", "min", "quadratic")}
-    found |= {f"width {width} of it": {"width": width} for width in (0.2, 0.7)}
-    found |= {f"cutoff {cutoff}": {"cutoff": cutoff} for cutoff in (5.0, 20.0, None)}
-    found |= {f"max_angle {angle}": {"max_angle": math.radians(angle)} for angle in (0, 30, 45, 90, 180)}
-    found |= {f"scale {scale}": {"scale": scale} for scale in ("per-dimension", "none")}
+    found: dict[str, dict[str, Any]] = {
+        f"{one.name.replace('forcing', 'f')} alone": {"representations": (one,)} for one in THREE
+    }
+    found |= {mean: {"mean": mean} for mean in ("geometric", "harmonic", "min", "quadratic")}
+    found |= {f"{width} of it": {"width": width} for width in (0.2, 0.7)}
+    found |= {f"{cutoff} cycles": {"cutoff": float(cutoff)} for cutoff in (5, 20)} | {"not smoothed": {"cutoff": None}}
+    found |= {f"{angle}°": {"max_angle": math.radians(angle)} for angle in (0, 30, 45, 90, 180)}
+    found |= {"per dimension": {"scale": "per-dimension"}, "size kept": {"scale": "none"}}
     for name, values in {"n_basis": (20, 80), "stiffness": (25.0, 400.0), "ridge": (1e-4, 1e-2)}.items():
         for value in values:
             found[f"{name} {value:g}"] = {"representations": tuple(replace(one, **{name: value}) for one in THREE)}
