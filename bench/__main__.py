@@ -18,6 +18,7 @@ SUBJECTS = (
     "control",
     "recognize",
     "one_shot",
+    "defaults",
     "library",
     "binning",
     "anchoring",

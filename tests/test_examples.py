@@ -5,12 +5,15 @@ import doctest
 import importlib
 import pkgutil
 import re
+import shlex
 from pathlib import Path
 
+import click
 import pytest
 from walk_through import otherwise, shown_by, walk
 
 import kineme
+from kineme.cli import main
 
 ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / "docs" / "action-library.md"  # its blocks need its commands: test_tutorial.py runs both
@@ -49,6 +52,20 @@ def test_a_page_that_shows_another_result_is_found_out(tmp_path):
         assert (otherwise(step) is None) is right
     page.write_text("```python\nprint(1)  # 1\nprint(2)\n# 2\n```\n")
     assert next(walk(page, tmp_path)).shown == ["1", "2"]
+
+
+_COMMAND = re.compile(r"^    (?:.*\| )?kineme (.+?)(?:  +#.*| > .*)?$", re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_options_of_pages_exist(page):
+    """Commands that a page shows without their answer: they are parsed, not run."""
+    for line in _COMMAND.findall(page.read_text(encoding="utf-8")):
+        command, context, rest = main, click.Context(main), shlex.split(line)
+        while isinstance(command, click.Group):
+            name, command, rest = command.resolve_command(context, rest)
+            context = click.Context(command, parent=context, info_name=name)
+        command.parse_args(context, rest)
 
 
 @pytest.mark.parametrize("name", MODULES)
