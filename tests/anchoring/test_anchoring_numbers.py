@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from sklearn.utils import Bunch
+from unlabeled_samples import draw_kinds
 
 from kineme import DMP, Demonstrations
 from kineme.anchoring.morph import morph
-from kineme.anchoring.space import ConceptualSpace
-from kineme.anchoring.spread import radii
+from kineme.anchoring.seen import see
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.spread import radii, spread_sample
 
 
 def _space(ab, ac, cb):
@@ -67,3 +69,24 @@ def test_half_way_to_a_moved_turned_and_larger_copy_is_half_of_each(share, make_
     expected = 2.0**share * (paths[0] - centers[0]) @ np.array([[c, s], [-s, c]]) + centers[2]
     np.testing.assert_allclose(paths[2], expected, atol=2e-2)
     np.testing.assert_allclose(made.durations, 4.0**share)
+
+
+def test_distances_of_symbols_go_on_growing():
+    """``sqrt(mean_r d_r^2 / sigma_r^2)``, sigma_r the median distance in each representation."""
+    demos = draw_kinds([1] * 6)
+    seen = see(demos)
+    squares = np.stack([seen.procrustes.squared_distances(one, one) for one in seen.views])
+    pairs = ~np.eye(6, dtype=bool)
+    sigmas = np.sqrt([np.median(one[pairs]) for one in squares])
+    expected = np.sqrt(np.mean(squares / sigmas[:, None, None] ** 2, axis=0))
+    space = conceptual_space(list("abcdef"), seen)
+    np.testing.assert_allclose(space.distances[pairs], expected[pairs], rtol=1e-4)
+
+
+def test_a_sample_leaves_out_no_rare_kind():
+    """Four movements of 604, in a sample of 80: drawn evenly, they would be missed every other time."""
+    seen = see(draw_kinds([60] * 10 + [4], spread=0.02))
+    for seed in range(8):
+        sample, _ = spread_sample(seen, 80, seed)
+        assert len(sample) == 80
+        assert (sample >= 600).any(), seed
