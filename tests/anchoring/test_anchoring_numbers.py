@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from sklearn.utils import Bunch
+from unlabeled_samples import draw_kinds
 
-from kineme.anchoring.space import ConceptualSpace
-from kineme.anchoring.spread import radii
+from kineme import DMP, Demonstrations
+from kineme.anchoring.morph import morph
+from kineme.anchoring.seen import see
+from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.spread import radii, spread_sample
 
 
 def _space(ab, ac, cb):
@@ -46,3 +50,43 @@ def test_a_kind_reaches_as_far_as_its_members_and_at_least_as_far_as_most_member
     tight, loose = radii(K, Bunch(clusters=clusters, proposals=kinds))
     assert loose == pytest.approx(0.6)
     assert tight == pytest.approx(0.3)  # the 95 % of all members
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_half_way_to_a_moved_turned_and_larger_copy_is_half_of_each(share, make_movement):
+    """The center moves evenly, the angle grows evenly, the size by equal factors, the duration too."""
+    x = make_movement(3)[1]
+    c, s = np.cos(0.6), np.sin(0.6)
+    turned = 2.0 * x @ np.array([[c, s], [-s, c]]) + [5.0, -3.0]
+    learned = DMP(n_basis=20, fit="trajectory").learn(
+        Demonstrations.from_arrays([x, turned], times=[np.linspace(0, end, len(x)) for end in (1.0, 4.0)])
+    )
+    made = morph(learned[0], learned[1], share)
+    paths = [one.rollout().positions[0] for one in (learned[0], learned[1], made)]
+    centers = [path.mean(axis=0) for path in paths]
+    np.testing.assert_allclose(centers[2], centers[0] + share * (centers[1] - centers[0]), atol=2e-2)
+    c, s = np.cos(0.6 * share), np.sin(0.6 * share)
+    expected = 2.0**share * (paths[0] - centers[0]) @ np.array([[c, s], [-s, c]]) + centers[2]
+    np.testing.assert_allclose(paths[2], expected, atol=2e-2)
+    np.testing.assert_allclose(made.durations, 4.0**share)
+
+
+def test_distances_of_symbols_go_on_growing():
+    """``sqrt(mean_r d_r^2 / sigma_r^2)``, sigma_r the median distance in each representation."""
+    demos = draw_kinds([1] * 6)
+    seen = see(demos)
+    squares = np.stack([seen.procrustes.squared_distances(one, one) for one in seen.views])
+    pairs = ~np.eye(6, dtype=bool)
+    sigmas = np.sqrt([np.median(one[pairs]) for one in squares])
+    expected = np.sqrt(np.mean(squares / sigmas[:, None, None] ** 2, axis=0))
+    space = conceptual_space(list("abcdef"), seen)
+    np.testing.assert_allclose(space.distances[pairs], expected[pairs], rtol=1e-4)
+
+
+def test_a_sample_leaves_out_no_rare_kind():
+    """Four movements of 604, in a sample of 80: drawn evenly, they would be missed every other time."""
+    seen = see(draw_kinds([60] * 10 + [4], spread=0.02))
+    for seed in range(8):
+        sample, _ = spread_sample(seen, 80, seed)
+        assert len(sample) == 80
+        assert (sample >= 600).any(), seed

@@ -150,14 +150,23 @@ def test_out_of_range_the_last_good_state_is_kept(bio, twin, told):
     assert np.isfinite(after.position).all()
 
 
-def test_inputs_are_never_written_to(bio, twin):
+def test_inputs_are_used_and_never_written_to(bio, twin):
+    """Read-only arrays: who wrote to one would reject it."""
     arrays = {"position": np.ones(3), "velocity": np.ones(3), "goal": np.ones(3), "coupling": np.ones(3)}
     arrays |= {"obstacles": np.ones((2, 3)), "obstacle_velocities": np.ones((2, 3))}
     for array in arrays.values():
         array.setflags(write=False)
     controller = bio.controller(0.02, goal_filter=0.1)
     for _ in range(3):
-        controller.step(**arrays)
+        state = controller.step(**arrays)
+        assert not state.status.rejected
+        assert np.isfinite(np.concatenate(state[2:6])).all()
+    for name in arrays:  # each of them counts
+        if name != "obstacle_velocities":
+            one, other = (bio.controller(0.02, goal_filter=0.1) for _ in range(2))
+            told = {name: arrays[name]}
+            assert (one.step(**told).position != other.step().position).any(), name
+    assert all((array == 1.0).all() for array in arrays.values())
 
 
 def test_several_things_at_once_are_all_reported(bio):

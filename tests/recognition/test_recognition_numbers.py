@@ -12,6 +12,7 @@ import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.kernels.procrustes import Prepared
 from kineme.recognition.choice import CANDIDATES, aligned_weights
+from kineme.recognition.classifiers import Nearest, SupportVectors, choose
 from kineme.recognition.conformal import calibrate
 from kineme.recognition.decision import Decision
 from kineme.recognition.hypotheses import Early, known_hypotheses
@@ -154,3 +155,10 @@ def test_a_label_is_decided_when_nine_tenths_were_held_for_a_twentieth_of_the_ti
         assert decision.update(1.10, 1, 0.95) == 0  # another needs twice as long
         assert decision.update(1.20, 1, 0.95) == 0
         assert decision.update(1.25, 1, 0.95) == 1
+
+
+def test_beyond_four_thousand_demonstrations_memory_stays_linear():
+    assert isinstance(choose("auto", np.full(400, 10)), SupportVectors)
+    assert isinstance(choose("auto", np.full(400, 11)), Nearest)
+    assert isinstance(choose("auto", np.array([8, 8])), SupportVectors)
+    assert isinstance(choose("auto", np.array([8, 7])), Nearest)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import Trajectory, segment
+from kineme import Trajectory, TrajectoryError, segment
 from kineme.segmentation.motion import observe
 
 
@@ -54,3 +54,33 @@ def test_a_bend_is_no_corner():
                          0.1 - 0.1 * np.cos(arc)))  # fmt: skip
     assert len(segment(Trajectory(t, x), "speed", turn=1.0)) == 1
     assert len(segment(Trajectory(t, x), "speed", turn=1.0, span=0.2)) > 1
+
+
+def test_without_noise_a_movement_begins_where_rest_ends():
+    """Speed that rises evenly: what is extrapolated from a twentieth of the peak lies before that."""
+    t = np.arange(0.0, 4.0, 0.002)
+    speed = np.interp(t, [1.0, 2.0, 2.5, 3.0], [0.0, 1.0, 1.0, 0.0])
+    x = np.append(0.0, np.cumsum(0.5 * 0.002 * (speed[1:] + speed[:-1])))
+    (start, end), cutoff = segment(Trajectory(t, x)).cuts[0], 125.0
+    assert start == pytest.approx(1.0, abs=4.0 / cutoff)
+    assert end == pytest.approx(3.0, abs=4.0 / cutoff)
+
+
+def test_an_onset_is_extrapolated_by_a_tenth_of_the_movement_at_most():
+    """A slow start says little of when it began; in noise there is no rest to stop at."""
+    t = np.arange(0.0, 6.0, 0.01)
+    speed = np.interp(t, [2.0, 2.05, 3.0, 3.2, 4.0, 4.1], [0.0, 0.14, 0.14, 1.0, 1.0, 0.0])
+    x = np.append(0.0, np.cumsum(0.5 * 0.01 * (speed[1:] + speed[:-1])))
+    starts = []
+    for seed in range(8):
+        noise = 0.0005 * np.random.default_rng(seed).normal(size=len(t))
+        starts.append(segment(Trajectory(t, x + noise)).cuts[0, 0])
+    assert np.mean(starts) > 2.0 - 0.1 * 2.1 - 0.05
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_noise_alone_rests(seed):
+    """Smoothed, it moves less than four of its standard deviations."""
+    noise = np.random.default_rng(seed).normal(size=(300, 2))
+    with pytest.raises(TrajectoryError, match="at rest"):
+        segment(Trajectory(np.linspace(0.0, 3.0, 300), noise))

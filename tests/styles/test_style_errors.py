@@ -37,7 +37,12 @@ def test_a_style_outside_the_demonstrated_range_is_refused_with_the_range(model)
 
 def test_demonstrated_styles_and_the_edges_are_inside(model):
     for wish in (model.styles, model.lowest, model.highest, [0.0, 0.0]):
-        model.primitive(wish)
+        made = model.primitive(wish)
+        again = model.style_of(made)
+        assert len(made) == len(np.atleast_2d(wish))
+        assert again.inside.all()
+        np.testing.assert_allclose(again.styles, np.atleast_2d(wish), atol=1e-6 * np.abs(model.highest).max())
+        np.testing.assert_array_equal(made.scaled_weights, model.primitive(wish, extrapolate=True).scaled_weights)
 
 
 def test_styles_of_the_wrong_shape(model):

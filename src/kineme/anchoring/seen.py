@@ -12,7 +12,7 @@ from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.recognition.normalization import Normalization
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
 from kineme.recognition.views import view
 from kineme.trajectories.demonstrations import Demonstrations
 
@@ -87,7 +87,8 @@ def see_rows(rows: NDArray[Any], n_dims: int, like: Recognizer | None = None) ->
 
 def looks_of(recognizer: Recognizer) -> tuple[Representation, ...]:
     """The representations that a recognizer was made with."""
-    return DEFAULT_REPRESENTATIONS if recognizer.representations is None else tuple(recognizer.representations)
+    given = recognizer.representations
+    return DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
 
 
 def _prepared(blocks: list[NDArray[Any]], n_dims: int, like: Recognizer) -> Seen:

@@ -1,0 +1,37 @@
+"""Numbers that the documentation gives for control: each falls here if it is changed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kineme.control.obstacles import ObstacleAvoidance, steering
+from kineme.control.state import Status
+
+
+def test_how_strongly_obstacles_turn_a_movement_by_default():
+    """``1000 |v| phi exp(-20 / pi phi)``: strongest at nine degrees, however far."""
+    angles = np.pi * np.array([0.01, 0.05, 0.1, 0.5])
+    still = np.zeros((1, 2))
+    for distance in (0.1, 30.0):
+        for phi in angles:
+            obstacle = distance * np.array([[np.cos(phi), np.sin(phi)]])
+            term = steering(ObstacleAvoidance(), np.array([[0.0, 0.0], [2.0, 0.0]]), obstacle, still)
+            expected = [0.0, -1000.0 * 2.0 * phi * np.exp(-20.0 / np.pi * phi)]
+            np.testing.assert_allclose(term, expected, rtol=1e-9, atol=1e-9)
+    assert angles[np.argmax(angles * np.exp(-20.0 / np.pi * angles))] == pytest.approx(np.deg2rad(9))
+
+
+def test_a_movement_has_settled_within_a_thousandth_of_its_extent(bio):
+    controller = bio.controller(0.02)
+    states = [controller.step() for _ in range(400)]
+    first = next(k for k, state in enumerate(states) if state.status & Status.SETTLED)
+    allowed = 1e-3 * bio.extents.max()
+
+    def away(state):
+        slope = state.velocity * bio.durations[0]
+        return max(np.abs(state.position - bio.goals[0]).max(), np.abs(slope).max())
+
+    assert away(states[first]) <= allowed
+    assert states[first - 1].progress < 1 or away(states[first - 1]) > allowed
+    assert all(state.status & Status.SETTLED for state in states[first:])
