@@ -72,12 +72,15 @@ def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
     return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
 
 
-def extents_of(rows: Array) -> Array:
-    """Largest minus smallest of each row (n, d, T), shape (n, d)."""
-    if not use_compiled(rows.size):
-        return np.asarray(rows.max(axis=2) - rows.min(axis=2))
+def extents_of(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Largest minus smallest recorded position of movements start:stop in each dimension, shape (stop - start, d)."""
+    offsets = demonstrations.offsets[start : stop + 1]
+    positions = demonstrations.positions[offsets[0] : offsets[-1]]
+    if not use_compiled(positions.size):
+        first = offsets[:-1] - offsets[0]
+        return np.asarray(np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first))
     from kineme.trajectories._compiled import fill_extents
 
-    extents = np.empty(rows.shape[:2])
-    fill_extents(rows, extents)
+    extents = np.empty((stop - start, demonstrations.n_dims))
+    fill_extents(positions, offsets - offsets[0], extents)
     return extents
