@@ -76,8 +76,8 @@ def test_any_recording_is_cut_or_refused(method):
 
 def test_known_movements_are_looked_for_in_any_recording():
     for seed in range(250):
-        recording = _recording(seed)
         with contextlib.suppress(KinemeError):
+            recording = _recording(seed)
             for one in _recognizer(recording.n_dims).spot(recording):
                 assert recording.times[0] <= one.start < one.end <= recording.times[-1]
                 assert 0.0 <= one.confidence <= 1.0
@@ -100,10 +100,10 @@ def test_one_sample_that_is_elsewhere_is_no_known_movement(moving):
 
 def test_numbers_without_squares_are_refused_with_their_size():
     t, x = np.arange(20.0), np.random.default_rng(0).normal(size=(20, 2)).cumsum(axis=0)
-    with pytest.raises(KinemeError, match=r"expected positions up to 1e\+100 .* choose another unit"):
+    with pytest.raises(KinemeError, match=r"expected positions up to 1e\+100, got .* choose a unit in which they are"):
         segment(Trajectory(t, 1e150 * x))
-    with pytest.raises(KinemeError, match=r"differ by 1e-100 or more, .* choose another unit"):
+    with pytest.raises(KinemeError, match=r"expected an extent of at least 1e-100, got .* choose a unit in which it is"):
         segment(Trajectory(t, 1e-150 * x))
-    with pytest.raises(KinemeError, match=r"expected times that differ by .* got steps of 1e-150 to 1e-150"):
+    with pytest.raises(KinemeError, match=r"expected at least 1e-50 s between stamps, got .* times are in seconds"):
         segment(Trajectory(1e-150 * t, x))
     segment(Trajectory(1e-20 * t, 1e-20 * x), cover=True)

@@ -15,7 +15,7 @@ from kineme.parallel import for_tiles
 from kineme.primitives.batch import Batch
 from kineme.primitives.operators import decoder
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import LARGEST, Array, check_number, check_samples, describe
+from kineme.validation import LARGEST, Array, as_numbers, check_number, check_samples, describe
 
 if TYPE_CHECKING:
     from kineme.primitives.dmp import DMP
@@ -166,8 +166,8 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
     if wish is None:
         return None
     try:
-        value = np.asarray(wish, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        value = as_numbers(wish, name)
+    except TrajectoryError as error:
         raise TrajectoryError(f"expected numbers for {name}, got {wish!r}") from error
     if n_dims == 1 and value.ndim == 0:
         value = value[None]

@@ -117,10 +117,10 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
         return np.asarray(((rows - fit.fitted) ** 2).sum(axis=(1, 2)) / total)
 
     width = 0.5 * cycles**2 / (rows.shape[2] - 1)  # change of `cycles` when the period changes by half a sample
-    n_steps = int(np.clip(np.ceil((2 * width * n_harmonics).max()), 2, 40))
+    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40)  # of each recording, whatever others need
     best, left = cycles.copy(), unexplained(cycles)
-    for step in np.arange(-n_steps, n_steps + 1) / n_steps:
-        trial = cycles + step * width
+    for step in np.arange(-n_steps.max(), n_steps.max() + 1):
+        trial = cycles + np.clip(step / n_steps, -1, 1) * width
         value = unexplained(trial)
         best, left = np.where(value < left, trial, best), np.minimum(value, left)
     for _ in range(_NEWTON_STEPS):

@@ -20,15 +20,14 @@ def fill_even_rows(block, rows):  # type: ignore[no-untyped-def]
 
 
 @jit
-def fill_extents(rows, extents):  # type: ignore[no-untyped-def]
-    """Largest minus smallest of each row (n, d, T), in one pass; see `resample.extents_of`."""
-    n, n_dims, n_samples = rows.shape
+def fill_extents(positions, offsets, extents):  # type: ignore[no-untyped-def]
+    """Largest minus smallest of each movement and dimension, in one pass; see `resample.extents_of`."""
+    n, n_dims = extents.shape
     for i in range(n):
         for k in range(n_dims):
-            row = rows[i, k]
-            low, high = row[0], row[0]
-            for t in range(1, n_samples):
-                low, high = min(low, row[t]), max(high, row[t])
+            low = high = positions[offsets[i], k]
+            for t in range(offsets[i] + 1, offsets[i + 1]):
+                low, high = min(low, positions[t, k]), max(high, positions[t, k])
             extents[i, k] = high - low
 
 

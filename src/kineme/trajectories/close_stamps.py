@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.compiled import use_compiled
+from kineme.compiled import compiled_module, use_compiled
 from kineme.validation import MIN_SAMPLES, Array
 
 #: Samples are close when less than this share of the movement's usual step lies between them. Of 0.1, 0.2, 0.3 and 0.5
@@ -83,9 +83,8 @@ def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:
     """Upper quartile of the gaps of each movement, shape (n,); 0 where none can be close, the usual case."""
     steps = np.zeros(len(offsets) - 1)
     if use_compiled(_OPERATIONS_PER_SAMPLE * len(times)):
-        from kineme.trajectories._compiled import fill_usual_steps
-
-        fill_usual_steps(times, offsets, SHARE, _QUANTILE, steps)
+        fill = compiled_module("kineme.trajectories._compiled").fill_usual_steps
+        fill(times, offsets, SHARE, _QUANTILE, steps)
         return steps
     bounds = np.column_stack((offsets[:-1], offsets[1:] - 1)).ravel()[:-1]  # of the gaps within each movement
     gaps = np.diff(times)

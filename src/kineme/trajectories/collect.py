@@ -14,7 +14,16 @@ from kineme.errors import TrajectoryError
 from kineme.trajectories.close_stamps import merge_close
 from kineme.trajectories.labels import label_array
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import Array, as_positions, as_times, check_finite, check_times, describe, refuse_lossy
+from kineme.validation import (
+    Array,
+    as_positions,
+    as_times,
+    check_extents,
+    check_finite,
+    check_times,
+    describe,
+    refuse_lossy,
+)
 
 Names = tuple[str | None, ...] | None
 
@@ -132,6 +141,7 @@ def collect_arrays(
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
     check_finite(positions, offsets, names, "positions")
+    check_extents(positions, offsets, names)
     stamps = None if times is None else _join_times(times, offsets, names)
     durations = np.ones(n) if stamps is None else stamps[offsets[1:] - 1] - stamps[offsets[:-1]]
     return Movements(

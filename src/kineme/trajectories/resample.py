@@ -72,10 +72,13 @@ def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
     return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
 
 
-def extents_of(rows: Array) -> Array:
-    """Largest minus smallest of each row (n, d, T), shape (n, d)."""
-    if not use_compiled(rows.size):
-        return np.asarray(rows.max(axis=2) - rows.min(axis=2))
-    extents = np.empty(rows.shape[:2])
-    compiled_module("kineme.trajectories._compiled").fill_extents(rows, extents)
+def extents_of(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Largest minus smallest recorded position of movements start:stop in each dimension, shape (stop - start, d)."""
+    offsets = demonstrations.offsets[start : stop + 1]
+    positions = demonstrations.positions[offsets[0] : offsets[-1]]
+    if not use_compiled(positions.size):
+        first = offsets[:-1] - offsets[0]
+        return np.asarray(np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first))
+    extents = np.empty((stop - start, demonstrations.n_dims))
+    compiled_module("kineme.trajectories._compiled").fill_extents(positions, offsets - offsets[0], extents)
     return extents
