@@ -56,11 +56,11 @@ def fit_harmonics(rows: Array, cycles: Array, n_harmonics: NDArray[np.intp]) -> 
     moment = rows @ half.conj()  # (n, d, H + 1), sum_t x e^(-i h theta)
     moment[np.broadcast_to((np.arange(top + 1) > n_harmonics[:, None])[:, None], moment.shape)] = 0.0
     both = np.concatenate((moment[:, :, :0:-1].conj(), moment), axis=2)
-    coefficients = np.linalg.solve(gram, both.transpose(0, 2, 1)).transpose(0, 2, 1)[:, :, top:]
+    solved = np.asarray(np.linalg.solve(gram, both.transpose(0, 2, 1)), dtype=complex)
+    coefficients = solved.transpose(0, 2, 1)[:, :, top:]
     coefficients[:, :, 0] = coefficients[:, :, 0].real
     doubled = coefficients * np.where(np.arange(top + 1) == 0, 1.0, 2.0)
-    waves: Array = (doubled @ half.transpose(0, 2, 1)).real
-    return HarmonicFit(coefficients, waves)
+    return HarmonicFit(coefficients, (doubled @ half.transpose(0, 2, 1)).real)
 
 
 def as_real(coefficients: Complex) -> Array:
