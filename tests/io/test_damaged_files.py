@@ -26,3 +26,13 @@ def test_whole_files_are_read_and_damaged_ones_refused_in_words(child, name):
     found = [child.call("file_mutants:read_mutant", name, mutant(rng, samples()[name], name)) for _ in range(ROUNDS)]
     assert [one for one in found if not one.is_good] == []
     assert any(one.how == "refused" for one in found)
+
+
+def test_metadata_that_end_the_process_are_not_asked_for(child):
+    """pyarrow aborts on damaged statistics of columns, if one looks at them."""
+    data = samples()["wide.parquet"]
+    begin = len(data) - 8 - int.from_bytes(data[-8:-4], "little")
+    for at in range(begin, len(data), 2):
+        spoiled = data[:at] + bytes((data[at] ^ 3,)) + data[at + 1 :]
+        outcome = child.call("file_mutants:read_mutant", "wide.parquet", spoiled)
+        assert outcome.is_good, (at, outcome)

@@ -16,6 +16,8 @@ from kineme.io.layout import Layout
 from kineme.io.limits import check_expanded
 from kineme.io.table import Table
 
+_ROWS = 2**18  # that are expanded together
+
 
 def _no_lines(row: int) -> None:
     return None
@@ -40,14 +42,14 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         kinds = tuple(_kind(pa, kind) for kind in file.schema_arrow.types)
         roles = choose_roles(heads, kinds, layout)
         needed = sorted({*range(len(heads))} - {*roles.ignored})
-        _check_memory(file.metadata, [heads[k] for k in needed])
+        check_expanded(8 * max(file.metadata.num_rows, 0) * len(needed))
         _refuse_twins(heads, needed)
         texts = {*roles.movement, roles.label}
         if nested := [k for k in needed if k in texts and pa.types.is_nested(file.schema_arrow.types[k])]:
             raise DataError(f"expected names in {heads[nested[0]]!r}, got {file.schema_arrow.types[nested[0]]}")
         named = [heads[k] for k in needed if k in texts]  # kept as they are stored: few different ones, many rows
         file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
-        table = file.read(columns=[heads[k] for k in needed])
+        table = pa.Table.from_batches(_batches(file, [heads[k] for k in needed]))
         read = {k: (_texts if k in texts else _numbers)(table.column(heads[k]), heads[k]) for k in needed}
     except (pa.ArrowException, OSError) as error:
         if isinstance(error, DataError):
@@ -67,13 +69,19 @@ def _kind(pa: Any, kind: Any) -> str:
     return "number" if of.is_integer(kind) or of.is_floating(kind) or of.is_decimal(kind) else "text"
 
 
-def _check_memory(metadata: Any, needed: Sequence[str]) -> None:
-    """Refuse columns that would take more memory than the limit, as their pages or as numbers."""
-    groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
-    packed = [group.column(k) for group in groups for k in range(group.num_columns)]
-    heads = tuple(needed)
-    pages = sum(one.total_uncompressed_size for one in packed if one.path_in_schema.startswith(heads))
-    check_expanded(max(pages, 0) + 8 * max(metadata.num_rows, 0) * len(heads))
+def _batches(file: Any, needed: Sequence[str]) -> list[Any]:
+    """The columns some rows at a time, until they take more memory than the limit.
+
+    What the metadata say about the columns' pages is not asked for: pyarrow ends the process where they are damaged.
+    """
+    batches, n_bytes = [], 0
+    for batch in file.iter_batches(_ROWS, columns=list(needed)):
+        n_bytes += batch.nbytes
+        check_expanded(n_bytes)
+        batches.append(batch)
+    if not batches:
+        raise DataError("expected samples, got a table without rows")
+    return batches
 
 
 def _refuse_twins(heads: Sequence[str], needed: Sequence[int]) -> None:
