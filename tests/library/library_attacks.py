@@ -121,6 +121,7 @@ ROWS = {
         ["UPDATE movement SET n_samples = 'x' WHERE id = 8"],
         "n_samples is not a whole number",
     ),
+    "stamps of no bytes": (["UPDATE raw SET times = x'' WHERE movement = 8"], "of the wrong size"),
     "no samples": (["UPDATE movement SET n_samples = 0 WHERE id = 2"], "n_samples is not a whole number from 4"),
     "samples below zero": (
         ["UPDATE movement SET n_samples = -8 WHERE id = 2"],

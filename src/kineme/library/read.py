@@ -107,7 +107,8 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstra
     for rows in _chunks(store, "raw", "movement", wanted):
         part = slice(done, done + len(rows))
         for row, n in zip(rows, lengths[part].tolist(), strict=True):
-            if len(row[1]) != 8 * d or len(row[2]) != 4 * d * n or (row[3] and len(row[3]) not in {4 * n, 8 * n}):
+            stamped = row[3] is None or len(row[3]) in {4 * n, 8 * n}
+            if len(row[1]) != 8 * d or len(row[2]) != 4 * d * n or not stamped:
                 raise strange("raw", row)
         starts = np.frombuffer(b"".join(row[1] for row in rows)).reshape(len(rows), d)
         relative = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d)

@@ -46,12 +46,15 @@ class Problem:
 Check = Callable[[sqlite3.Connection], Iterator[Problem]]
 
 
-def verify(store: Store) -> list[Problem]:
-    """All that is damaged or that no library holds, as it is at one moment; an empty list if nothing is."""
+def verify(store: Store, *, pages: bool = True) -> list[Problem]:
+    """All that is damaged or that no library holds, as it is at one moment; an empty list if nothing is.
+
+    `pages` is False where the pages of the file have been checked already.
+    """
     with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
         connection.execute("BEGIN")
         checks: list[Check] = [
-            _structure,
+            *((_structure,) if pages else ()),
             *(_rows(table, store) for table in COLUMNS),
             _references,
             _completeness,
