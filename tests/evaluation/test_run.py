@@ -130,7 +130,7 @@ def test_a_rival_that_is_ahead_is_named():
     said = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.95, euclidean=0.9))
     assert said == "Ahead of kineme: DTW 1-NN, as recorded (0.950 over 0.900)."
     equal = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.9))
-    assert equal == "No rival is ahead of kineme anywhere in this table; rivals here: DTW 1-NN."
+    assert equal == "No rival is ahead of kineme anywhere in this table. Rivals here: DTW 1-NN."
     assert rivals_ahead("few-shot", outcome(dtw=0.9)) == ""
 
 
@@ -140,7 +140,7 @@ def test_a_rival_that_did_not_take_part_is_named_beside_what_is_concluded(theirs
     said = rivals_ahead("few-shot", outcome(absent, kineme=0.9, euclidean=theirs))
     assert ("Ahead of kineme" in said) is (theirs > 0.9)
     assert ("No rival is ahead" in said) is (theirs < 0.9)
-    assert said.endswith(". Not compared: DTW 1-NN (not installed: dtaidistance), HMM (not installed: hmmlearn).")
+    assert said.endswith(". Not compared: DTW 1-NN (not installed: dtaidistance); HMM (not installed: hmmlearn).")
     alone = rivals_ahead("few-shot", outcome(absent, kineme=0.9))
     assert alone.startswith("No rival took part. Not compared: DTW 1-NN")
     assert rivals_ahead("few-shot", outcome(kineme=0.9)) == "No rival took part."

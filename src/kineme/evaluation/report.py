@@ -70,15 +70,15 @@ def rivals_ahead(protocol: str, results: Results) -> str:
                 what = "" if measure == "accuracy" else f" in {_MEASURES[measure]}"
                 found.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
     ahead = f"Ahead of kineme: {'; '.join(found)}."
-    names = ", ".join(METHODS[rival].title for rival in rivals)
-    none = f"No rival is ahead of kineme anywhere in this table; rivals here: {names}."
+    names = "; ".join(METHODS[rival].title for rival in rivals)
+    none = f"No rival is ahead of kineme anywhere in this table. Rivals here: {names}."
     return f"{ahead if found else none} {_not_compared(results)}".rstrip()
 
 
 def _not_compared(results: Results) -> str:
     """Whom the conclusion does not speak of, and why."""
     absent = [f"{METHODS[name].title} ({why})" for name, why in results.absent.items() if name != OURS]
-    return f"Not compared: {', '.join(absent)}." if absent else ""
+    return f"Not compared: {'; '.join(absent)}." if absent else ""
 
 
 def write_report(data: DataSet, results: Results, tables: dict[str, Table], facts: dict[str, Any]) -> str:

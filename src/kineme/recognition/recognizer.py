@@ -153,7 +153,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def predict_proba(self, X: Any) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.
 
-        A ranking made comparable, not a calibrated probability; `recognize` gives calibrated p-values.
+        A ranking made comparable, not a calibrated probability; `recognize` gives p-values, and says whether those are
+        calibrated.
         """
         scores = self.decision_function(X)
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
