@@ -1,6 +1,7 @@
 """``kineme generate`` as a user runs it, on a real recording."""
 
 import json
+from dataclasses import replace
 
 import commands
 import numpy as np
@@ -116,3 +117,21 @@ def test_a_truncated_primitive_is_refused(recording, tmp_path):
     done = run(tmp_path / "g.kineme", by=commands.start)
     assert done.returncode == 1
     assert "truncated or damaged" in done.stderr
+
+
+def test_numbers_that_are_not_finite_never_reach_a_file(recording, tmp_path):
+    """A robot gets no movement that was not checked: here of a primitive with weights beyond reason."""
+    primitive = kineme.DMP(n_basis=10).learn([read_recording(recording)])[0]
+    path = tmp_path / "wild.kineme"
+    replace(primitive, scaled_weights=np.full_like(primitive.scaled_weights, 1e308)).save(path)
+    for out in ("new.json", "new.csv", "new.npz"):
+        wishes = "--duration", 0.001, "--rate", 1e6, "--save", tmp_path / "again.kineme"
+        done = run(path, *wishes, "-o", tmp_path / out)
+        assert done.returncode == 1
+        assert "expected finite" in done.stderr
+        assert not (tmp_path / out).exists()
+    assert not (tmp_path / "again.kineme").exists()
+    done = run(recording, "--goal", "1e308,1e308", "--json")
+    assert done.returncode == 1
+    assert "numbers up to 1e+100 for goal" in done.stderr
+    assert done.stdout == ""
