@@ -13,6 +13,19 @@ from hypothesis import strategies as st
 
 from kineme import DegenerateMovementWarning
 
+#: Numbers of one tile of work, set so small that every batch is many tiles, none of which begins where the batch does.
+TILES = {
+    "kineme.primitives.encode._TILE_SAMPLES": 700,
+    "kineme.primitives.rollout._TILE_SAMPLES": 700,
+    "kineme.trajectories.smooth._TILE_MOVEMENTS": 7,
+    "kineme.recognition.views._TILE_SAMPLES": 3000,
+    "kineme.recognition.recognizer._TILE_PAIRS": 100,
+    "kineme.recognition.early._TILE": 5000,
+    "kineme.kernels.procrustes._PAIRS": 300,
+    "kineme.orientation.tangent._TILE_SAMPLES": 400,
+    "kineme.rhythm.encode._TILE_SAMPLES": 700,
+}
+
 
 def _off(one, other):
     """By how much two results differ, in units of the larger of 1 and the largest number of each array."""
@@ -41,7 +54,10 @@ def test_a_batch_equals_its_members_one_by_one(row, drawn, seed):
         for choice in ("never", "always"):
             patch.setenv("KINEME_COMPILED", choice)
             results[choice] = row.call(batch)
-            results[f"shuffled {choice}"] = dict(zip(order.tolist(), row.call(batch[order]), strict=True))
+            with pytest.MonkeyPatch.context() as tiles:
+                for where, size in TILES.items():
+                    tiles.setattr(where, size)
+                results[f"shuffled {choice}"] = dict(zip(order.tolist(), row.call(batch[order]), strict=True))
             results[f"alone {choice}"] = {i: row.call(batch[[i]])[0] for i in some.tolist()}
     for name, result in results.items():
         for i in some.tolist():

@@ -49,7 +49,7 @@ def _learned_path_error(make_movement, kind, fit):
         ("trajectory", "even-ish", 0.0012, 0.0010),
         ("trajectory", "coincident", 0.0012, 0.0010),  # interpolated: 0.0088 and 0.0043
         ("trajectory", "in pairs", 0.0012, 0.0010),  # interpolated: 0.034 and 0.028
-        ("trajectory", "random", 0.0035, 0.0016),  # interpolated: 2.5 and 0.015
+        ("trajectory", "random", 0.0075, 0.0022),  # interpolated: 2.5 and 0.015
         ("forcing", "coincident", 0.0025, 0.0016),  # interpolated: 0.059 and 0.0053
     ],
 )
@@ -72,14 +72,14 @@ def test_rhythms_at_random_stamps_have_a_period():
     assert np.abs(off).max() < 0.005
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("jitter", [0.0, 0.4, 0.8])
 @given(seed=st.integers(0, 10**6), n=st.integers(4, 40))
 def test_ordinary_stamps_are_left_as_they_are(jitter, seed, n):
     t = np.append(0, np.cumsum(np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, n - 1)))
     assert merge_close(t, t[:, None], np.array([0, n])) is None
 
 
-@pytest.mark.parametrize("gap", [0.1, 5.0, 100.0])
+@pytest.mark.parametrize("gap", [0.05, 5.0, 100.0])
 def test_missing_samples_and_dense_stretches_are_left_as_they_are(gap):
     """A recording that waits, drops samples, or is denser for longer than a usual step, has no close samples."""
     gaps = np.ones(N - 1)
@@ -102,9 +102,9 @@ def test_what_is_left_increases_and_keeps_both_ends(seed, origin):
 
 
 def test_close_samples_become_their_mean():
-    t, x = np.array([0.0, 1.0, 1.1, 2.0, 3.0, 4.0, 4.05]), np.array([0.0, 1.0, 3.0, 2.0, 3.0, 9.0, 4.0])
+    t, x = np.array([0.0, 1.0, 1.08, 2.0, 3.0, 4.0, 4.05]), np.array([0.0, 1.0, 3.0, 2.0, 3.0, 9.0, 4.0])
     times, positions, offsets = merge_close(t, x[:, None], np.array([0, 7]))
-    np.testing.assert_allclose(times, [0.0, 1.05, 2.0, 3.0, 4.05])
+    np.testing.assert_allclose(times, [0.0, 1.04, 2.0, 3.0, 4.05])
     np.testing.assert_allclose(positions[:, 0], [0.0, 2.0, 2.0, 3.0, 4.0])
     assert offsets.tolist() == [0, 5]
 

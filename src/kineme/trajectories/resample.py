@@ -27,7 +27,7 @@ class Resample:
     Notes
     -----
     Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
-    fifth of the usual step apart are averaged first: a spline would magnify the noise between them (see
+    tenth of the usual step apart are averaged first: a spline would magnify the noise between them (see
     `kineme.trajectories.close_stamps`). Resampling far below the recorded rate folds high frequencies into low ones:
     `Smooth` first.
     """
