@@ -19,6 +19,9 @@ from kineme.errors import SpecificationError, TrajectoryError
 Array = NDArray[np.float64]
 
 MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
+#: What a movement may measure, in its unit: accelerations, and squares of positions and extents, then stay numbers.
+_LARGEST_POSITION, _SMALLEST_EXTENT = 1e100, 1e-100
+_SHORTEST_STEP, _LARGEST_STAMP = 1e-50, 1e50  # seconds
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -44,6 +47,28 @@ def refuse_lossy(values: Any, who: str) -> None:
         raise TrajectoryError(f"{who}: expected real numbers, got {values.dtype}; pass both parts as columns")
 
 
+def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers") -> Array:
+    """Whatever NumPy takes for numbers, as float64; imaginary parts are refused wherever they hide.
+
+    Raises
+    ------
+    TrajectoryError
+        What is no number; complex numbers in an array, a list or an array of objects.
+    """
+    if _is_float64(values):
+        return values
+    refuse_lossy(values, who)
+    try:
+        array = np.asarray(values)
+        hidden = array.dtype.kind == "O" and any(isinstance(one, (complex, np.complexfloating)) for one in array.flat)
+        numbers = None if hidden or array.dtype.kind == "c" else array.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise TrajectoryError(f"{who}: expected {expected}, got {error}") from error
+    if numbers is None:
+        raise TrajectoryError(f"{who}: expected real numbers, got complex ones; pass both parts as columns")
+    return numbers
+
+
 def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     """Check one movement's positions and return them as float64 of shape (T, d).
 
@@ -51,11 +76,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     """
     if _is_float64(positions) and positions.ndim == 2 and len(positions) >= MIN_SAMPLES and positions.shape[1]:
         return positions
-    refuse_lossy(positions, who)
-    try:
-        x = np.asarray(positions, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise TrajectoryError(f"{who}: expected positions to be an array of numbers, got {error}") from error
+    x = as_numbers(positions, who, "positions to be an array of numbers")
     flat = x.ndim == 1
     if flat:
         x = x[:, None]
@@ -74,13 +95,23 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
 
 
 def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None, what: str) -> None:
-    """Refuse NaN and infinity in (total, ...) `values`; name the movement and the sample."""
+    """Refuse NaN, infinity and what is out of range in (total, ...) `values`; name the movement and the sample."""
+    largest = _LARGEST_STAMP if what == "times" else _LARGEST_POSITION
     with np.errstate(invalid="ignore", over="ignore"):
-        total = values.sum()  # one quick pass without a temporary
-    if math.isfinite(total) or np.isfinite(values).all():
+        flat = values.ravel()
+        squares = np.einsum("i,i->", flat, flat)  # one quick pass in one thread, without a temporary
+    if squares <= largest**2:
         return
-    row = int(np.argmin(np.isfinite(values).reshape(len(values), -1).all(axis=1)))
+    good = np.abs(values) <= largest
+    if good.all():
+        return
+    row = int(np.argmin(good.reshape(len(values), -1).all(axis=1)))
     i = int(np.searchsorted(offsets, row, side="right")) - 1
+    if np.isfinite(values[row]).all():
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected {what} up to {largest:g}, got {values[row].tolist()} at sample "
+            f"{row - offsets[i]}; choose a unit in which they are"
+        )
     raise TrajectoryError(
         f"{describe(i, names)}: expected finite {what}, got {values[row].tolist()} at sample "
         f"{row - offsets[i]}; remove the sample (its neighbors are interpolated on their time stamps) or repair it"
@@ -90,18 +121,38 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
-    increasing = times[1:] > times[:-1]
+    increasing = times[1:] - times[:-1] >= _SHORTEST_STEP
     increasing[offsets[1:-1] - 1] = True  # from one movement to the next
     if increasing.all():
         return
     row = int(np.argmin(increasing)) + 1
     i = int(np.searchsorted(offsets, row, side="right")) - 1
     k = row - offsets[i]
+    if times[row] > times[row - 1]:
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected at least {_SHORTEST_STEP:g} s between stamps, got "
+            f"{times[row - 1]:.9g} and {times[row]:.9g} at samples {k - 1} and {k}; times are in seconds"
+        )
     problem = "duplicate" if times[row] == times[row - 1] else "decreasing"
     raise TrajectoryError(
         f"{describe(i, names)}: expected strictly increasing times, got {problem} stamps "
         f"{times[row - 1]:.9g} and {times[row]:.9g} at samples {k - 1} and {k}; sort the samples and drop repeated ones"
     )
+
+
+def check_extents(positions: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
+    """Refuse a movement so small that the squares of its positions are no numbers; none at all is judged later."""
+    probes = offsets[:-1], (offsets[:-1] + offsets[1:]) // 2, offsets[1:] - 1
+    suspects = np.ones(len(offsets) - 1, dtype=bool)
+    for probe in probes:  # three samples clear the usual movement
+        suspects &= np.abs(positions[probe]).max(axis=1) < _SMALLEST_EXTENT / np.finfo(float).eps
+    for i in np.flatnonzero(suspects):
+        extent = np.ptp(positions[offsets[i] : offsets[i + 1]], axis=0).max()
+        if 0 < extent < _SMALLEST_EXTENT:
+            raise TrajectoryError(
+                f"{describe(int(i), names)}: expected an extent of at least {_SMALLEST_EXTENT:g}, got {extent:g}; "
+                "choose a unit in which it is"
+            )
 
 
 def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:
@@ -113,10 +164,7 @@ def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array
             f"{who}: expected times in seconds, got {times.dtype}, which counts in a unit of its own; "  # type: ignore[union-attr]
             "pass (times - times[0]) / np.timedelta64(1, 's')"
         )
-    try:
-        t = np.asarray(times, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise TrajectoryError(f"{who}: expected times in seconds, got {error}") from error
+    t = as_numbers(times, who, "times in seconds")
     if t.shape != (n_samples,):
         raise TrajectoryError(
             f"{who}: expected one time stamp for each of the {n_samples} samples, got times of shape {t.shape}"

@@ -9,7 +9,8 @@ import re
 import numpy as np
 import pytest
 
-from kineme import DMP, Demonstrations, KinemeError, Trajectory, TrajectoryError
+from kineme import DMP, Demonstrations, KinemeError, Trajectory, TrajectoryError, orientation, styles
+from kineme.features.random_binning import RandomBinning
 
 T = np.linspace(0, 1, 8)
 X = np.column_stack((T, T**2))
@@ -121,5 +122,72 @@ def test_errors_are_those_that_numpy_users_catch():
     assert issubclass(TrajectoryError, KinemeError)
 
 
-def test_positions_as_large_as_numbers_go_are_finite():
-    assert len(Demonstrations.from_arrays([np.full(8, 1.7e308)])) == 1
+def test_positions_and_stamps_as_large_and_as_small_as_they_may_be_are_learned():
+    """Where the sum of their squares is beyond what one of them may be."""
+    for size, seconds in ((0.9e100, 1e49), (1e-99, 1e-48), (1e-99, 1e49), (0.9e100, 1e-48)):
+        demos = Demonstrations.from_arrays([size * X, size * X[::-1]], times=seconds * np.append(T[:-1], 1.1))
+        movement = DMP("original", n_basis=10).learn(demos).rollout()
+        for numbers in (movement.positions / size, movement.velocities / size * seconds):
+            assert np.isfinite(numbers).all()
+            assert np.abs(numbers).max() < 10
+        assert np.isfinite(movement.accelerations).all()
+
+
+OUT_OF_RANGE = {
+    "large": (1e160 * X, T, "expected positions up to 1e+100, got [1.42857142857142"),
+    "large, one sample": (_with(-1e101), T, "expected positions up to 1e+100, got [0.42857142857142855, -1e+101] at sample 3; choose a unit in which they are"),
+    "small": (1e-101 * X, T, "expected an extent of at least 1e-100, got 1e-101; choose a unit in which it is"),
+    "denormal": (5e-324 * np.arange(16.0).reshape(8, 2), T, "expected an extent of at least 1e-100"),
+    "late": (X, 1e60 + 1e50 * T, "expected times up to 1e+50, got"),
+    "short": (X, 1e-60 * T, "expected at least 1e-50 s between stamps, got 0 and 1.42857143e-61 at samples 0 and 1; times are in seconds"),
+    "denormal stamps": (X, 5e-324 * np.arange(8), "expected at least 1e-50 s between stamps"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("x", "t", "message"), OUT_OF_RANGE.values(), ids=OUT_OF_RANGE)
+def test_what_is_out_of_range_is_refused(x, t, message):
+    for make in (
+        lambda: Demonstrations.from_arrays([X, x], times=[T, t]),
+        lambda: Trajectory(t, x),
+    ):
+        with pytest.raises(TrajectoryError, match=re.escape(message)):
+            make()
+
+
+def test_small_positions_of_a_movement_that_is_not_small_and_rest_are_no_matter():
+    closed = np.column_stack((np.sin(2 * np.pi * T), 1e-120 * T))
+    closed[[0, 4, -1]] = 0.0
+    assert len(Demonstrations.from_arrays([closed, np.zeros((8, 2)), np.full((8, 2), 1e-200)])) == 3
+
+
+COMPLEX = {
+    "an array": X + 1j,
+    "a list": (X + 1j).tolist(),
+    "a list of arrays": list(X + 1j),
+    "numbers of NumPy": [list(row) for row in X + 1j],
+    "single precision": [list(row) for row in (X + 1j).astype(np.complex64)],
+    "objects": (X + 1j).astype(object),
+    "objects of NumPy": np.array([[np.complex64(v) for v in row] for row in X + 1j], dtype=object),
+}
+
+
+@pytest.mark.parametrize("values", COMPLEX.values(), ids=COMPLEX)
+def test_imaginary_parts_are_refused_wherever_they_hide(values):
+    column = [row[0] for row in values]
+    primitives = DMP(n_basis=10).learn([X])
+    wish = values[0]
+    for take in (
+        lambda: Demonstrations.of([X, values]),
+        lambda: Trajectory(T, values),
+        lambda: Trajectory(column, X),
+        lambda: Demonstrations.from_arrays([X], times=[column]),
+        lambda: primitives.rollout(goal=wish),
+        lambda: primitives.rollout(start=wish),
+        lambda: styles.average(primitives, [wish[0]]),
+        lambda: RandomBinning().fit(values),
+        lambda: orientation.normalized([*wish, *wish]),
+        lambda: orientation.log([*wish, *wish]),
+        lambda: orientation.exp([*wish, wish[0]]),
+    ):
+        with pytest.raises(TrajectoryError, match=r"expected real numbers|expected numbers for"):
+            take()

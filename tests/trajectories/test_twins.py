@@ -44,6 +44,44 @@ def _demonstrations(movements):
     return Demonstrations.from_arrays(wide, times=[t for t, _ in movements])
 
 
+def _spline_rows(demos):
+    return spline_rows(demos.times, demos.positions, demos.offsets, 33)
+
+
+def _company(seed, n, least):
+    """Ragged movements of extents over 12 powers of ten, long and short ones next to each other."""
+    rng = np.random.default_rng(seed)
+    movements = []
+    for _ in range(n):
+        length = int(rng.integers(least, rng.choice([8, 120])))
+        t = np.append(0, np.cumsum(rng.uniform(0.3, 1.7, length - 1)))
+        movements.append((t, 10.0 ** rng.uniform(-6, 6) * rng.normal(size=(length, 2)).cumsum(axis=0)))
+    return movements
+
+
+def _within_its_extent(actual, expected, tolerance):
+    assert np.abs(actual - expected).max() <= tolerance * np.ptp(expected, axis=0).max()
+
+
+@given(seed=st.integers(0, 10**6))
+def test_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
+    movements = _company(seed, 200, least=4)  # 13 blocks of lanes
+    rows = _spline_rows(_demonstrations(movements))
+    for (t, x), row in zip(movements, rows, strict=True):
+        _within_its_extent(row.T, CubicSpline(t, x - x[0])(np.linspace(0, t[-1], 33)), 1e-9)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_smoothing_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
+    movements = _company(seed, 200, least=5)
+    demos = _demonstrations(movements)
+    rows = smooth_rows(demos, 0, 200, 6.0, 33)
+    for (t, x), row, one in zip(movements, rows, preprocess(demos, [Smooth(6.0)]), strict=True):
+        spline = make_smoothing_spline(t / t[-1], x - x[0], lam=(len(t) - 1) / (2 * np.pi * 6.0) ** 4)
+        _within_its_extent(row.T, spline(np.linspace(0, 1, 33)), 1e-7)
+        _within_its_extent(one.positions - x[0], spline(t / t[-1]), 1e-7)
+
+
 any_ragged = given(
     seed=st.integers(0, 10**6),
     origin=st.sampled_from([0.0, -7.0, 1.7e9]),  # the last one is a ROS stamp
@@ -54,7 +92,7 @@ any_ragged = given(
 @any_ragged
 def test_splines_are_those_of_scipy(compiled, seed, origin, place):
     movements = _ragged(seed, least=4, origin=origin, place=place)
-    rows = relative_rows(_demonstrations(movements), 0, 6, 33)
+    rows = _spline_rows(_demonstrations(movements))
     for (t, x), row in zip(movements, rows, strict=True):
         even = np.linspace(0, t[-1] - t[0], 33)
         np.testing.assert_allclose(row, CubicSpline(t - t[0], x - x[0])(even).T, atol=1e-9)

@@ -11,7 +11,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError
 from kineme.kernels import TruncatedEuclidean
-from kineme.validation import Array, check_count, check_number
+from kineme.validation import Array, as_numbers, check_count, check_number
 
 _COLUMNS = np.iinfo(np.int32).max
 
@@ -119,7 +119,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
 
 
 def _rows(X: ArrayLike) -> Array:
-    rows = np.asarray(X, dtype=np.float64)
+    rows = as_numbers(X, "X", "finite rows of features")
     if rows.ndim != 2 or not rows.size or not np.isfinite(rows).all():
         raise SpecificationError(
             f"expected finite rows of features, (n, p), got shape {rows.shape}"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.validation import Array
+from kineme.validation import Array, as_numbers
 
 #: Deviation from norm 1 that is put down to rounding in a recording (three decimals give up to 0.001).
 NORM_TOLERANCE = 0.01
@@ -46,7 +46,7 @@ def normalized(q: ArrayLike) -> Array:
     TrajectoryError
         Not of shape (..., 4), or a norm that differs from 1 by more than `NORM_TOLERANCE`.
     """
-    q = np.asarray(q, dtype=np.float64)
+    q = as_numbers(q, "quaternions")
     if q.ndim == 0 or q.shape[-1] != 4:
         raise TrajectoryError(f"expected quaternions (w, x, y, z) of shape (..., 4), got shape {q.shape}")
     shape = q.shape[:-1]
@@ -84,7 +84,7 @@ def continuous(q: ArrayLike) -> Array:
     ndarray of shape (..., T, 4)
         The first of each movement unchanged; ``sum(q[t] * q[t - 1]) >= 0`` afterwards.
     """
-    q = np.asarray(q, dtype=np.float64)
+    q = as_numbers(q, "quaternions")
     flips = (q[..., 1:, :] * q[..., :-1, :]).sum(axis=-1) < 0
     odd = np.zeros(q.shape[:-1], dtype=bool)
     np.logical_xor.accumulate(flips, axis=-1, out=odd[..., 1:])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.orientation.quaternions import conjugate, product
-from kineme.validation import Array
+from kineme.validation import Array, as_numbers
 
 _TURN = 2.0 * np.pi
 #: Vector parts of quaternions below this length have lost their direction to rounding.
@@ -23,7 +23,7 @@ def log(q: ArrayLike) -> Array:
     ``p = 2 atan2(|v|, w) v / |v|`` with the sign of q = (w, v) for which w >= 0; q and -q give the same, except at
     exactly pi, where the two ends of the axis are the same rotation.
     """
-    q = np.asarray(q, dtype=np.float64)
+    q = as_numbers(q, "quaternions")
     w, v = np.abs(q[..., :1]), np.where(q[..., :1] < 0, -q[..., 1:], q[..., 1:])
     return logarithm_factor(w, np.linalg.norm(v, axis=-1, keepdims=True)) * v
 
@@ -38,7 +38,7 @@ def logarithm_factor(w: Array, length: Array) -> Array:
 
 def exp(p: ArrayLike) -> Array:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad] of any length: the inverse of `log`."""
-    p = np.asarray(p, dtype=np.float64)
+    p = as_numbers(p, "rotation vectors")
     half = 0.5 * np.linalg.norm(p, axis=-1, keepdims=True)
     return np.concatenate((np.cos(half), 0.5 * np.sinc(half / np.pi) * p), axis=-1)
 

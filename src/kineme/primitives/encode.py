@@ -34,7 +34,7 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
         flat = rows.reshape(-1, n_samples)  # a stack of matrices would become as many small products
         np.matmul(flat, operator.weights, out=weights[start:stop].reshape(len(flat), -1))
         np.matmul(flat, operator.velocity, out=velocities[start:stop].reshape(-1))
-        extents[start:stop] = extents_of(rows)
+        extents[start:stop] = extents_of(demos, start, stop)
 
     for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
     starts = demos.positions[demos.offsets[:-1]]

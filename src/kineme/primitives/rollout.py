@@ -15,7 +15,7 @@ from kineme.parallel import for_tiles
 from kineme.primitives.batch import Batch
 from kineme.primitives.operators import decoder
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import Array, check_number, describe
+from kineme.validation import Array, as_numbers, check_number, describe
 
 if TYPE_CHECKING:
     from kineme.primitives.primitives import Primitives
@@ -156,8 +156,8 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
     if wish is None:
         return None
     try:
-        value = np.asarray(wish, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        value = as_numbers(wish, name)
+    except TrajectoryError as error:
         raise TrajectoryError(f"expected numbers for {name}, got {wish!r}") from error
     if n_dims == 1 and value.ndim == 0:
         value = value[None]

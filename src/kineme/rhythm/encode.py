@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.parallel import for_tiles
@@ -18,7 +20,7 @@ from kineme.rhythm.rhythmic_dmp import RhythmicDMP
 from kineme.trajectories.demonstrations import Demonstrations
 from kineme.trajectories.preprocess import preprocess
 from kineme.trajectories.resample import relative_rows
-from kineme.validation import describe
+from kineme.validation import Array, describe
 
 _TILE_SAMPLES = 10_000  # numbers of recording in one tile; the exponentials of the period search are fifty times more
 _LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
@@ -37,18 +39,15 @@ def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
     starts = demos.positions[first]
     extents = np.maximum.reduceat(demos.positions, first) - np.minimum.reduceat(demos.positions, first)
     check_movement(demos, starts, extents)
-    n_samples = demos.even_length or int(demos.lengths.max())
-    found = periodicity(dmp, demos, n_samples)
+    found = periodicity(dmp, demos)
     coefficients = np.empty((n, n_dims, H + 1), dtype=complex)
     phases, explained, aligned_on = np.empty(n), np.empty(n), np.empty(n, dtype=np.intp)
 
-    def fold_tile(start: int, stop: int) -> None:
-        chosen = slice(start, stop)
-        rows = relative_rows(demos, start, stop, n_samples)
+    def fold_tile(chosen: NDArray[np.intp], rows: Array) -> None:
         one = fold(rows, found.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
         coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = one
 
-    for_tiles(fold_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
+    _for_even_rows(demos, fold_tile)
     series = as_real(coefficients)
     shape = series[:, :, 1:] @ waves(even_phases(dmp.n_points), H)[:, 1:].T
     return RhythmicPrimitives(
@@ -65,7 +64,22 @@ def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
     )
 
 
-def periodicity(dmp: RhythmicDMP, demos: Demonstrations, n_samples: int) -> Periodicity:
+def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Array], None]) -> None:
+    """Call ``work(chosen, rows)`` on tiles of recordings, each at as many even samples as it has itself.
+
+    Recordings of one length go together: a recording must not be resampled as its company needs it.
+    """
+    for length in np.unique(demos.lengths).tolist():
+        alike = np.flatnonzero(demos.lengths == length)
+        group = demos if len(alike) == len(demos) else demos[alike]
+
+        def tile(start: int, stop: int) -> None:
+            work(alike[start:stop], relative_rows(group, start, stop, length))  # noqa: B023 - called in this round
+
+        for_tiles(tile, len(group), max(1, _TILE_SAMPLES // (demos.n_dims * length)))
+
+
+def periodicity(dmp: RhythmicDMP, demos: Demonstrations) -> Periodicity:
     """Periods per recording: from the given period, or found, or refused."""
     n = len(demos)
     if dmp.period is not None:
@@ -82,11 +96,10 @@ def periodicity(dmp: RhythmicDMP, demos: Demonstrations, n_samples: int) -> Peri
         return Periodicity(cycles, np.ones(n))
     found = Periodicity(np.empty(n), np.empty(n))
 
-    def search_tile(start: int, stop: int) -> None:
-        rows = relative_rows(demos, start, stop, n_samples)
-        found.cycles[start:stop], found.explained[start:stop] = find_cycles(rows, demos.lengths[start:stop])
+    def search_tile(chosen: NDArray[np.intp], rows: Array) -> None:
+        found.cycles[chosen], found.explained[chosen] = find_cycles(rows, demos.lengths[chosen])
 
-    for_tiles(search_tile, n, max(1, _TILE_SAMPLES // (demos.n_dims * n_samples)))
+    _for_even_rows(demos, search_tile)
     aperiodic = ~(found.explained >= _LEAST_EXPLAINED)
     if aperiodic.any() and dmp.aperiodic == "raise":
         _refuse(demos, found, aperiodic)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from kineme.errors import TrajectoryError
 from kineme.primitives.primitives import Primitives
 from kineme.styles.numbers import check_primitives, from_numbers, map_rows, path_matrix, shared_label, to_numbers
-from kineme.validation import Array, check_choice, check_count
+from kineme.validation import Array, as_numbers, check_choice, check_count
 
 _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
 
@@ -137,7 +137,7 @@ def _shares(weights: ArrayLike | None, n: int) -> Array:
         raise TrajectoryError("expected at least one primitive to average, got none")
     if weights is None:
         return np.full(n, 1.0 / n)
-    w = np.asarray(weights, dtype=np.float64)
+    w = as_numbers(weights, "weights")
     if w.shape != (n,):
         raise TrajectoryError(f"expected one weight for each of the {n} primitives, got weights of shape {w.shape}")
     bad = ~np.isfinite(w) | (w < 0)

@@ -13,7 +13,7 @@ from kineme.primitives.dmp import DMP
 from kineme.primitives.primitives import Primitives
 from kineme.styles.metrics import compared
 from kineme.styles.numbers import from_numbers, to_numbers
-from kineme.validation import Array, check_count
+from kineme.validation import Array, as_numbers, check_count
 
 _SLACK = 1e-9  # of the range: a demonstrated style is inside, whatever the rounding
 
@@ -140,7 +140,7 @@ class StyleModel:
         return StyleEstimate(styles, residuals, np.all(self._inside(styles), axis=1))
 
     def _as_styles(self, style: ArrayLike) -> Array:
-        s = np.atleast_2d(np.asarray(style, dtype=np.float64))
+        s = np.atleast_2d(as_numbers(style, "style"))
         if s.ndim != 2 or s.shape[1] != self.n_styles:
             raise SpecificationError(
                 f"expected style of shape ({self.n_styles},) or (m, {self.n_styles}), got shape {np.shape(style)}"

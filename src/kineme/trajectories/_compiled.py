@@ -20,16 +20,38 @@ def fill_even_rows(block, rows):  # type: ignore[no-untyped-def]
 
 
 @jit
-def fill_extents(rows, extents):  # type: ignore[no-untyped-def]
-    """Largest minus smallest of each row (n, d, T), in one pass; see `resample.extents_of`."""
-    n, n_dims, n_samples = rows.shape
+def fill_extents(positions, offsets, extents):  # type: ignore[no-untyped-def]
+    """Largest minus smallest of each movement and dimension, in one pass; see `resample.extents_of`."""
+    n, n_dims = extents.shape
     for i in range(n):
         for k in range(n_dims):
-            row = rows[i, k]
-            low, high = row[0], row[0]
-            for t in range(1, n_samples):
-                low, high = min(low, row[t]), max(high, row[t])
+            low = high = positions[offsets[i], k]
+            for t in range(offsets[i] + 1, offsets[i + 1]):
+                low, high = min(low, positions[t, k]), max(high, positions[t, k])
             extents[i, k] = high - low
+
+
+@jit
+def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no-untyped-def]
+    """Quantile of the gaps of each movement, 0 where no gap is close; see `close_stamps.merge_close`."""
+    longest = 0
+    for i in range(len(steps)):
+        longest = max(longest, offsets[i + 1] - offsets[i])
+    gaps, range_bits = np.empty(longest), np.empty(2, np.int64)
+    gap_bits, ends = gaps.view(np.int64), range_bits.view(np.float64)  # bits order positive numbers, and are quicker
+    for i in range(len(steps)):
+        own = times[offsets[i] : offsets[i + 1]]
+        n_gaps = len(own) - 1
+        for j in range(n_gaps):
+            gaps[j] = own[j + 1] - own[j]
+        low, high = gap_bits[0], gap_bits[0]
+        for j in range(n_gaps):
+            low = min(low, gap_bits[j])
+        for j in range(n_gaps):
+            high = max(high, gap_bits[j])
+        range_bits[0], range_bits[1] = low, high
+        at = int(quantile * n_gaps)
+        steps[i] = np.partition(gaps[:n_gaps], at)[at] if ends[0] < share * ends[1] else 0.0
 
 
 @jit

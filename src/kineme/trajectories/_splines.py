@@ -166,6 +166,7 @@ def _interpolate(knots, length, offsets, first, n_dims):  # type: ignore[no-unty
             right = (knots[j + 4].x[lane] - knots[j + 3].x[lane]) * knots[j + 3].inverse[lane]
             knots[j + 3].m[lane] = (6.0 * (right - left) - before * knots[j + 2].m[lane]) * pivot
     for lane in range(_LANES):
+        knots[length + 2].m[lane] = 0.0  # the rows before these may have been longer and left a number here
         _close(knots, _last(offsets, first + lane, n_dims), lane)
     for j in range(length - 1, -1, -1):
         for lane in range(_LANES):

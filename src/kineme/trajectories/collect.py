@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,8 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.trajectories.close_stamps import merge_close
 from kineme.trajectories.trajectory import Trajectory
-from kineme.validation import Array, as_positions, as_times, check_finite, check_times, describe, refuse_lossy
+from kineme.validation import (
+    Array,
+    as_positions,
+    as_times,
+    check_extents,
+    check_finite,
+    check_times,
+    describe,
+    refuse_lossy,
+)
 
 Names = tuple[str | None, ...] | None
 
@@ -64,6 +74,14 @@ class Movements:
         step = self.durations[:, None] / (n_samples - 1)
         deviation = np.abs(t - t[:, :1] - step * np.arange(n_samples))
         return n_samples if (deviation <= _EVEN * step + 2 * np.spacing(np.abs(t[:, -1:]))).all() else None
+
+    @cached_property
+    def separated(self) -> Movements:
+        """The same movements, samples at nearly the same time made one, for interpolation; usually themselves."""
+        merged = None if self.times is None else merge_close(self.times, self.positions, self.offsets)
+        if merged is None:
+            return self
+        return replace(self, times=merged[0], positions=merged[1], offsets=merged[2])
 
     def take(self, chosen: NDArray[np.intp]) -> Movements:
         """The chosen movements, in that order, copied into a block of their own."""
@@ -122,6 +140,7 @@ def collect_arrays(
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
     check_finite(positions, offsets, names, "positions")
+    check_extents(positions, offsets, names)
     stamps = None if times is None else _join_times(times, offsets, names)
     durations = np.ones(n) if stamps is None else stamps[offsets[1:] - 1] - stamps[offsets[:-1]]
     return Movements(

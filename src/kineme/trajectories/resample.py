@@ -24,8 +24,10 @@ class Resample:
 
     Notes
     -----
-    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Resampling far
-    below the recorded rate folds high frequencies into low ones: `Smooth` first.
+    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
+    tenth of the usual step apart are averaged first: a spline would magnify the noise between them (see
+    `kineme.trajectories.close_stamps`). Resampling far below the recorded rate folds high frequencies into low ones:
+    `Smooth` first.
     """
 
     n_points: int = 200
@@ -50,8 +52,8 @@ def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_point
     """Movements start:stop at `n_points` even times, minus their start, shape (stop - start, d, n_points)."""
     n_samples = demonstrations.even_length
     if n_samples is None:
-        offsets = demonstrations.offsets[start : stop + 1]
-        return spline_rows(demonstrations.times, demonstrations.positions, offsets, n_points)
+        movements = demonstrations.movements.separated
+        return spline_rows(movements.stamps, movements.positions, movements.offsets[start : stop + 1], n_points)
     rows = even_rows(demonstrations, start, stop)
     return rows if n_points == n_samples else rows @ spline_matrix(n_samples, n_points).T
 
@@ -70,12 +72,15 @@ def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
     return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
 
 
-def extents_of(rows: Array) -> Array:
-    """Largest minus smallest of each row (n, d, T), shape (n, d)."""
-    if not use_compiled(rows.size):
-        return np.asarray(rows.max(axis=2) - rows.min(axis=2))
+def extents_of(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Largest minus smallest recorded position of movements start:stop in each dimension, shape (stop - start, d)."""
+    offsets = demonstrations.offsets[start : stop + 1]
+    positions = demonstrations.positions[offsets[0] : offsets[-1]]
+    if not use_compiled(positions.size):
+        first = offsets[:-1] - offsets[0]
+        return np.asarray(np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first))
     from kineme.trajectories._compiled import fill_extents
 
-    extents = np.empty(rows.shape[:2])
-    fill_extents(rows, extents)
+    extents = np.empty((stop - start, demonstrations.n_dims))
+    fill_extents(positions, offsets - offsets[0], extents)
     return extents

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.validation import Array, as_positions, as_times, check_finite, check_times
+from kineme.validation import Array, as_positions, as_times, check_extents, check_finite, check_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,8 @@ class Trajectory:
     Raises
     ------
     TrajectoryError
-        Fewer than 4 samples, NaN or infinity, times not strictly increasing or of another length.
+        Fewer than 4 samples; NaN, infinity or complex numbers; times not strictly increasing or of another length;
+        positions beyond 1e100 or an extent below 1e-100; stamps beyond 1e50 s or less than 1e-50 s apart.
 
     Notes
     -----
@@ -47,6 +48,7 @@ class Trajectory:
         whole = np.array([0, len(x)])
         names = [self.name] if self.name else None
         check_finite(x, whole, names, "positions")
+        check_extents(x, whole, names)
         check_times(t, whole, names)
         for field, values in (("times", t), ("positions", x)):
             own = values.copy()

@@ -1,0 +1,145 @@
+"""A new function of a batch must stand in the table of `batched_functions`, or say here why it need not."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import sys
+import threading
+import warnings
+from functools import cached_property
+
+import pytest
+from batched_functions import TABLE, recognizer
+
+import kineme
+
+#: Parameters that hold many movements, or many rows.
+MANY = {
+    "A", "B", "X", "arrays", "demonstrations", "demos", "features", "movements", "p", "paths", "positions",
+    "primitives", "q", "queries", "recordings", "rows", "trajectories",
+}  # fmt: skip
+
+#: Layers whose functions do not answer for each movement by itself.
+OTHER_LAYERS = {
+    "anchoring": "clusters, merges and names depend on the company by intent; movements are seen by recognition's view",
+    "cli": "calls the layers below",
+    "control": "one movement by contract",
+    "datasets": "reads files",
+    "evaluation": "scores of whole sets",
+    "generation": "one movement by contract",
+    "inspection": "reports on whole sets",
+    "io": "reads and writes files, one by one",
+    "library": "its class is in the table; what lies under it writes and reads rows of a database",
+    "reproduction": "the paper's experiments on whole sets",
+    "segmentation": "one recording by contract",
+    "validation": "checks that raise",
+}
+
+#: Functions that depend on the whole batch by intent, or on one movement by contract.
+EXEMPT = {
+    "orientation.pose_primitives.PosePrimitives.controller": "one movement by contract",
+    "orientation.pose_primitives.PosePrimitives.load": "the same file as Primitives.load, which is in the table",
+    "orientation.pose_primitives.PosePrimitives.save": "the same file as Primitives.save, which is in the table",
+    "primitives.primitives.Primitives.controller": "one movement by contract",
+    "recognition.candidates.Code.take": "an index into arrays",
+    "recognition.early.earliness": "a score of the whole set",
+    "recognition.live_state.LiveStatus.messages": "of one stream; its length counts problems",
+    "recognition.perturbations.Perturbation.apply": "random numbers are drawn for the batch in its order",
+    "recognition.shortlist.Shortlist.recognize": "of large libraries; compared with comparing all in test_shortlist.py",
+    "recognition.shortlist.Stored.codes_at": "reads stored rows",
+    "recognition.transform.Transform.apply": "one movement by contract",
+    "styles.average.average": "a mean of the batch; see test_order_of_training.py",
+    "styles.average.average_by_label": "means of the batch, by `average`",
+    "styles.figure.draw_morph": "one picture",
+    "styles.learn.learn_styles": "what differs within the batch; see test_order_of_training.py",
+    "styles.numbers.shared_label": "one label of the whole batch",
+    "trajectories.collect.collect_trajectories": "joins arrays that the table's movements are made of",
+    "trajectories.demonstrations.require_labels": "hands out labels, or raises",
+    "trajectories.preprocess.Step.apply": "a protocol; the steps are in the table",
+    "trajectories.trajectory.Trajectory.n_dims": "of one movement; its length counts samples",
+}
+
+
+def _discovered():
+    """Code objects of public functions with such a parameter, and of what public batches can do: name -> code."""
+    found = {}
+    for info in pkgutil.walk_packages(kineme.__path__, "kineme."):
+        parts = info.name.split(".")
+        if any(part.startswith("_") for part in parts) or parts[1] in OTHER_LAYERS:
+            continue
+        module = importlib.import_module(info.name)
+        for name, thing in vars(module).items():
+            if name.startswith("_") or getattr(thing, "__module__", None) != info.name:
+                continue
+            where = ".".join([*parts[1:], name])
+            if inspect.isfunction(thing):
+                if MANY & set(inspect.signature(thing).parameters):
+                    found[where] = thing.__code__
+            elif inspect.isclass(thing):
+                found |= {f"{where}.{key}": code for key, code in _methods(thing).items()}
+    return found
+
+
+def _methods(cls):
+    """Public methods that take many movements; of a class with a length all that it can do, properties too."""
+    holds_many = hasattr(cls, "__len__")
+    codes = {}
+    for key, value in vars(cls).items():
+        if key.startswith("_") and key != "__call__":
+            continue
+        if isinstance(value, property):
+            function, takes_many = value.fget, holds_many
+        elif isinstance(value, cached_property):
+            function, takes_many = value.func, holds_many
+        else:
+            function = value.__func__ if isinstance(value, (classmethod, staticmethod)) else value
+            if not inspect.isfunction(function):
+                continue
+            takes_many = holds_many or bool(MANY & set(inspect.signature(function).parameters))
+        if takes_many:
+            codes[key] = inspect.unwrap(function).__code__
+    return codes
+
+
+def _called():
+    """Code objects that the rows of the table run."""
+    called = set()
+
+    def note(frame, event, _):
+        if event == "call":
+            called.add(frame.f_code)
+
+    drawn = [(20 + 7 * i, i, ("even", "jitter", "random", "coincident")[i % 4], 0, i) for i in range(5)]
+    recognizer.cache_clear()
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        for row in TABLE:
+            row.call(row.draw(drawn))
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    return called
+
+
+@pytest.fixture(scope="module")
+def missing():
+    with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", kineme.DegenerateMovementWarning)
+        patch.setenv("KINEME_COMPILED", "never")
+        called = _called()
+    return {name for name, code in _discovered().items() if code not in called}
+
+
+def test_every_function_of_a_batch_is_in_the_table(missing):
+    assert sorted(missing - EXEMPT.keys()) == []
+
+
+def test_exemptions_are_needed(missing):
+    assert sorted(EXEMPT.keys() - missing) == []
+
+
+def test_layers_left_out_exist():
+    assert set(OTHER_LAYERS) <= {info.name for info in pkgutil.iter_modules(kineme.__path__)}
