@@ -11,12 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.parallel import single_threaded_blas
 from kineme.rhythm.harmonics import fit_harmonics
 from kineme.validation import Array
 
 FEWEST_CYCLES = 1.5  # with less, a movement and a part of it look the same
 SAMPLES_PER_PERIOD = 4  # fewer cannot show a shape
 _CANDIDATES = 6
+_AVERAGED = 0.02  # of a lag, to either side
+_VALLEY = 0.1  # of a lag, to either side: a valley is the lowest place there
+_RISEN = 0.5  # dissimilarity that comes before a period; without, noise next to lag 0 looks like short ones
 _SLACK = 0.25  # self-dissimilarity by which a candidate may be worse than the best
 _HARMONICS = 8
 _PER_HARMONIC = 2.5  # samples per period that the highest harmonic needs
@@ -52,22 +56,60 @@ def dissimilarity(rows: Array) -> Array:
 
 
 def candidates(rows: Array, lengths: NDArray[np.intp]) -> Array:
-    """Possible numbers of cycles, descending, (n, C), NaN where there are fewer: valleys of `dissimilarity`."""
+    """Possible numbers of cycles, descending, (n, C), NaN where there are fewer: valleys of `dissimilarity`.
+
+    Noise makes a small valley of every few samples. What lies within a share of a lag is therefore averaged, so that
+    more samples of a period average more noise, and only the lowest valley within a tenth of a lag counts.
+    """
     n_samples = rows.shape[2]
-    distance = dissimilarity(rows)
     longest = min(int((n_samples - 1) / FEWEST_CYCLES) + 4, n_samples)
-    left, here, right = distance[:, : longest - 2], distance[:, 1 : longest - 1], distance[:, 2:longest]
+    distance = _averaged(dissimilarity(rows))[:, :longest]
     lag = np.arange(1, longest - 1)
+    reach = np.minimum(_share_of(lag, _AVERAGED), np.minimum(lag, longest - 1 - lag))  # to the parabola's outer points
+    reach = np.maximum(reach, 1)
+    left, here, right = distance[:, lag - reach], distance[:, lag], distance[:, lag + reach]
     resolved = lag * (lengths[:, None] - 1) >= SAMPLES_PER_PERIOD * (n_samples - 1)
-    valley = (here <= left) & (here < right) & resolved
+    valley = (here <= distance[:, lag - 1]) & (here < distance[:, lag + 1]) & resolved
+    valley &= here <= _lowest_near(distance, lag)
+    valley &= np.maximum.accumulate(distance, axis=1)[:, lag] >= _RISEN
     best = np.where(valley, here, np.inf).min(axis=1, keepdims=True)
     valley &= here <= best + _SLACK
     valley &= np.cumsum(valley, axis=1) <= _CANDIDATES
     with np.errstate(invalid="ignore", divide="ignore"):
-        tip = 0.5 * (left - right) / (left - 2 * here + right)  # of the parabola through three points
-        cycles = np.where(valley, (n_samples - 1) / (lag + tip), np.nan)
+        tip = 0.5 * reach * (left - right) / (left - 2 * here + right)  # of the parabola through three points
+        cycles = np.where(valley, (n_samples - 1) / (lag + np.clip(tip, -reach, reach)), np.nan)
     order = np.argsort(~valley, axis=1, kind="stable")[:, :_CANDIDATES]
     return np.take_along_axis(cycles, order, axis=1)
+
+
+def _share_of(lag: NDArray[np.intp], share: float) -> NDArray[np.intp]:
+    return np.asarray(share * lag, dtype=np.intp)
+
+
+def _averaged(distance: Array) -> Array:
+    """Each lag's value (n, R) averaged over the lags within a share of it."""
+    lag = np.arange(distance.shape[1])
+    reach = np.minimum(_share_of(lag, _AVERAGED), len(lag) - 1 - lag)
+    sums = np.zeros((len(distance), len(lag) + 1))
+    np.cumsum(distance, axis=1, out=sums[:, 1:])
+    means = (sums[:, lag + reach + 1] - sums[:, lag - reach]) / (2 * reach + 1)
+    return np.where(reach > 0, means, distance)
+
+
+def _lowest_near(distance: Array, lag: NDArray[np.intp]) -> Array:
+    """Least value within a tenth of each lag (n, len(lag)): from minima over 1, 2, 4, ... neighbors."""
+    reach = np.maximum(_share_of(lag, _VALLEY), 1)
+    first = lag - reach
+    count = np.minimum(lag + reach, distance.shape[1] - 1) - first + 1
+    lowest, width, result = distance, 1, np.empty((len(distance), len(lag)))
+    while True:
+        now = (count >= width) & (count < 2 * width)
+        start = first[now]
+        result[:, now] = np.minimum(lowest[:, start], lowest[:, start + count[now] - width])
+        if 2 * width > count.max():
+            return result
+        lowest = np.minimum(lowest[:, :-width], lowest[:, width:])
+        width *= 2
 
 
 def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
@@ -91,7 +133,8 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
     if len(owner) == 0:
         return result
     centered = rows - rows.mean(axis=2, keepdims=True)
-    cycles, left = refine(centered[owner], found[chosen], lengths[owner])
+    with single_threaded_blas():  # products this small take many times as long where two threads wait for each other
+        cycles, left = refine(centered[owner], found[chosen], lengths[owner])
     residuals, refined = np.full(found.shape, np.inf), found.copy()
     residuals[owner, column] = left / np.maximum(1 - 1 / cycles, 1e-3) + _ROUNDING
     refined[owner, column] = cycles
@@ -104,7 +147,7 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
 
 
 def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Improve cycles (m,) known to a sample's width; also the share of the variance left unexplained (m,).
+    """Improve cycles (m,) known to a sample's width, or to two percent; also the share of the variance left (m,).
 
     Variable projection (G. H. Golub and V. Pereyra, 1973): the series is eliminated, one nonlinear unknown remains. A
     scan as fine as the narrowest dip comes first, Gauss-Newton steps follow.
@@ -116,10 +159,11 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
         fit = fit_harmonics(rows, trial, n_harmonics)
         return np.asarray(((rows - fit.fitted) ** 2).sum(axis=(1, 2)) / total)
 
-    width = 0.5 * cycles**2 / (rows.shape[2] - 1)  # change of `cycles` when the period changes by half a sample
-    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40)  # of each recording, whatever others need
+    # Change of `cycles` when the period changes by half a sample, or by what noise does to a valley.
+    width = np.maximum(0.5 * cycles**2 / (rows.shape[2] - 1), _AVERAGED * cycles)
+    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40).astype(np.intp)  # of each recording, whatever others need
     best, left = cycles.copy(), unexplained(cycles)
-    for step in np.arange(-n_steps.max(), n_steps.max() + 1):
+    for step in range(-int(n_steps.max()), int(n_steps.max()) + 1):
         trial = cycles + np.clip(step / n_steps, -1, 1) * width
         value = unexplained(trial)
         best, left = np.where(value < left, trial, best), np.minimum(value, left)
