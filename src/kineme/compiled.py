@@ -16,12 +16,14 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from threading import RLock
 from typing import Any
 
 from kineme.errors import SpecificationError
+from kineme.forks import at_fork
 
 CHOICES = ("auto", "always", "never")
 
@@ -172,3 +174,15 @@ def _let_others_finish(attempt: int) -> None:
 def _parts_of_numba() -> list[str]:
     loaded = list(sys.modules.items())
     return [name for name, module in loaded if name.partition(".")[0] == "numba" and module is not None]
+
+
+@contextmanager
+def _nobody_compiles() -> Iterator[None]:
+    """Before a fork: the child could not end what another thread had begun."""
+    with _loading:
+        compiler = sys.modules.get("numba.core.compiler_lock")
+        with getattr(compiler, "global_compiler_lock", nullcontext()):
+            yield
+
+
+at_fork(_nobody_compiles)

@@ -11,12 +11,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
-from threading import Lock
+from threading import Lock, active_count
 from typing import Any
 
 from kineme.errors import SpecificationError
+from kineme.forks import at_fork
 
 _blas_lock = Lock()
 _blas_holds: list[Any] = []  # one entry per active caller; the first entry is the limiter
@@ -77,3 +78,25 @@ def _blas_controller() -> Any:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Over a fork, hold BLAS to one thread if another thread may be within it.
+
+    OpenBLAS takes locks for work in several threads, and to change their number; those of a thread that is not there
+    in the child are never given back. With one thread it takes none.
+    """
+    with single_threaded_blas() if active_count() > 1 else nullcontext(), _blas_lock:
+        yield
+
+
+def _in_child() -> None:
+    """Whoever held BLAS to one thread, `_quiet` or a thread that is not there, does so for the life of the child."""
+    global _blas_lock  # noqa: PLW0603 - of another thread, perhaps
+    _blas_lock = Lock()
+    if _blas_holds:
+        _blas_holds.append(None)
+
+
+at_fork(_quiet, _in_child)

@@ -102,7 +102,9 @@ def test_numbers_without_squares_are_refused_with_their_size():
     t, x = np.arange(20.0), np.random.default_rng(0).normal(size=(20, 2)).cumsum(axis=0)
     with pytest.raises(KinemeError, match=r"expected positions up to 1e\+100, got .* choose a unit in which they are"):
         segment(Trajectory(t, 1e150 * x))
-    with pytest.raises(KinemeError, match=r"expected an extent of at least 1e-100, got .* choose a unit in which it is"):
+    with pytest.raises(
+        KinemeError, match=r"expected an extent of at least 1e-100, got .* choose a unit in which it is"
+    ):
         segment(Trajectory(t, 1e-150 * x))
     with pytest.raises(KinemeError, match=r"expected at least 1e-50 s between stamps, got .* times are in seconds"):
         segment(Trajectory(1e-150 * t, x))

@@ -19,6 +19,7 @@ from urllib.parse import quote
 from kineme.errors import DataError
 from kineme.library.faults import in_plain_words
 from kineme.library.guard import defend
+from kineme.library.over_forks import Connection, open_connection
 from kineme.library.placing import LOGS, placed
 from kineme.library.rows import Row, insert
 from kineme.library.schema import APPLICATION_ID, CREATE, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
@@ -29,12 +30,12 @@ _LOG_BYTES = 1 << 26  # what the write-ahead log is cut back to
 _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
 
 
-def connect(path: Path, mode: str, wait: float) -> sqlite3.Connection:
+def connect(path: Path, mode: str, wait: float) -> Connection:
     """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun by hand."""
     address = f"file:{quote(str(path))}?mode={mode}"
     if mode == "ro" and _cannot_keep_a_log(path):
         address += "&immutable=1"
-    connection = sqlite3.connect(address, uri=True, timeout=wait, isolation_level=None, check_same_thread=False)
+    connection = open_connection(address, uri=True, timeout=wait, isolation_level=None, check_same_thread=False)
     try:
         connection.execute("PRAGMA synchronous = FULL")
         defend(connection)
@@ -65,7 +66,7 @@ def create(path: Path, meta: dict[str, str]) -> None:
     with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may make it at the same time
         path.parent.mkdir(parents=True, exist_ok=True)
         check_alone(path)
-        with placed(path) as beside, closing(sqlite3.connect(beside, isolation_level=None)) as connection:
+        with placed(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
             connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
             connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             connection.execute("PRAGMA journal_mode = WAL")

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from numbers import Integral
 from pathlib import Path
-from threading import RLock
+from threading import Lock, RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
+from kineme.library import over_forks
 from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
 from kineme.library.guard import size_of
@@ -90,10 +91,11 @@ class Store:
         # Threads share the connection to read from; a SQLite that was built without locks of its own gets ours.
         self._look: AbstractContextManager[Any] = RLock() if sqlite3.threadsafety < 3 else nullcontext()
         self._writer: sqlite3.Connection | None = None
+        self._waking, self._asleep, self._closed = Lock(), False, False
         if not self.path.exists():
             self._create(specification)
-        with in_plain_words(self.path, wait):
-            self._reader = connect(self.path, "ro" if self.read_only else "rw", wait)
+        with in_plain_words(self.path, wait), over_forks.awake():
+            self._reader = self._connect()
             try:
                 self._check_kind()
                 meta = self._checked_meta()
@@ -103,6 +105,34 @@ class Store:
             except BaseException:
                 self._reader.close()
                 raise
+            over_forks.register(self)
+
+    def _connect(self) -> sqlite3.Connection:
+        over_forks.refuse_if_lost(self.path)
+        return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
+
+    def sleep(self) -> None:
+        """Close the connections for a fork; the next one to read or write opens them again."""
+        if not self._closed and not self._asleep:
+            self._asleep = True
+            for connection in (self._writer, self._reader):
+                if connection is not None:
+                    connection.close()
+            self._writer = None
+
+    def carried_over(self) -> list[sqlite3.Connection]:
+        """The connections that a fork found open; see `over_forks`."""
+        if self._closed or self._asleep:
+            return []
+        return [one for one in (self._writer, self._reader) if one is not None]
+
+    def _wake(self) -> None:
+        over_forks.refuse_if_lost(self.path)
+        with self._waking:
+            if self._asleep:
+                self._check_there("read")
+                self._reader = self._connect()
+                self._asleep = False
 
     def _create(self, specification: Specification | None) -> None:
         if specification is None or self.read_only:
@@ -171,8 +201,10 @@ class Store:
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
         """The connection to read from. It sees committed versions only, also while this process writes."""
-        with self._look, in_plain_words(self.path, self.wait):
-            yield self._reader
+        with over_forks.awake(), in_plain_words(self.path, self.wait):
+            self._wake()
+            with self._look:
+                yield self._reader
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
         """The version that is shown, which stays the same while others are added."""
@@ -194,20 +226,22 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        with self._turn, in_plain_words(self.path, self.wait):
-            self.check_writable()
-            if self._writer is None:
-                self._writer = connect(self.path, "rw", self.wait)
-            with transaction(self._writer):
-                self.check_writable()  # again: waiting for the turn may have taken long
-                last = self.moment(self._writer)
-                change = Change(
-                    self._writer, last.version + 1, {name: getattr(last, name) for name in COUNTED.values()}
-                )
-                yield change
-                at = datetime.now(UTC).isoformat(timespec="milliseconds")
-                text = json.dumps(detail, ensure_ascii=False)
-                insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
+        with over_forks.awake(), in_plain_words(self.path, self.wait):
+            self._wake()  # first: in a child, the turn may be that of a thread that is not there
+            with self._turn:
+                self.check_writable()
+                if self._writer is None:
+                    self._writer = connect(self.path, "rw", self.wait).rest()
+                with transaction(self._writer):
+                    self.check_writable()  # again: waiting for the turn may have taken long
+                    last = self.moment(self._writer)
+                    change = Change(
+                        self._writer, last.version + 1, {name: getattr(last, name) for name in COUNTED.values()}
+                    )
+                    yield change
+                    at = datetime.now(UTC).isoformat(timespec="milliseconds")
+                    text = json.dumps(detail, ensure_ascii=False)
+                    insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
 
     def check_writable(self) -> None:
         """Refuse to write where it was opened for reading, or where the file is no longer the one that was opened.
@@ -218,6 +252,9 @@ class Store:
             raise DataError(
                 f"expected to write to {self.path}, but it is open for reading only; open it again to write"
             )
+        self._check_there("written")
+
+    def _check_there(self, done: str) -> None:
         try:
             there = self.path.stat().st_ino == self._file
         except OSError:
@@ -225,7 +262,7 @@ class Store:
         if not there:
             raise DataError(
                 f"expected {self.path} where it was opened, but it was moved, deleted or replaced; nothing was "
-                "written: put it back, or open the library again"
+                f"{done}: put it back, or open the library again"
             )
 
     def __del__(self) -> None:
@@ -234,7 +271,8 @@ class Store:
 
     def close(self) -> None:
         """Close both connections; the last one to close leaves a single file."""
-        with self._turn:
+        with over_forks.awake(), self._turn:
+            self._closed = True
             for connection in (self._writer, self._reader):
                 if connection is not None:
                     connection.close()
