@@ -120,3 +120,10 @@ def test_what_compressed_data_say_of_themselves_is_not_believed():
             read_demos(whole[:128] + struct.pack("<II", 15, len(packed)) + packed)
     with pytest.raises(kineme.DataError, match="truncated"):
         read_demos(whole[:-4])
+
+
+def test_a_file_that_was_cut_is_refused_wherever_that_was():
+    whole = saved(demos=one(), beside=np.arange(9.0))
+    for at in range(0, len(whole) - 1, 7):
+        with pytest.raises(kineme.DataError, match="expected a MATLAB file with 'demos', got"):
+            read_demos(whole[:at])
