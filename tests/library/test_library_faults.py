@@ -251,6 +251,14 @@ def test_what_is_no_library_is_refused_and_left_alone(tmp_path, make, message):
         assert (tmp_path / FILE).read_bytes() == before
 
 
+def test_a_header_of_no_known_format_is_damaged(folder):
+    with (folder / FILE).open("rb+") as file:
+        file.seek(47)  # the last byte of the schema format number
+        file.write(b"\x09")
+    with pytest.raises(DataError, match=r"damaged bytes"):
+        ActionLibrary(folder)
+
+
 def test_a_truncated_library_is_damaged(folder):
     whole = (folder / FILE).read_bytes()
     (folder / FILE).write_bytes(whole[: len(whole) // 2])

@@ -14,6 +14,9 @@ _DAMAGED = (
     "the file from a backup or an export"
 )
 
+#: What SQLite says of damage under no code of its own: of text that is no text any more, of a strange header.
+_DAMAGE = ("decode", "unsupported file format")
+
 #: Primary result code of SQLite -> what to tell; see sqlite.org/rescode.html for the codes.
 _WORDS = {
     sqlite3.SQLITE_BUSY: (
@@ -64,7 +67,7 @@ def in_plain_words(path: Path, wait: float) -> Iterator[None]:
     except sqlite3.Error as error:
         code = getattr(error, "sqlite_errorcode", None)
         words = _WORDS.get(code & 0xFF) if code is not None else None
-        if words is None and "decode" in str(error):  # text that is no text any more
+        if words is None and any(said in str(error) for said in _DAMAGE):
             words = _DAMAGED
         if words is None:
             raise
