@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kineme.control.moving_goal import MovingGoal
 from kineme.control.obstacles import ObstacleAvoidance, steering
+from kineme.control.plan import Plan
 from kineme.control.state import Status
 
 
@@ -35,3 +37,16 @@ def test_a_movement_has_settled_within_a_thousandth_of_its_extent(bio):
     assert away(states[first]) <= allowed
     assert states[first - 1].progress < 1 or away(states[first - 1]) > allowed
     assert all(state.status & Status.SETTLED for state in states[first:])
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.3])
+def test_of_a_filtered_goal_the_mean_over_the_step_acts(bio, dt):
+    """On the way to a new target by ``filter dg/dt = target - g``."""
+    plan = Plan(bio, ObstacleAvoidance())
+    old = bio.goals[0] - bio.starts[0]
+    goal = MovingGoal(plan, old, 0.2)
+    goal.aim(old + 1.0)
+    mean, _ = goal.follow(dt)
+    on_the_way = old + 1.0 - np.exp(-np.linspace(0.0, dt, 20_001) / 0.2)[:, None]
+    np.testing.assert_allclose(mean, on_the_way.mean(axis=0), atol=1e-4)
+    np.testing.assert_allclose(goal.now, on_the_way[-1])
