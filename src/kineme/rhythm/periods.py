@@ -161,7 +161,9 @@ def refine(rows: Array, cycles: Array, lengths: NDArray[np.intp]) -> tuple[Array
 
     # Change of `cycles` when the period changes by half a sample, or by what noise does to a valley.
     width = np.maximum(0.5 * cycles**2 / (rows.shape[2] - 1), _AVERAGED * cycles)
-    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40).astype(np.intp)  # of each recording, whatever others need
+    n_steps = np.clip(np.ceil(2 * width * n_harmonics), 2, 40).astype(
+        np.intp
+    )  # of each recording, whatever others need
     best, left = cycles.copy(), unexplained(cycles)
     for step in range(-int(n_steps.max()), int(n_steps.max()) + 1):
         trial = cycles + np.clip(step / n_steps, -1, 1) * width
