@@ -22,8 +22,8 @@ MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
 LARGEST = 1e100  # of parameters and wishes: the squares and cubes of larger numbers, and of 1 over them, are no numbers
 MOST_NUMBERS = 50_000_000  # samples times basis functions: what generates a movement then takes some gigabytes
 #: What a movement may measure, in its unit: accelerations, and squares of positions and extents, then stay numbers.
-_LARGEST_POSITION, _SMALLEST_EXTENT = LARGEST, 1 / LARGEST
-_SHORTEST_STEP, _LARGEST_STAMP = 1e-50, 1e50  # seconds
+LARGEST_POSITION, SMALLEST_EXTENT = LARGEST, 1 / LARGEST
+SHORTEST_STEP, LARGEST_STAMP = 1e-50, 1e50  # seconds
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -98,7 +98,7 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
 
 def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None, what: str) -> None:
     """Refuse NaN, infinity and what is out of range in (total, ...) `values`; name the movement and the sample."""
-    largest = _LARGEST_STAMP if what == "times" else _LARGEST_POSITION
+    largest = LARGEST_STAMP if what == "times" else LARGEST_POSITION
     with np.errstate(invalid="ignore", over="ignore"):
         flat = values.ravel()
         squares = np.einsum("i,i->", flat, flat)  # one quick pass in one thread, without a temporary
@@ -123,7 +123,7 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
-    increasing = times[1:] - times[:-1] >= _SHORTEST_STEP
+    increasing = times[1:] - times[:-1] >= SHORTEST_STEP
     increasing[offsets[1:-1] - 1] = True  # from one movement to the next
     if increasing.all():
         return
@@ -132,7 +132,7 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
     k = row - offsets[i]
     if times[row] > times[row - 1]:
         raise TrajectoryError(
-            f"{describe(i, names)}: expected at least {_SHORTEST_STEP:g} s between stamps, got "
+            f"{describe(i, names)}: expected at least {SHORTEST_STEP:g} s between stamps, got "
             f"{times[row - 1]:.9g} and {times[row]:.9g} at samples {k - 1} and {k}; times are in seconds"
         )
     problem = "duplicate" if times[row] == times[row - 1] else "decreasing"
@@ -142,19 +142,24 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
     )
 
 
-def check_extents(positions: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
-    """Refuse a movement so small that the squares of its positions are no numbers; none at all is judged later."""
+def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
+    """Movements so small that the squares of their positions are no numbers, with their extents."""
     probes = offsets[:-1], (offsets[:-1] + offsets[1:]) // 2, offsets[1:] - 1
     suspects = np.ones(len(offsets) - 1, dtype=bool)
     for probe in probes:  # three samples clear the usual movement
-        suspects &= np.abs(positions[probe]).max(axis=1) < _SMALLEST_EXTENT / np.finfo(float).eps
-    for i in np.flatnonzero(suspects):
-        extent = np.ptp(positions[offsets[i] : offsets[i + 1]], axis=0).max()
-        if 0 < extent < _SMALLEST_EXTENT:
-            raise TrajectoryError(
-                f"{describe(int(i), names)}: expected an extent of at least {_SMALLEST_EXTENT:g}, got {extent:g}; "
-                "choose a unit in which it is"
-            )
+        suspects &= np.abs(positions[probe]).max(axis=1) < SMALLEST_EXTENT / np.finfo(float).eps
+    own = [(int(i), positions[offsets[i] : offsets[i + 1]]) for i in np.flatnonzero(suspects)]
+    extents = [(i, float(np.ptp(x, axis=0).max())) for i, x in own]
+    return [(i, extent) for i, extent in extents if 0 < extent < SMALLEST_EXTENT]
+
+
+def check_extents(positions: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
+    """Refuse a movement whose extent is too small; one that does not move at all is judged later."""
+    for i, extent in too_small(positions, offsets):
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected an extent of at least {SMALLEST_EXTENT:g}, got {extent:g}; "
+            "choose a unit in which it is"
+        )
 
 
 def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array:

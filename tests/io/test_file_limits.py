@@ -231,13 +231,13 @@ def test_a_limit_that_is_no_number_is_told_before_anything_is_read(tmp_path, mon
 
 
 @pytest.mark.parametrize("skip", ["movement", "sample"])
-def test_stamps_of_infinite_span_are_refused(skip):
+def test_stamps_out_of_range_are_refused(skip):
     good = "a,0,0\na,1,1\na,2,4\na,3,9\n"
     bad = "b,-1.5e308,0\nb,0,1\nb,1,2\nb,2,3\nb,1.5e308,4\n"
     found = read(f"id,t,x\n{good}{bad}".encode(), "a.csv", units="s", skip=skip)
-    assert found.demonstrations.lengths.tolist() == ([4] if skip == "movement" else [4, 4])
-    assert "expected times that span a finite duration, got -1.5e+308 and 1.5e+308 s" in found.problems[0].reason
-    with pytest.raises(kineme.TrajectoryError, match="trajectory 0: expected times that span a finite duration"):
+    assert found.demonstrations.lengths.tolist() == [4]  # of the other, three samples are left at most
+    assert "expected times up to 1e+50 s, got -1.5e+308 at sample 0" in found.problems[0].reason
+    with pytest.raises(kineme.TrajectoryError, match=r"trajectory 0: expected times up to 1e\+50, got -1.5e\+308"):
         kineme.Demonstrations.from_arrays([np.zeros((4, 1))], times=[np.array([-1.5e308, 0, 1, 1.5e308])])
 
 
@@ -270,3 +270,21 @@ def test_numbers_beyond_float64_are_infinite():
 def test_labels_that_are_records_are_refused():
     with pytest.raises(kineme.DataError, match="expected labels that are texts or numbers, got"):
         read(npz(positions=np.stack((X, X)), labels=np.zeros(2, [("a", "f8")])))
+
+
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ("0,1e200\n1,2\n2,3\n3,5", r"expected positions up to 1e\+100, got \[1e\+200\] at sample 0"),
+        ("0,0\n1e-60,2\n1,3\n2,5", "expected at least 1e-50 s between stamps, got 0 and 1e-60 s at sample 1"),
+        ("0,0\n1,2e-150\n2,1e-150\n3,4e-150", "expected an extent of at least 1e-100, got 4e-150"),
+    ],
+)
+def test_files_and_arrays_have_one_range(rows, reason):
+    with pytest.raises(kineme.DataError, match=reason):
+        read(f"t,x\n{rows}\n".encode(), "a.csv")
+    t, x = np.array([row.split(",") for row in rows.split("\n")], dtype=float).T
+    with pytest.raises(
+        kineme.TrajectoryError, match=reason.partition(" at ")[0].replace(" s at", " s").removesuffix(" s")
+    ):
+        kineme.Demonstrations.from_arrays([x[:, None]], times=[t])

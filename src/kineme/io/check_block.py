@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, TrajectoryError
 from kineme.io.found import Block, Problem
-from kineme.validation import MIN_SAMPLES, Array
+from kineme.validation import (
+    LARGEST_POSITION,
+    LARGEST_STAMP,
+    MIN_SAMPLES,
+    SHORTEST_STEP,
+    SMALLEST_EXTENT,
+    Array,
+    too_small,
+)
 
 Flags = NDArray[np.bool_]
 
@@ -23,8 +31,9 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
     file : str
         For the problems.
     skip : {"movement", "sample"}
-        Whether a sample that is missing, infinite, or not later than the one before costs its movement or is left
-        out alone. Movements of fewer than `MIN_SAMPLES` samples are left out in any case.
+        Whether a sample that is missing, infinite, out of range, or not later than the one before costs its movement
+        or is left out alone. Movements of fewer than `MIN_SAMPLES` samples are left out in any case, and so are those
+        whose extent is out of range; the ranges are those of `kineme.validation`.
     """
     problems: list[Problem] = []
     odd = _unusable(block, skip)
@@ -40,23 +49,27 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
         reason = f"expected at least {MIN_SAMPLES} samples, got {lengths[i]}"
         line = block.line_of(block.row(int(block.offsets[i]))) if lengths[i] and len(lengths) > 1 else None
         problems.append(Problem(file, line, _who(block, i) + reason, TrajectoryError))
-    return _take(block, lengths >= MIN_SAMPLES), sorted(problems, key=lambda problem: problem.line or 0)
+    block = _take(block, lengths >= MIN_SAMPLES)
+    good = np.ones(len(block.labels), dtype=bool)
+    for i, extent in too_small(block.positions, block.offsets):
+        reason = f"expected an extent of at least {SMALLEST_EXTENT:g}, got {extent:g}; choose another unit"
+        problems.append(Problem(file, None, _who(block, i) + reason, TrajectoryError))
+        good[i] = False
+    return _take(block, good), sorted(problems, key=lambda problem: problem.line or 0)
 
 
 def _unusable(block: Block, skip: str) -> Flags:
-    """Per sample: not finite, or not later than the sample before (than all before, where samples are left out)."""
+    """Per sample: out of range, or not later than the sample before (than all before, where samples are left out)."""
     total = len(block.positions)
-    odd: Flags = np.asarray(~np.isfinite(block.positions).all(axis=1))
+    odd: Flags = np.asarray(~(np.abs(block.positions) <= LARGEST_POSITION).all(axis=1))
     if block.faults:
         odd |= np.isin(np.arange(total) if block.rows is None else block.rows, list(block.faults))
     if block.times is None or not total:
         return odd
-    lengths = np.diff(block.offsets)
-    elapsed = block.times - np.repeat(block.times[block.offsets[:-1][lengths > 0]], lengths[lengths > 0])
     step = np.diff(block.times, prepend=-np.inf)
-    odd |= ~np.isfinite(block.times) | (np.isinf(elapsed) & np.isfinite(block.times))
+    odd |= ~(np.abs(block.times) <= LARGEST_STAMP)
     step[block.offsets[:-1][np.diff(block.offsets) > 0]] = np.inf
-    late = ~(step > 0)
+    late = ~(step >= SHORTEST_STEP)
     if skip == "sample" and (odd | late).any():
         return odd | _late_after_leaving_out(block.times, block.offsets, odd, late)
     return odd | late
@@ -70,7 +83,8 @@ def _late_after_leaving_out(times: Array, offsets: NDArray[np.intp], odd: Flags,
         rows = slice(offsets[i], offsets[i + 1])
         usable = np.where(odd[rows], -np.inf, times[rows])
         before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
-        result[rows] = ~odd[rows] & ~(usable > before)
+        with np.errstate(invalid="ignore"):  # of what is left out
+            result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
     return result
 
 
@@ -91,14 +105,19 @@ def _reason(block: Block, i: int, k: int) -> str:
     at = f" at sample {k - block.offsets[i]}"
     if not np.isfinite(block.positions[k]).all():
         return f"expected finite positions, got {block.positions[k].tolist()}{at}"
+    if np.abs(block.positions[k]).max() > LARGEST_POSITION:
+        return (
+            f"expected positions up to {LARGEST_POSITION:g}, got {block.positions[k].tolist()}{at}; choose another unit"
+        )
     times = block.times
     assert times is not None
     if not np.isfinite(times[k]):
         return f"expected finite times, got {times[k]}{at}"
-    first = times[block.offsets[i]]
-    if np.isinf(times[k] - first):
-        return f"expected times that span a finite duration, got {first:.9g} and {times[k]:.9g} s{at}"
+    if abs(times[k]) > LARGEST_STAMP:
+        return f"expected times up to {LARGEST_STAMP:g} s, got {times[k]:.9g}{at}"
     before = times[k - 1]
+    if before < times[k]:
+        return f"expected at least {SHORTEST_STEP:g} s between stamps, got {before:.9g} and {times[k]:.9g} s{at}"
     what = "duplicate" if times[k] == before else "decreasing"
     return f"expected strictly increasing times, got {what} stamps {before:.9g} and {times[k]:.9g} s{at}"
 
