@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import cache
 from threading import Lock, active_count
 from typing import Any
@@ -21,6 +21,7 @@ from kineme.forks import at_fork
 
 _blas_lock = Lock()
 _blas_holds: list[Any] = []  # one entry per active caller; the first entry is the limiter
+_limited = False  # whether the last fork held BLAS to one thread
 
 
 def n_threads() -> int:
@@ -85,17 +86,24 @@ def _quiet() -> Iterator[None]:
     """Over a fork, hold BLAS to one thread if another thread may be within it.
 
     OpenBLAS takes locks for work in several threads, and to change their number; those of a thread that is not there
-    in the child are never given back. With one thread it takes none.
+    in the child are never given back. With one thread it takes none, so the child stays with one. The limit is set
+    here and now, whoever holds one already: other libraries restore theirs without asking.
     """
-    with single_threaded_blas() if active_count() > 1 else nullcontext(), _blas_lock:
+    global _limited  # noqa: PLW0603 - told to the child
+    parent = os.getpid()
+    with _blas_lock:
+        _limited = active_count() > 1
+        limiter = _blas_controller().limit(limits=1, user_api="blas") if _limited else None
         yield
+        if limiter is not None and os.getpid() == parent:
+            limiter.restore_original_limits()
 
 
 def _in_child() -> None:
-    """Whoever held BLAS to one thread, `_quiet` or a thread that is not there, does so for the life of the child."""
+    """One more hold, which is never left: no call changes the number of threads in the child."""
     global _blas_lock  # noqa: PLW0603 - of another thread, perhaps
     _blas_lock = Lock()
-    if _blas_holds:
+    if _limited or _blas_holds:
         _blas_holds.append(None)
 
 
