@@ -13,20 +13,36 @@ import kineme
 from bench.rows import Row
 from kineme.evaluation.conditions import TOGETHER
 from kineme.evaluation.splits import few_shot
-from kineme.recognition import similarity
+from kineme.recognition import classifiers, similarity
+from kineme.recognition.perturbations import Perturbation
 from kineme.recognition.representation import DEFAULT_REPRESENTATIONS as THREE
 
 SPLITS, SEED = 5, 0
 LEVELS = {"moderately": TOGETHER[1], "strongly": TOGETHER[2]}
+DRAWS, COPIES, SHOWN = 4, 3, 4
+BENT = Perturbation(rotation=math.radians(40), warp=0.8, noise=0.1)
+
+#: Name -> width of an SVM's kernels in widths of the nearest's, parameters of `Recognizer`.
+MANY: dict[str, tuple[float, dict[str, Any]]] = {
+    "1-NN, equal weights": (2.0, {"classifier": "nearest", "weights": "equal"}),
+    "1-NN, chosen weights": (2.0, {"classifier": "nearest"}),
+    "SVM, equal weights, kernels of 1-NN": (1.0, {"classifier": "svm", "weights": "equal"}),
+    "SVM, equal weights, kernels twice as wide": (2.0, {"classifier": "svm", "weights": "equal"}),
+    "SVM, chosen weights, kernels twice as wide": (2.0, {}),
+}
 
 
 def measure(quick: bool) -> list[Row]:
     splits = 1 if quick else SPLITS
     asked = {"defaults": {}, **_options()}
-    return [
+    rows = [
         Row(f"{name}, {level}", "accuracy", accuracy(options, changes, splits))
         for name, options in asked.items()
         for level, changes in LEVELS.items()
+    ]
+    return rows + [
+        Row(f"many shown: {name}", "accuracy", many_shown(wider, options, 1 if quick else DRAWS))
+        for name, (wider, options) in MANY.items()
     ]
 
 
@@ -58,3 +74,24 @@ def accuracy(options: dict[str, Any], changes: Any, splits: int) -> float:
             recognizer = kineme.Recognizer(**given).fit(perturbed[split.train])
         found.append(recognizer.score(perturbed[split.test], demos.labels[split.test]))
     return float(np.mean(found))
+
+
+def many_shown(wider: float, options: dict[str, Any], draws: int) -> float:
+    """Twelve of each shape: three bent copies of four recordings; asked are three of each of the other three."""
+    demos = kineme.load_lasa()
+    found = []
+    for draw in range(draws):
+        rng = np.random.default_rng(draw)
+        shown = np.zeros(len(demos), bool)
+        shown[np.concatenate([7 * c + rng.permutation(7)[:SHOWN] for c in range(26)])] = True
+        copies = [BENT.apply(demos, [draw, k]) for k in range(COPIES)]
+        train, test = (_joined(copies, some) for some in (shown, ~shown))
+        with patch.object(classifiers, "_WIDER", wider):
+            found.append(kineme.Recognizer(**options).fit(train).score(test, test.labels))
+    return float(np.mean(found))
+
+
+def _joined(copies: list[kineme.Demonstrations], some: Any) -> kineme.Demonstrations:
+    every = [one for copy in copies for one in copy[some]]
+    labels = np.concatenate([copy[some].labels for copy in copies])
+    return kineme.Demonstrations.from_arrays([one.positions for one in every], labels, [one.times for one in every])
