@@ -9,6 +9,7 @@ split in two, because a tile stays in one core's cache.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -46,13 +47,16 @@ def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -
     """
     tiles = [(start, min(start + tile_rows, n_rows)) for start in range(0, n_rows, tile_rows)]
     threads = min(n_threads(), len(tiles))
-    if threads <= 1:
-        for start, stop in tiles:
-            work(start, stop)
-        return
-    with single_threaded_blas(), ThreadPoolExecutor(threads) as pool:
-        for result in [pool.submit(work, *tile) for tile in tiles]:
-            result.result()
+    # One tile too: split between threads that wait for each other, its small products take longer, and a fork
+    # meanwhile, which ends the threads of OpenBLAS, would wait for them for ever.
+    with single_threaded_blas():
+        if threads <= 1:
+            for start, stop in tiles:
+                work(start, stop)
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            for result in [pool.submit(work, *tile) for tile in tiles]:
+                result.result()
 
 
 @contextmanager
@@ -63,7 +67,7 @@ def single_threaded_blas() -> Iterator[None]:
     the second one in would save, and later restore, the first one's limit.
     """
     with _blas_lock:
-        _blas_holds.append(None if _blas_holds else _blas_controller().limit(limits=1, user_api="blas"))
+        _blas_holds.append(None if _blas_holds else _limit())
     try:
         yield
     finally:
@@ -71,11 +75,41 @@ def single_threaded_blas() -> Iterator[None]:
             first = _blas_holds[0]
             _blas_holds.pop()
             if not _blas_holds:
-                first.restore_original_limits()
+                _restore(first)
+
+
+def _limit() -> Any:
+    """Set BLAS to one thread; what restores it."""
+    controller = _blas_controller()
+    with _control(controller):
+        return controller.limit(limits=1, user_api="blas")
+
+
+def _restore(limiter: Any) -> None:
+    with _control(_blas_controller()):
+        limiter.restore_original_limits()
+
+
+@contextmanager
+def _control(controller: Any) -> Iterator[None]:
+    """Let the calling thread set limits: from release 3.7 of threadpoolctl on, all but the first do nothing."""
+    libraries = [one for one in controller.lib_controllers if hasattr(one, "clear_controlling_thread")]
+    for library in libraries:
+        library.clear_controlling_thread(force=True)
+    try:
+        yield
+    finally:
+        for library in libraries:
+            library.clear_controlling_thread(force=True)
+
+
+def _blas_controller() -> Any:
+    return _controller("scipy.linalg" in sys.modules)
 
 
 @cache
-def _blas_controller() -> Any:
+def _controller(scipy_is_loaded: bool) -> Any:
+    """Of the BLAS libraries that are loaded; SciPy brings one of its own, which comes later than NumPy's."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
@@ -93,10 +127,10 @@ def _quiet() -> Iterator[None]:
     parent = os.getpid()
     with _blas_lock:
         _limited = active_count() > 1
-        limiter = _blas_controller().limit(limits=1, user_api="blas") if _limited else None
+        limiter = _limit() if _limited else None
         yield
         if limiter is not None and os.getpid() == parent:
-            limiter.restore_original_limits()
+            _restore(limiter)
 
 
 def _in_child() -> None:

@@ -76,10 +76,27 @@ def _blas_threads():
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
 
-def test_tiles_hold_blas_to_one_thread(two_blas_threads):
+@pytest.mark.parametrize("n_tiles", [1, 2])
+def test_tiles_hold_blas_to_one_thread(two_blas_threads, n_tiles):
     seen = []
-    parallel.for_tiles(lambda start, stop: seen.append(_blas_threads()), 2, 1)
-    assert seen == [{1}, {1}]
+    parallel.for_tiles(lambda start, stop: seen.append(_blas_threads()), n_tiles, 1)
+    assert seen == [{1}] * n_tiles
+
+
+def test_every_thread_holds_blas_to_one_thread_and_gives_it_back(two_blas_threads):
+    """Whichever thread set a limit first, and though it is still there."""
+
+    def hold():
+        with parallel.single_threaded_blas():
+            return _blas_threads()
+
+    for _ in range(2):
+        assert hold() == {1}
+        with ThreadPoolExecutor(1) as pool:
+            assert pool.submit(hold).result() == {1}
+            assert _blas_threads() == {2}
+            assert hold() == {1}
+    assert _blas_threads() == {2}
 
 
 def test_the_threads_of_blas_are_as_before_after_concurrent_learners(monkeypatch, two_blas_threads, ragged):
