@@ -63,6 +63,13 @@ def test_names_in_any_language_are_left_alone(name):
     assert printable(name) == name
 
 
+@pytest.mark.parametrize("mark", ["\u034f", "\u115f", "\u1160", "\u17b4", "\u17b5", "\u2800", "\u3164", "\uffa0"])
+def test_marks_without_ink_are_written_out(mark):
+    """Unicode counts them as printable; two names that differ in them alone would look the same."""
+    assert mark.isprintable()
+    assert printable(f"wave{mark}1") == f"wave\\u{ord(mark):04x}1"
+
+
 @pytest.mark.parametrize("name", HOSTILE)
 def test_every_way_of_showing_a_name_is_harmless(name):
     table = Table(name, (name, "n"), [(name, "1"), ("x", name)], name)

@@ -7,7 +7,8 @@ so small work stays with the twin. The environment variable ``KINEME_COMPILED`` 
 Numba's modules import each other in circles. Two threads that enter the circle at different places wait for each
 other's import; Python breaks the deadlock by failing one of them, and leaves behind a Numba that never works again in
 that process. Therefore everything that imports Numba, or a module with compiled functions, does so here, under one
-lock and by Numba's front door: a thread that says ``import numba`` on its own then waits for us, or we for it.
+lock, and imports the package ``numba`` before any of its modules: Python lets a thread that imports the same package
+elsewhere wait until that import is done.
 """
 
 from __future__ import annotations

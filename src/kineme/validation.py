@@ -24,6 +24,9 @@ MOST_NUMBERS = 50_000_000  # samples times basis functions: what generates a mov
 #: What a movement may measure, in its unit: accelerations, and squares of positions and extents, then stay numbers.
 LARGEST_POSITION, SMALLEST_EXTENT = LARGEST, 1 / LARGEST
 SHORTEST_STEP, LARGEST_STAMP = 1e-50, 1e50  # seconds
+_EPS = np.finfo(np.float64).eps
+_NEAR_ZERO = 1e4 * SHORTEST_STEP / _EPS  # two different stamps farther from 0 are more than the shortest step apart
+_SMALL_POSITION = SMALLEST_EXTENT / _EPS  # a movement that comes farther from 0 cannot have a smaller extent
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -123,7 +126,9 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
-    increasing = times[1:] - times[:-1] >= SHORTEST_STEP
+    increasing = times[1:] > times[:-1]  # a pass without a temporary as large as the stamps
+    near = np.flatnonzero((times[:-1] < _NEAR_ZERO) & (times[:-1] > -_NEAR_ZERO))
+    increasing[near] = times[near + 1] - times[near] >= SHORTEST_STEP
     increasing[offsets[1:-1] - 1] = True  # from one movement to the next
     if increasing.all():
         return
@@ -144,11 +149,12 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
     """Movements so small that the squares of their positions are no numbers, with their extents."""
-    probes = offsets[:-1], (offsets[:-1] + offsets[1:]) // 2, offsets[1:] - 1
-    suspects = np.ones(len(offsets) - 1, dtype=bool)
-    for probe in probes:  # three samples clear the usual movement
-        suspects &= np.abs(positions[probe]).max(axis=1) < SMALLEST_EXTENT / np.finfo(float).eps
-    own = [(int(i), positions[offsets[i] : offsets[i + 1]]) for i in np.flatnonzero(suspects)]
+    suspects = np.arange(len(offsets) - 1)
+    for probe in (offsets[1:] - 1, offsets[:-1], (offsets[:-1] + offsets[1:]) // 2):  # the first clears the usual one
+        suspects = suspects[(np.abs(positions[probe[suspects]]) < _SMALL_POSITION).all(axis=1)]
+        if not len(suspects):
+            return []
+    own = [(int(i), positions[offsets[i] : offsets[i + 1]]) for i in suspects]
     extents = [(i, float(np.ptp(x, axis=0).max())) for i, x in own]
     return [(i, extent) for i, extent in extents if 0 < extent < SMALLEST_EXTENT]
 

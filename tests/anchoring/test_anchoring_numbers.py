@@ -7,8 +7,11 @@ import pytest
 from sklearn.utils import Bunch
 from unlabeled_samples import draw_kinds
 
-from kineme import DMP, Demonstrations
+from kineme import DMP, Demonstrations, Recognizer
+from kineme.anchoring import count, revise
 from kineme.anchoring.morph import morph
+from kineme.anchoring.place import agreement
+from kineme.anchoring.revise import Split, suggest_splits
 from kineme.anchoring.seen import see
 from kineme.anchoring.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.spread import radii, spread_sample
@@ -90,3 +93,30 @@ def test_a_sample_leaves_out_no_rare_kind():
         sample, _ = spread_sample(seen, 80, seed)
         assert len(sample) == 80
         assert (sample >= 600).any(), seed
+
+
+@pytest.mark.parametrize(("stability", "found"), [(0.96, 3), (0.94, 2)])
+def test_of_numbers_of_kinds_as_stable_as_the_most_stable_the_best_fit_is_taken(stability, found, monkeypatch):
+    """As stable: within 0.05 of the adjusted Rand index."""
+    stable, fitting = {2: 1.0, 3: stability, 4: 0.5}, {2: 0.4, 3: 0.6, 4: 0.9}
+    monkeypatch.setattr(count, "mean_silhouettes", lambda _, whole: np.array([fitting[one.max() + 1] for one in whole]))
+    monkeypatch.setattr(count, "_agreement", lambda *given: np.array([stable[c] for c in given[2]]))
+    points = np.random.default_rng(0).uniform(size=8)
+    assert count.count_kinds(np.abs(points[:, None] - points)) == found
+
+
+@pytest.mark.parametrize(("stability", "n"), [(0.74, 0), (0.76, 1)])
+def test_a_symbol_is_split_into_parts_with_a_stability_of_three_quarters(stability, n, monkeypatch):
+    def in_two(name, seen, places, widths):
+        return Split(name, (places[:2], places[2:]), 0.1, stability)
+
+    monkeypatch.setattr(revise, "_in_two", in_two)
+    assert len(suggest_splits(draw_kinds([4, 1]), [0, 0, 0, 0, 1])) == n
+
+
+def test_symbols_shown_once_agree_up_to_six_tenths_of_the_way_to_the_nearest_other():
+    known = Recognizer().fit(draw_kinds([1] * 6), list("abcdef"))
+    K = np.exp(known.log_similarity(known.demonstrations_))
+    np.fill_diagonal(K, 0.0)
+    away = np.sqrt(-2.0 * np.log(K.max(axis=1)))
+    assert agreement(known) == pytest.approx(np.exp(-0.5 * (0.6 * np.median(away)) ** 2), rel=1e-3)

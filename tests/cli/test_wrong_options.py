@@ -108,3 +108,12 @@ def test_a_wrong_option_is_refused_by_name(folder, command, option):
         assert "Traceback" not in said
         assert any(name in said for name in names | _shown(value)), (value, said)
         assert not done.stdout.startswith(("{", "time")), value  # nothing that a robot could take for a movement
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999"])
+@pytest.mark.parametrize("option", ["--duration", "--rate", "--settle", "--start", "--goal"])
+def test_a_number_that_is_not_finite_is_a_mistake_of_typing(folder, option, value):
+    """Status 2, before anything is read."""
+    done = run("generate", "g.csv", option, value, cwd=folder)
+    assert done.returncode == 2, done
+    assert f"got '{value}'" in done.stderr

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.io import limits
 from kineme.io.layout import Layout
 from kineme.io.limits import VARIABLE, max_file_bytes
 from kineme.io.recordings import read_recordings, read_recordings_from_bytes
@@ -52,6 +53,18 @@ def headed(shape="(6, 2)", descr="'<f8'", body=BODY, order="False"):
     """A .npy file with any header."""
     head = f"{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}}}".encode()
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + body
+
+
+@pytest.mark.parametrize(
+    ("memory", "limit"), [(2**31, 2**30), (2**32, 2**31), (2**33, 2**32), (2**38, 2**32), (-1, 2**32)]
+)
+def test_the_default_is_four_gib_or_half_of_the_memory(memory, limit, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    pages = {"SC_PHYS_PAGES": memory // 4096 if memory > 0 else -1, "SC_PAGE_SIZE": 4096}
+    monkeypatch.setattr(limits.os, "sysconf", pages.__getitem__, raising=False)
+    limits._by_default.cache_clear()
+    assert max_file_bytes() == limit
+    limits._by_default.cache_clear()
 
 
 def test_the_limit_has_a_default_and_can_be_set(monkeypatch):

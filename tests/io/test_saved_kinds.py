@@ -99,11 +99,12 @@ def test_a_truncated_file_is_refused(tmp_path, kind, kept):
 
 
 def _rewrite(path, **changes):
-    """Replace arrays of a saved file, or drop those that are None, or change the specification."""
+    """Replace arrays of a saved file, or drop those that are None, or change the specification or the header."""
     with np.load(path) as archive:
         arrays = dict(archive)
     header = json.loads(arrays.pop("header").tobytes())
     header["dmp"] |= changes.pop("dmp", {})
+    header |= changes.pop("header", {})
     arrays = {name: value for name, value in (arrays | changes).items() if value is not None}
     with path.open("wb") as file:
         np.savez(file, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), **arrays)
@@ -117,6 +118,11 @@ def _rewrite(path, **changes):
         ("rhythmic primitives", {"baselines": np.full((3, 2), np.nan)}, "baselines should be finite"),
         ("rhythmic primitives", {"scaled_weights": np.ones(3)}, "KeyError"),
         ("rhythmic primitives", {"dmp": {"formulation": "original"}}, "formulation"),
+        ("primitives", {"header": {"names": ["one", "two"]}}, "names should be a list of 3 texts"),
+        ("primitives", {"header": {"names": "one"}}, "names should be a list of 3 texts"),
+        ("primitives", {"header": {"names": ["one", "two", 3]}}, "names should be a list of 3 texts"),
+        ("primitives", {"header": {"labels": ["a", "b"]}}, "labels should be a list of 3 texts or numbers"),
+        ("primitives", {"header": {"labels": ["a", "b", ["c"]]}}, "labels should be a list of 3 texts or numbers"),
         ("pose primitives", {"references": None}, "references"),
         ("pose primitives", {"references": np.ones((2, 4))}, r"references should be finite .* of shape \(3, 4\)"),
         ("pose primitives", {"references": np.ones((3, 4))}, "unit quaternion"),

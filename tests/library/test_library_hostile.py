@@ -17,7 +17,7 @@ from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
 from kineme.library import guard
-from kineme.library.connection import FILE
+from kineme.library.connection import FILE, connect
 
 
 @pytest.fixture(scope="module")
@@ -214,3 +214,20 @@ def _make_endless(path, table="feature", levels=10):
     data[(numbers[-1] - 1) * size :] = leaf
     data[28:32] = (pages + levels).to_bytes(4, "big")
     path.write_bytes(data)
+
+
+@pytest.mark.parametrize("mode", ["ro", "rw"])
+def test_what_a_file_defines_is_never_trusted(victim, tmp_path, mode):
+    """By SQLite's own switches too, should a definition slip past the comparison."""
+    path = copy_of(victim / FILE, tmp_path / FILE)
+    with closing(connect(path, mode, 1.0)) as connection:
+        assert connection.execute("PRAGMA trusted_schema").fetchone() == (0,)
+        assert connection.execute("PRAGMA cell_size_check").fetchone() == (1,)
+        if hasattr(connection, "getconfig"):  # from Python 3.12 on
+            assert not any(connection.getconfig(getattr(sqlite3, name)) for name in guard._OFF)
+        guard.defend_foreign(connection, path)
+        assert connection.execute("PRAGMA query_only").fetchone() == (1,)
+        assert connection.getlimit(sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH) == 0
+        assert connection.getlimit(sqlite3.SQLITE_LIMIT_LENGTH) == max(1 << 20, path.stat().st_size)
+        with pytest.raises(sqlite3.OperationalError, match="too many attached"):
+            connection.execute("ATTACH ':memory:' AS other")

@@ -110,6 +110,20 @@ def wandering_full_turn():
     return product(exp(angle * [0, 0, 1.0]), exp(side * [1.0, 0, 0]))
 
 
+@pytest.mark.parametrize(("angle", "good"), [(3.0, True), (5.1, True), (5.3, False), (6.0, False)])
+def test_a_rotation_vector_may_move_five_times_as_far_as_the_orientation(angle, good):
+    """``(t / 2) / sin(t / 2)`` where only the axis turns: 5 at t = 5.2."""
+    turned = np.linspace(0.0, np.pi / 2, 5)[:, None]
+    around = angle * np.concatenate((np.cos(turned), np.sin(turned), 0 * turned), axis=1)
+    back = np.linspace(angle, 0.0, 60)[1:, None] * [0.0, 1.0, 0.0]
+    movement = exp(np.concatenate((around, back)))
+    if good:
+        np.testing.assert_allclose(np.linalg.norm(vectors(movement)[:5], axis=1), angle, rtol=1e-9)
+        return
+    with pytest.raises(TrajectoryError, match="jumps by"):
+        vectors(movement)
+
+
 @pytest.mark.parametrize(
     ("movements", "message"),
     [

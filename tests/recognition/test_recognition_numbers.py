@@ -13,7 +13,7 @@ from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.kernels.procrustes import Prepared
 from kineme.recognition.choice import CANDIDATES, aligned_weights
 from kineme.recognition.classifiers import Nearest, SupportVectors, choose
-from kineme.recognition.conformal import calibrate
+from kineme.recognition.conformal import Calibration, calibrate, typical_scale
 from kineme.recognition.decision import Decision
 from kineme.recognition.hypotheses import Early, known_hypotheses
 from kineme.recognition.perturbations import Perturbation
@@ -30,6 +30,26 @@ def test_of_four_demonstrations_the_own_scale_counts_half():
     own = np.array([logs[i, i // 4 * 4 : i // 4 * 4 + 4].max() for i in range(24)])
     means = np.sqrt(-2.0 * own).reshape(6, 4).mean(axis=1)
     np.testing.assert_allclose(calibrate(recognizer).scales, 0.5 * means + 0.5 * means.mean(), rtol=1e-3)
+
+
+def test_what_is_not_calibrated_is_unknown_beyond_six_tenths_of_the_way_to_another_class():
+    none = (np.empty(0),)
+    guess = Calibration(np.array([typical_scale(np.array([1.0, 2.0, 3.0]))]), none, none)
+    logs = -0.5 * (2.0 * np.array([[0.59], [0.6], [0.61]])) ** 2
+    p = guess.p_values(logs, 0.05)[:, 0]
+    assert p[1] == pytest.approx(0.05)
+    assert p[0] > 0.05 > p[2]
+
+
+def test_copies_of_one_movement_have_a_scale():
+    """A millionth of a kernel width: a copy is a member, what differs at all is not."""
+    demos = draw_shapes([1] * 3, seed=3)
+    copies = demos[[0, 0, 1, 1, 2, 2]]
+    recognizer = Recognizer(classifier="nearest", weights="equal").fit(copies, list("aabbcc"))
+    scales = calibrate(recognizer).scales
+    np.testing.assert_array_less(scales, 1e-3)  # single precision: copies are not quite at 0
+    np.testing.assert_array_less(0.999e-6, scales)
+    assert (recognizer.p_values(copies)[range(6), [0, 0, 1, 1, 2, 2]] > 0.05).all()
 
 
 def test_a_typical_impostor_counts_exp_of_minus_four():

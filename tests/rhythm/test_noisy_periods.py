@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import RhythmicDMP, Trajectory
+from kineme.rhythm import periods
 from kineme.rhythm.periods import candidates, find_cycles
 
 
@@ -76,3 +77,15 @@ def test_stamps_at_random_times_are_learned_with_their_noise():
         x = np.stack((np.sin(2 * np.pi * t), 0.5 * np.cos(4 * np.pi * t + 1)), axis=1)
         movements.append(Trajectory(t, x + 0.06 * rng.normal(size=x.shape)))
     np.testing.assert_allclose(RhythmicDMP().learn(movements).periods, 1.0, rtol=0.01)
+
+
+@pytest.mark.parametrize(("second", "n"), [(106, 1), (115, 2)])
+def test_a_valley_is_the_lowest_place_within_a_tenth_of_its_lag(second, n, monkeypatch):
+    """Of two places 6 % apart the lower one counts, 15 % apart both do."""
+    lag = np.arange(600)
+    distance = np.minimum(lag / 30.0, 1.0)
+    for at, depth in ((100, 0.5), (second, 0.6)):
+        distance -= depth * np.exp(-0.5 * ((lag - at) / 1.5) ** 2)
+    monkeypatch.setattr(periods, "dissimilarity", lambda rows: distance[None])
+    found = candidates(np.zeros((1, 1, 600)), np.array([600]))[0]
+    np.testing.assert_allclose(599 / found[np.isfinite(found)], [100, second][2 - n :], atol=1.0)

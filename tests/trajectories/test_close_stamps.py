@@ -121,3 +121,14 @@ def test_smooth_movements_lose_nothing_by_it(make_movement):
     exact = Demonstrations.from_arrays([np.sin(k * t[:, None] / t[-1])], times=[t])
     even = preprocess(exact, [Resample(300)]).positions
     np.testing.assert_allclose(even, np.sin(k * np.linspace(0, 1, 300)[:, None]), atol=1e-6)
+
+
+def test_a_group_is_shorter_than_a_tenth_of_a_step():
+    """Close samples that follow each other for half a step become five, not one."""
+    times = np.concatenate((np.arange(10.0), 9.0 + np.arange(1, 26) * 0.02, np.arange(10.0, 20.0)))
+    merged = merge_close(times, times[:, None], np.array([0, len(times)]))
+    assert merged is not None
+    inside = merged[0][(merged[0] >= 9.0) & (merged[0] <= 9.5)]
+    assert len(inside) in {5, 6}
+    assert np.diff(inside).max() < 0.12
+    assert len(merged[0]) == len(times) - 26 + len(inside)

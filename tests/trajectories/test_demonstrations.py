@@ -166,3 +166,13 @@ def test_labels_are_returned_or_asked_for(demos):
         TrajectoryError, match=r"expected labeled demonstrations.*pass labels= to Demonstrations.from_arrays"
     ):
         require_labels(Demonstrations.from_arrays([np.arange(5.0)]))
+
+
+@pytest.mark.parametrize("odd", [0, 700, 799])
+def test_one_uneven_movement_among_many_is_noticed(odd):
+    """Stamps are looked at some thousands at a time."""
+    times = np.tile(np.linspace(0.0, 1.0, 100), (800, 1))
+    positions = np.zeros((800, 100, 1)) + times[:, :, None]
+    assert Demonstrations.from_arrays(positions, times=list(times)).even_length == 100
+    times[odd, 50] += 1e-4
+    assert Demonstrations.from_arrays(positions, times=list(times)).even_length is None

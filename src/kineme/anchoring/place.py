@@ -17,6 +17,7 @@ from kineme.anchoring.similarities import compare
 from kineme.anchoring.spread import assign, largest_clustered, spread_sample
 from kineme.anchoring.tree import average_linkage, cut_at
 from kineme.recognition.answer import known_labels
+from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.recognizer import Recognizer
 from kineme.sampling import evenly_spaced
@@ -24,7 +25,6 @@ from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_count
 
 _REPEATS = 20
-_REACH = 0.6  # of the distance to an impostor, where no symbol shows how far its members are from each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def agreement(known: Recognizer) -> float:
     if several.any():
         return 0.5 * (float(np.median(np.diag(means)[several])) + apart)
     nearest = np.where(own[:, None] == own, 0.0, K).max(axis=1)
-    reach = _REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
+    reach = REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
     return float(np.exp(-0.5 * np.median(reach) ** 2))
 
 

@@ -39,11 +39,16 @@ def replaced(path: Path) -> Iterator[Path]:
     beside = name_beside(path)
     try:
         yield beside
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
+        bring_to_disk(beside)
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def bring_to_disk(path: Path) -> None:
+    """Return once the bytes of a file are on the disk, where a power cut leaves them."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def name_beside(path: Path) -> Path:

@@ -69,8 +69,8 @@ class Detected(NamedTuple):
     ignored: tuple[str, ...] = ()
 
 
-def _no_lines(row: int) -> None:
-    return None
+def no_lines(row: int) -> None:
+    """The line of every row of a file that has no lines: None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class Block:
     labels: list[str | None]
     places: list[str]
     rows: NDArray[np.intp] | None = None
-    line_of: Callable[[int], int | None] = _no_lines
+    line_of: Callable[[int], int | None] = no_lines
     faults: dict[int, str] | None = None
 
     def row(self, k: int) -> int:

@@ -12,15 +12,12 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.io.columns import Roles, choose_roles
 from kineme.io.dates import nanoseconds
+from kineme.io.found import no_lines
 from kineme.io.layout import Layout
 from kineme.io.limits import check_expanded
 from kineme.io.table import Table
 
 _ROWS = 2**18  # that are expanded together
-
-
-def _no_lines(row: int) -> None:
-    return None
 
 
 def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
@@ -59,7 +56,7 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         raise DataError("expected samples, got a table without rows")
     columns = [read.get(k) for k in range(len(heads))]
     dated = roles.time is not None and kinds[roles.time] == "date"
-    return Table(heads, columns, table.num_rows, _no_lines, dates_in="ns" if dated else None), roles
+    return Table(heads, columns, table.num_rows, no_lines, dates_in="ns" if dated else None), roles
 
 
 def _kind(pa: Any, kind: Any) -> str:

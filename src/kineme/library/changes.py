@@ -11,8 +11,9 @@ from kineme.errors import SpecificationError
 from kineme.library.read import as_ids
 from kineme.library.rows import Row, among, check_size, listed, next_key, parsed_column, select
 from kineme.library.schema import COLUMNS, MAX_DOCUMENT
-from kineme.library.store import NOW, Change, Store
+from kineme.library.store import NOW, Store
 from kineme.library.symbols import HOW, check_name, join, make, state_of
+from kineme.library.versions import Change
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]

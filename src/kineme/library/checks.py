@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from kineme.library.schema import COUNTED, MAX_DOCUMENT, MAX_TEXT
+from kineme.library.schema import COUNTED, LARGEST_ID, MAX_DOCUMENT, MAX_TEXT
 from kineme.validation import MIN_SAMPLES
 
-_LARGEST = (1 << 62) - 1
 _LARGEST_REAL = "1.7976931348623157e308"
 
 
@@ -24,8 +23,8 @@ class Check(NamedTuple):
     quick: str = ""
 
 
-def _whole(name: str, least: int = 1, most: int = _LARGEST) -> Check:
-    limits = f"a whole number from {least}" if most == _LARGEST else f"a whole number from {least} to {most}"
+def _whole(name: str, least: int = 1, most: int = LARGEST_ID) -> Check:
+    limits = f"a whole number from {least}" if most == LARGEST_ID else f"a whole number from {least} to {most}"
     return Check(f"typeof({name}) = 'integer' AND {name} BETWEEN {least} AND {most}", limits)
 
 

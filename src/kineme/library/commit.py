@@ -12,8 +12,9 @@ from kineme.library.known import Batch, Known, look_up
 from kineme.library.pack import evenly_sampled, pack
 from kineme.library.rows import Row, among, as_text, listed, next_key
 from kineme.library.source import Source
-from kineme.library.store import Change, Store
+from kineme.library.store import Store
 from kineme.library.symbols import join, keys_by_name
+from kineme.library.versions import Change
 from kineme.trajectories.demonstrations import Demonstrations
 
 

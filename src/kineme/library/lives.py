@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.schema import COUNTED
+from kineme.library.schema import COUNTED, LARGEST_ID
 
 Whole = NDArray[np.int64]
 Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
-
-_EVER = (1 << 62) - 1
 
 
 def lives(connection: sqlite3.Connection) -> Found:
@@ -53,14 +51,14 @@ def _table(connection: sqlite3.Connection, query: str, width: int) -> Whole:
 
 def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Whole:
     """Rows (key, whose, added, removed), ordered by whose life it is, then by time."""
-    query = f"SELECT id, {whose}, added, coalesce(removed, {_EVER}) FROM {table} WHERE {whose} IS NOT NULL"
+    query = f"SELECT id, {whose}, added, coalesce(removed, {LARGEST_ID}) FROM {table} WHERE {whose} IS NOT NULL"
     rows = _table(connection, query, 4)
     return rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1]))]
 
 
 def _named(connection: sqlite3.Connection) -> Whole:
     """As `_columns`, for names: each gets a number."""
-    rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {_EVER}) FROM symbol_state").fetchall()
+    rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
     numbers: dict[str, int] = {}
     found = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
     table = np.array(found, dtype=np.int64).reshape(-1, 4)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from kineme.io.atomic import bring_to_disk, name_beside
 from kineme.library.schema import APPLICATION_ID
 
 LOGS = ("-wal", "-journal")  # ends of the names of the files beside a database from which SQLite changes it
@@ -30,11 +30,10 @@ def placed(target: Path) -> Iterator[Path]:
     if target.exists():
         raise FileExistsError(target)
     _sweep(target.parent)
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    beside = name_beside(target)
     try:
         yield beside
-        with beside.open("rb+") as file:
-            os.fsync(file.fileno())
+        bring_to_disk(beside)
         _name(beside, target)
         _sync_folder(target.parent)
     finally:
@@ -43,7 +42,10 @@ def placed(target: Path) -> Iterator[Path]:
 
 
 def _sweep(folder: Path) -> None:
-    """Delete what processes left that were killed here more than a day ago; nobody would ever read it."""
+    """Delete what processes left that were killed here more than a day ago; nobody would ever read it.
+
+    Unlike `remove_leftovers`, for libraries of any name: an export often has a name that is never used again.
+    """
     for path in folder.glob(".*"):
         with suppress(OSError):  # another process was faster, or it is not ours to delete
             if _LEFT.fullmatch(path.name) and time.time() - path.lstat().st_mtime > _DAY and _is_ours(path):

@@ -9,6 +9,7 @@ from __future__ import annotations
 APPLICATION_ID = 0x6B696E65  # "kine", in the header of the file
 SCHEMA_VERSION = 1
 MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # bytes of a name, and of a description or JSON
+LARGEST_ID = (1 << 62) - 1  # of versions and rows: one more is still a number to SQLite and NumPy
 PAGE_SIZE = 32768  # a row of features fills a seventh of it or less, so little of a page stays empty
 
 #: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.

@@ -12,13 +12,14 @@ from kineme.library.rows import parsed
 from kineme.primitives.dmp import DMP
 from kineme.primitives.persistence import specification_from_dict, specification_to_dict
 from kineme.recognition.normalization import Normalization
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation
-from kineme.validation import check_choice, check_count, check_number
+from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.trajectories.smooth import Smooth
+from kineme.validation import check_choice, check_number
 
 if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
-_MOST = 100_000  # dimensions, points, basis functions: of more, one matrix would not fit into any memory
+_MOST = 100_000  # dimensions
 
 #: The primitives of a library: a fit of the path itself, which replays what was shown.
 DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
@@ -43,13 +44,22 @@ class Specification:
 
     @classmethod
     def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
-        """From a recognizer, fitted or not, and a DMP; None for the defaults."""
+        """From a recognizer, fitted or not, and a DMP; None for the defaults.
+
+        Raises
+        ------
+        SpecificationError
+            A parameter of the recognizer that no movement could be recognized with.
+        """
         names = {one.name for one in fields(cls)} - {"dmp"}
         chosen: dict[str, Any] = {} if recognizer is None else {name: getattr(recognizer, name) for name in names}
-        chosen["representations"] = tuple(chosen.get("representations") or DEFAULT_REPRESENTATIONS)
+        given = chosen.get("representations")
+        chosen["representations"] = DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
         if not isinstance(weights := chosen.get("weights", "auto"), str):
             chosen["weights"] = tuple(map(float, weights))
-        return cls(**chosen, dmp=dmp or DEFAULT_DMP)
+        made = cls(**chosen, dmp=dmp or DEFAULT_DMP)
+        made.check()
+        return made
 
     @property
     def normalization(self) -> Normalization:
@@ -77,8 +87,6 @@ class Specification:
         """What `to_json` wrote into the library at `path`; every parameter is checked as if a user had typed it."""
         try:
             seen, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
-            _check_sizes(seen, "recognizer")
-            _check_sizes(dmp, "dmp")
             seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
             if isinstance(weights := seen.get("weights"), list):
                 seen["weights"] = tuple(map(float, weights))
@@ -93,21 +101,13 @@ class Specification:
         return made
 
     def check(self) -> None:
-        """Refuse what no recognizer could be made with; a `DMP` has been checked when it was made."""
-        if not self.representations:
-            raise SpecificationError("expected at least one representation, got none")
-        for one in self.representations:
-            check_count("n_points", one.n_points, 2)
-            check_count("n_basis", one.n_basis, 3)
-            check_number("stiffness", one.stiffness, above=0.0)
-            check_number("ridge", one.ridge, least=0.0)
+        """Refuse what no recognizer could be made with; each representation and the DMP check themselves."""
+        check_representations(self.representations)
+        _ = self.normalization  # checks translation and scale
         if self.max_angle is not None:
             check_number("max_angle", self.max_angle, least=0.0)
         if self.cutoff is not None:
-            check_number("cutoff", self.cutoff, above=0.0)
-        if not isinstance(self.translation, bool):
-            raise SpecificationError(f"expected translation to be true or false, got {self.translation!r}")
-        _ = self.normalization  # checks the scale
+            Smooth(self.cutoff)  # checks its own parameter
         self._check_choices()
 
     def _check_choices(self) -> None:
@@ -123,15 +123,6 @@ class Specification:
         else:
             for weight in self.weights:
                 check_number("weights", weight, least=0.0)
-
-
-def _check_sizes(data: Any, name: str) -> None:
-    """Refuse whole numbers of which a matrix would fit into no memory: points, basis functions."""
-    if isinstance(data, dict | list):
-        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-            _check_sizes(value, f"{name}.{key}")
-    elif isinstance(data, int) and abs(data) > _MOST:
-        raise SpecificationError(f"expected {name} to be at most {_MOST}, got {data}")
 
 
 def as_n_dims(text: str, path: Path) -> int:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import sqlite3
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from numbers import Integral
 from pathlib import Path
@@ -19,44 +18,12 @@ from kineme.library import over_forks
 from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
 from kineme.library.faults import in_plain_words
 from kineme.library.guard import size_of
-from kineme.library.rows import Row, damage, damaged, insert, retire, select
-from kineme.library.schema import COUNTED, META, SCHEMA_VERSION
+from kineme.library.rows import damage, insert, select
+from kineme.library.schema import COUNTED, LARGEST_ID, META, SCHEMA_VERSION
 from kineme.library.specification import Specification, as_n_dims
+from kineme.library.versions import Change, Moment, moment_at
 
-NOW = (1 << 62) - 1  # later than every version: what is there now
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A version, and how many rows are alive at it: by that count, rows that damage has hidden are missed."""
-
-    version: int
-    movements: int = 0
-    members: int = 0
-    symbols: int = 0
-
-
-@dataclass(frozen=True)
-class Change:
-    """One transaction under way."""
-
-    connection: sqlite3.Connection
-    version: int
-    counts: dict[str, int]
-
-    def insert(self, table: str, rows: Sequence[Row]) -> None:
-        """Add rows to a table."""
-        insert(self.connection, table, rows)
-        self._count(table, len(rows))
-
-    def retire(self, table: str, rows: Sequence[Row]) -> None:
-        """Remove rows, as they were selected, from this version on."""
-        retire(self.connection, table, rows, self.version)
-        self._count(table, -len(rows))
-
-    def _count(self, table: str, more: int) -> None:
-        if table in COUNTED:
-            self.counts[COUNTED[table]] += more
+NOW = LARGEST_ID  # later than every version: what is there now
 
 
 class Store:
@@ -208,13 +175,7 @@ class Store:
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
         """The version that is shown, which stays the same while others are added."""
-        last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": self.as_of}).fetchone()[0]
-        if last is None:
-            return Moment(0)
-        rows = select(connection, "version", "id = :last", {"last": last})
-        if not rows:
-            raise damaged("version", (last,))
-        return Moment(last, *rows[0][4:])
+        return moment_at(connection, self.as_of)
 
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.library.rows import ALIVE, Row, among, check_size, damage, damaged, listed, next_key, parsed_column, select
 from kineme.library.schema import COLUMNS, MAX_TEXT
-from kineme.library.store import Change, Moment, Store
+from kineme.library.store import Store
+from kineme.library.versions import Change, Moment
 
 _ALIKE = 100  # characters by which names are alike: the search takes their square
 

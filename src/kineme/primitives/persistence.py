@@ -86,7 +86,7 @@ def _one_each(n: int, header: dict[str, Any], name: str) -> list[Any] | None:
     if given is not None and (
         not isinstance(given, list) or len(given) != n or not all(isinstance(one, allowed) for one in given)
     ):
-        raise ValueError(f"{name} should be {n} texts")
+        raise ValueError(f"{name} should be a list of {n} {'texts' if name == 'names' else 'texts or numbers'}")
     return given
 
 

@@ -15,7 +15,16 @@ from kineme.parallel import for_tiles
 from kineme.primitives.batch import Batch
 from kineme.primitives.operators import decoder
 from kineme.trajectories.demonstrations import Demonstrations
-from kineme.validation import LARGEST, Array, as_numbers, check_number, check_samples, describe
+from kineme.validation import (
+    LARGEST,
+    LARGEST_STAMP,
+    SHORTEST_STEP,
+    Array,
+    as_numbers,
+    check_number,
+    check_samples,
+    describe,
+)
 
 if TYPE_CHECKING:
     from kineme.primitives.dmp import DMP
@@ -24,7 +33,6 @@ if TYPE_CHECKING:
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
 _LONGEST = 10.0  # durations after which a movement that has not settled will not
 _SETTLING_SAMPLES = 400
-_LONGEST_TIME = 1e50  # seconds; accelerations divide by its square
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,11 +161,11 @@ def rollout(
 
 def check_durations(name: str, durations: Array) -> None:
     """Refuse durations of 0 seconds or less, and those whose squares leave the range of numbers."""
-    usable = (durations >= 1 / _LONGEST_TIME) & (durations <= _LONGEST_TIME)
+    usable = (durations >= SHORTEST_STEP) & (durations <= LARGEST_STAMP)
     if usable.all():
         return
     i = int(np.argmin(usable))
-    between = "" if durations[i] <= 0 else f" and from {1 / _LONGEST_TIME:g} to {_LONGEST_TIME:g}"
+    between = "" if durations[i] <= 0 else f" and from {SHORTEST_STEP:g} to {LARGEST_STAMP:g}"
     raise SpecificationError(f"expected {name} above 0 seconds{between}, got {durations[i]:g} for movement {i}")
 
 

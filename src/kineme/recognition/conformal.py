@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spread
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
 _LEAST = 1e-6  # smallest scale, in kernel widths: demonstrations may be copies of each other
-_REACH = 0.6  # of the typical distance to another class: within it, 95 % of members are expected without calibration
+#: Of the typical distance to another class: within it, 95 % of members are expected where nothing calibrates.
+REACH = 0.6
 
 
 def check_error_rate(error_rate: float) -> None:
@@ -129,7 +130,7 @@ def calibrate(recognizer: Recognizer) -> Calibration:
 
 def typical_scale(impostors: Array) -> float:
     """The scale of classes shown once, from distances of demonstrations to the nearest other class."""
-    return _REACH * float(np.median(impostors)) * math.sqrt(math.pi / 4 / math.log(20))
+    return REACH * float(np.median(impostors)) * math.sqrt(math.pi / 4 / math.log(20))
 
 
 @dataclass(frozen=True, eq=False)

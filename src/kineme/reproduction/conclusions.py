@@ -14,7 +14,7 @@ ByColumn = Mapping[str, Sequence[float]]
 _DIGITS = 0.001  # the paper prints three digits, and cuts rather than rounds: 0.740 for 20/27
 _ALIKE = 1.5  # the largest factor between two widths that are alike
 _LOST = 0.1  # an accuracy that is lower by this much has fallen
-_MOST = 0.5
+_MOST = 0.5  # share of the multipliers at their bound above which the bound is the reason
 _NUMBERS = ("no", "one", "two", "three", "four")
 
 
@@ -51,8 +51,10 @@ def read_counts(accuracies: Sequence[float], counted: int, drawn: int) -> str:
     """How many movements the paper's accuracies speak of: those that it counts, or those of our draws."""
     both = {n: multiples(accuracies, n) for n in (drawn, counted)}
     neither = [f"{value:.3f}" for value in accuracies if all(value not in some for some in both.values())]
-    said = f"The paper counts {counted} movements. Of its {len(accuracies)} accuracies in Tables 2 and 4, "
-    said += f"{len(both[drawn])} are multiples of 1/{drawn} and {len(both[counted])} are multiples of 1/{counted}"
+    said = (
+        f"The paper counts {counted} movements. Of its {len(accuracies)} accuracies in Tables 2 and 4, "
+        f"{len(both[drawn])} are multiples of 1/{drawn} and {len(both[counted])} are multiples of 1/{counted}"
+    )
     return f"{said}; {listed(neither)} of neither." if neither else f"{said}."
 
 
@@ -149,13 +151,15 @@ def read_penalty(
         if high - low < _LOST:
             said.append(f"{kernel} does not fall: {low:.3f} at C = {smallest:g}.")
             continue
-        text = f"{kernel} falls from {high:.3f} at C = {largest:g} to {low:.3f} at C = {smallest:g}, where chance is "
-        text += f"{1 / n_classes:.3f}"
+        text = (
+            f"{kernel} falls from {high:.3f} at C = {largest:g} to {low:.3f} at C = {smallest:g}, where chance is "
+            f"{1 / n_classes:.3f}"
+        )
         if share > _MOST:
             text += (
                 f": there {share:.0%} of the multipliers of the class that lost a movement to the test are at their "
+                "bound C, and the other classes, which keep all their movements, outvote it"
             )
-            text += "bound C, and the other classes, which keep all their movements, outvote it"
         said.append(f"{text}.")
     return " ".join(said)
 

@@ -64,7 +64,7 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
     Raises
     ------
     TrajectoryError
-        Fewer than eight samples, a recording that rests all along.
+        Fewer than eight samples, or a recording that rests all along.
     """
     who = f"recording {recording.name!r}" if recording.name else "recording"
     if len(recording) < _MIN_SAMPLES:

@@ -28,6 +28,7 @@ from kineme.validation import (
 Names = tuple[str | None, ...] | None
 
 _EVEN = 1e-9  # stamps off an even grid by less than this share of a step count as even
+_SAMPLES_AT_ONCE = 65_536  # stamps looked at together: uneven ones are found soon, and temporaries stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +72,17 @@ class Movements:
         n_samples = int(lengths[0])
         if self.times is None:
             return n_samples
-        t = self.times.reshape(-1, n_samples)
-        step = self.durations[:, None] / (n_samples - 1)
-        deviation = np.abs(t - t[:, :1] - step * np.arange(n_samples))
-        return n_samples if (deviation <= _EVEN * step + 2 * np.spacing(np.abs(t[:, -1:]))).all() else None
+        n_rows = max(1, _SAMPLES_AT_ONCE // n_samples)
+        tiles = (slice(start, start + n_rows) for start in range(0, len(lengths), n_rows))
+        return n_samples if all(map(self._is_even, tiles)) else None
+
+    def _is_even(self, some: slice) -> bool:
+        """Whether the stamps of some movements, all of one length, are evenly spaced."""
+        assert self.times is not None
+        t = self.times.reshape(len(self.durations), -1)[some]
+        step = self.durations[some, None] / (t.shape[1] - 1)
+        deviation = np.abs(t - t[:, :1] - step * np.arange(t.shape[1]))
+        return bool((deviation <= _EVEN * step + 2 * np.spacing(np.abs(t[:, -1:]))).all())
 
     @cached_property
     def separated(self) -> Movements:
