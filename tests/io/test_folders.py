@@ -195,7 +195,8 @@ def test_a_file_that_must_not_be_read_is_a_problem(tmp_path, monkeypatch):
         return whole(path)
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
-    assert [str(one) for one in read_recordings(tmp_path).problems] == ["b.csv: expected a file that can be read, got: Permission denied"]
+    (problem,) = read_recordings(tmp_path).problems
+    assert str(problem) == "b.csv: expected a file that can be read, got: Permission denied"
 
 
 @posix
