@@ -94,7 +94,7 @@ figures: $(DEV)/ready
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
-	uv pip compile pyproject.toml --group dev --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
+	uv pip compile pyproject.toml --group lowest --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
 	uv pip compile bench/peers.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt

@@ -137,6 +137,23 @@ COMMANDS = {
 }
 
 
+def test_a_name_of_a_million_characters_does_not_bury_what_stands_beside_it(tmp_path):
+    """A label column of a file, or a library from elsewhere, may hold anything."""
+    name = "begin" + "a" * 2**20 + "end"
+    assert len(printable(name)) == 4000
+    assert printable(name).startswith("begina")
+    assert printable(name).endswith("aend")
+    assert printable("b" * 4000) == "b" * 4000
+    table = to_text(Table(name, ("label", "movements", name), [(name, "1", name), ("wave", "2", "")])).splitlines()
+    assert max(map(len, table[1:])) < 400
+    assert [line for line in table if line.startswith("wave ") and line.endswith("  2")]
+    rows = [f"0,{name},{k},{k % 3},{k}" for k in range(9)]
+    (tmp_path / "a.csv").write_text("\n".join(["demo,label,t,x,y", *rows]))
+    found = CliRunner().invoke(main, ["inspect", str(tmp_path / "a.csv")])
+    assert found.exit_code == 0
+    assert len(found.output) < 10_000
+
+
 @pytest.mark.parametrize("more", [(), ("--json",)])
 @pytest.mark.parametrize("name", COMMANDS)
 def test_no_command_prints_what_a_terminal_would_obey(folder, name, more):

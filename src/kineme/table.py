@@ -7,7 +7,7 @@ from statistics import fmean
 from textwrap import fill, wrap
 from typing import NamedTuple
 
-from kineme.text import in_markup, printable, printable_lines
+from kineme.text import LONGEST_CELL, in_markup, printable, printable_lines, shortened
 
 
 class Table(NamedTuple):
@@ -26,13 +26,18 @@ def spread(values: Sequence[float]) -> str:
 
 def to_text(table: Table, width: int = 160) -> str:
     """Columns aligned for a terminal; the last one is wrapped to stay within `width`."""
-    lines = [tuple(map(printable, row)) for row in (table.columns, *table.rows)]
+    lines = [(*(_cell(one) for one in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
     widths = [max(len(row[k]) for row in lines) for k in range(len(table.columns))]
     widths[-1] = max(24, min(widths[-1], width - sum(widths[:-1]) - 2 * len(widths)))
     rendered = [line for row in lines for line in _wrapped(row, widths)]
     rule = "-" * max(map(len, rendered))
     title, reading = printable_lines(table.title), fill(printable_lines(table.reading), 110)
     return "\n".join(filter(None, [title, rule, rendered[0], rule, *rendered[1:], reading]))
+
+
+def _cell(text: str) -> str:
+    """All rows are as wide as the widest: one long name must not push every other column off the screen."""
+    return shortened(printable(text), LONGEST_CELL)
 
 
 def _wrapped(row: tuple[str, ...], widths: list[int]) -> list[str]:

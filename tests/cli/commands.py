@@ -7,6 +7,7 @@ that it starts, ends, reads pipes and writes to a terminal is tested with true p
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import subprocess
 import sys
@@ -15,6 +16,9 @@ from typing import NamedTuple
 from click.testing import CliRunner
 
 from kineme.cli import main
+
+# Before 8.2, Click pours errors and output into one unless told not to.
+_APART = {"mix_stderr": False} if "mix_stderr" in inspect.signature(CliRunner).parameters else {}
 
 
 class Done(NamedTuple):
@@ -28,7 +32,8 @@ class Done(NamedTuple):
 def run(*arguments, input=None, cwd="."):  # noqa: A002 - named as in subprocess
     """Call ``kineme`` here; what is not an error for users is raised."""
     with contextlib.chdir(cwd):
-        done = CliRunner().invoke(main, [*map(str, arguments)], input, prog_name="kineme", catch_exceptions=False)
+        runner = CliRunner(**_APART)
+        done = runner.invoke(main, [*map(str, arguments)], input, prog_name="kineme", catch_exceptions=False)
     return Done(done.exit_code, done.stdout, done.stderr)
 
 

@@ -93,7 +93,7 @@ def test_dates_and_durations_keep_their_unit():
         ({"positions": X, "times": T, "offsets": [0, 4]}, "expected offsets from 0 to 5, got 0 to 4"),
         ({"positions": X, "times": T, "offsets": [0, 6, 5]}, "expected offsets as whole numbers"),
         ({"positions": X, "times": T, "offsets": [0.0, 5.0]}, "expected offsets as whole numbers"),
-        ({"positions": np.array([["a"]]), "times": T}, "expected times and positions, got could not convert"),
+        ({"positions": np.array([["1", "a"]]), "times": T}, "expected numbers in times and positions, got 'a'$"),
         ({"positions": np.array([{}, {}]), "times": T}, "Object arrays cannot be loaded"),
     ],
 )
@@ -128,8 +128,22 @@ def test_json_knows_the_same_layouts(tmp_path):
 
 
 def test_json_nested_without_end_is_a_problem():
-    with pytest.raises(kineme.DataError, match=r"a\.json: expected times and positions, got .*recursion"):
+    with pytest.raises(kineme.DataError, match=r"a\.json: expected times and positions, got lists within lists"):
         read_recordings_from_bytes(b"[" * 10**6, "a.json", Layout())
+
+
+@pytest.mark.parametrize(
+    ("positions", "words"),
+    [
+        ("[[0, 1], [1], [2, 3], [3, 4]]", "rows that differ in length or depth; name movements"),
+        ("[{}, 1, 2, 3]", r"expected numbers in times and positions, got \{\}$"),
+        ('[0, 1, "soon", 3]', "expected numbers in times and positions, got 'soon'$"),
+        ("[0, null, 2, 3]", r"expected finite positions, got \[nan\] at sample 1"),
+    ],
+)
+def test_entries_of_json_that_are_no_numbers_are_named(positions, words):
+    with pytest.raises(kineme.KinemeError, match=words):
+        read_recordings_from_bytes(b'{"times": [0, 1, 2, 3], "positions": %s}' % positions.encode(), "a.json", Layout())
 
 
 def test_a_reason_is_one_line():

@@ -69,7 +69,7 @@ def test_columns_are_named(tmp_path):
         ("a.mp4", "", "a file ending in one of .csv, .tsv, .txt, .npz, .json, .*, got '.mp4'"),
         ("a.json", "[1, 2]", "an object with times and positions, got a list"),
         ("a.json", '{"times": [0, 1]}', "got no entry 'positions'"),
-        ("a.json", '{"times": ', "a.json: expected times and positions, got Expecting value"),
+        ("a.json", '{"times": ', "a.json: expected JSON, got a truncated or damaged file .Expecting value"),
         ("a.npz", "not an archive", "archive of arrays"),
     ],
 )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.io.dates import nanoseconds
@@ -16,6 +17,11 @@ from kineme.trajectories.axes import axis_names
 from kineme.validation import Array
 
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
+
+_RAGGED = (
+    "expected times and positions with rows of one length, got rows that differ in length or depth; "
+    "name movements of unequal length positions_0, times_0, positions_1, ..."
+)
 
 
 def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Found:
@@ -110,12 +116,28 @@ class _Joined(Mapping[str, Any]):
 
 def _numbers(values: Any) -> Array:
     """As float64; dates and durations count in nanoseconds."""
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise DataError(_RAGGED) from error
     if array.dtype.kind == "c":
         raise DataError(f"expected real numbers, got {array.dtype}; save both parts as columns")
     if array.dtype.kind in "mM":
         return nanoseconds(array)
-    return array.astype(np.float64, copy=False)
+    try:
+        return array.astype(np.float64, copy=False)
+    except (ValueError, TypeError) as error:
+        raise DataError(f"expected numbers in times and positions, got {_no_number(array)!r:.80}") from error
+
+
+def _no_number(array: NDArray[Any]) -> Any:
+    """The first entry that stands in the way."""
+    for one in array.ravel().tolist():
+        try:
+            float(np.float64(one))
+        except (ValueError, TypeError):
+            return one
+    return array.dtype.name
 
 
 def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:

@@ -39,11 +39,16 @@ def nanoseconds(stamps: NDArray[Any]) -> Array:
     Raises
     ------
     DataError
-        Dates so far that nanoseconds cannot count them; NumPy would wrap them around silently.
+        Dates so far that nanoseconds cannot count them; NumPy before 2.5 would wrap them around silently.
     """
-    counts = stamps.astype(f"{stamps.dtype.kind}8[ns]")
     missing = np.isnat(stamps)
-    far = (counts.astype(stamps.dtype) != stamps) & ~missing
-    if far.any():
-        raise DataError(f"expected dates from 1678 to 2262 or durations of that size, got {stamps[far][0]}")
+    try:
+        counts = stamps.astype(f"{stamps.dtype.kind}8[ns]")
+        counted = bool(((counts.astype(stamps.dtype) == stamps) | missing).all())
+    except OverflowError:
+        counted = False
+    if not counted:
+        known = stamps[~missing]
+        farthest = known[np.abs(known.astype(np.int64).astype(np.float64)).argmax()]
+        raise DataError(f"expected dates from 1678 to 2262 or durations of that size, got {farthest}")
     return np.where(missing, np.nan, counts.astype(np.int64))

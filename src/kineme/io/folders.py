@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kineme.io.found import Problem
 
-_OUTSIDE = "a link that leads out of the folder; say follow_links to read it, or copy what it leads to"
+_OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
 
 
 def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:

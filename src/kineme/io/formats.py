@@ -43,7 +43,10 @@ def _read_npz(data: bytes, layout: Layout) -> Found:
 def _read_json(data: bytes, layout: Layout) -> Found:
     lists = data.count(b"[") + data.count(b"{")
     check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
-    entries = json.loads(data, object_pairs_hook=_each_once)
+    try:
+        entries = json.loads(data, object_pairs_hook=_each_once)
+    except json.JSONDecodeError as error:
+        raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
     if not isinstance(entries, dict):
         raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
     return arrays_movements(entries, layout, "JSON")

@@ -31,6 +31,8 @@ _UNREADABLE = (
     MemoryError,
 )
 
+_NOWHERE = "expected a file, got a link that leads nowhere; delete it, or restore what it leads to"
+
 
 class FileRead(NamedTuple):
     """What a file gave: movements and how they were understood, or neither; and what was wrong."""
@@ -64,7 +66,8 @@ def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
         check_expanded(known.st_size)
         data = path.read_bytes()
     except (OSError, MemoryError) as error:
-        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
+        reason = _NOWHERE if path.is_symlink() and not os.path.exists(path) else _plainly(error)
+        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, reason)])
     return read_bytes(data, relative, layout, known.st_mtime)
 
 
@@ -116,6 +119,8 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "expected a file that fits into the memory; split it"
     if isinstance(error, OSError):
-        return error.strerror or str(error)
+        return f"expected a file that can be read, got: {error.strerror or error}"
+    if isinstance(error, RecursionError):
+        return "expected times and positions, got lists within lists within lists, too many to be arrays"
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error) or type(error).__name__
     return f"expected times and positions, got {reason}"

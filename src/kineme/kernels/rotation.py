@@ -110,7 +110,7 @@ def _straight(C: Array) -> NDArray[np.bool_]:
     return np.asarray((cofactors**2).sum(axis=(1, 2)) <= (_STRAIGHT * (C**2).sum(axis=(1, 2))) ** 2)
 
 
-def _solve(form: _Form, trace: Array, c: float, s: float) -> tuple[Array, Array]:
+def _solve(form: _Form, trace: Array, c: float, s: float) -> tuple[Array, NDArray[np.bool_]]:
     """``l - m_1`` (n,) where F is least, and whether the best rotation is within the limit."""
     squares = form.z**2
     at_limit = _root_at_limit(squares, form.gaps, c, s)

@@ -196,9 +196,8 @@ class Store:
                 with transaction(self._writer):
                     self.check_writable()  # again: waiting for the turn may have taken long
                     last = self.moment(self._writer)
-                    change = Change(
-                        self._writer, last.version + 1, {name: getattr(last, name) for name in COUNTED.values()}
-                    )
+                    counts = {name: getattr(last, name) for name in COUNTED.values()}
+                    change = Change(self._writer, last.version + 1, counts)
                     yield change
                     at = datetime.now(UTC).isoformat(timespec="milliseconds")
                     text = json.dumps(detail, ensure_ascii=False)
