@@ -10,6 +10,7 @@ from pyarrow import parquet
 
 import kineme
 from kineme.io.layout import Layout
+from kineme.io.parquet import _texts
 from kineme.io.recordings import read_recordings_from_bytes
 
 T = np.arange(6) / 100
@@ -139,3 +140,13 @@ def test_one_long_name_costs_its_own_length(monkeypatch):
     monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(2**20))
     found = read({"label": [name] * n, "time": np.arange(n) / 100, "x": np.zeros(n)}, units="s")
     assert found.labels == (name,)
+
+
+@pytest.mark.parametrize("which", [[0, 5], [-1, 0]])
+def test_numbers_of_names_that_are_not_there_are_damage(which):
+    """pyarrow reads such pages and does not look."""
+    names = pa.DictionaryArray.from_arrays(pa.array(which), pa.array(["wave"]), safe=False)
+    with pytest.raises(
+        kineme.DataError, match=r"expected names in 'label', got numbers of names that are not there: damaged"
+    ):
+        _texts(pa.chunked_array([names]), "label")

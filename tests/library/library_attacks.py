@@ -8,6 +8,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from contextlib import closing
+from itertools import pairwise
 
 import numpy as np
 from library_samples import draw_movements
@@ -84,6 +85,36 @@ def copy_of(source, target):
     """A copy to attack."""
     shutil.copyfile(source, target)
     return target
+
+
+def make_endless(path, table="feature", levels=10):
+    """Put pages behind the file, each with a hundred branches to the next one, before the root of a table."""
+    with closing(sqlite3.connect(path)) as connection:
+        size = connection.execute("PRAGMA page_size").fetchone()[0]
+        root = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", (table,)).fetchone()[0]
+        pages = connection.execute("PRAGMA page_count").fetchone()[0]
+    data = bytearray(path.read_bytes())
+    leaf = bytes(data[(root - 1) * size : root * size])
+    numbers = [root, *range(pages + 1, pages + levels + 1)]
+    for at, to in pairwise(numbers):
+        page = bytearray(size)
+        cells = 100
+        page[0:12] = (
+            b"\x05\0\0"
+            + cells.to_bytes(2, "big")
+            + (size - 5 * cells).to_bytes(2, "big")
+            + b"\0"
+            + to.to_bytes(4, "big")
+        )
+        for k in range(cells):
+            place = size - 5 * (k + 1)
+            page[12 + 2 * k : 14 + 2 * k] = place.to_bytes(2, "big")
+            page[place : place + 5] = to.to_bytes(4, "big") + bytes([k + 1])
+        start = (at - 1) * size
+        data[start : start + size] = page
+    data[(numbers[-1] - 1) * size :] = leaf
+    data[28:32] = (pages + levels).to_bytes(4, "big")
+    path.write_bytes(data)
 
 
 def floats(kind, *places, value=np.nan, size=16):
@@ -240,6 +271,7 @@ ROWS = {
     ),
     "a member of no symbol": (["UPDATE member SET symbol = 77 WHERE id = 1"], "refers to a row of table symbol"),
     "a member of text": (["UPDATE member SET movement = 'two' WHERE id = 1"], "movement is not a whole number"),
+    "a member of infinity": (["UPDATE member SET movement = 9e999 WHERE id = 1"], "movement is not a whole number"),
     "a strange way to a symbol": (["UPDATE member SET how = 'magic' WHERE id = 1"], "how|CHECK constraint"),
     "removed before it was added": (
         ["UPDATE member SET added = 3, removed = 1 WHERE id = 1"],

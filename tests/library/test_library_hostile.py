@@ -8,11 +8,10 @@ import shutil
 import sqlite3
 import time
 from contextlib import closing, suppress
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_victim
+from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, make_victim
 from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
@@ -175,45 +174,36 @@ def test_texts_in_another_encoding_are_refused(export, tmp_path):
     _is_refused(tmp_path / "wide", tmp_path, r"libraries? and nothing else, got texts in UTF-16|got texts in UTF-16le")
 
 
+ENDLESS = {
+    "movement": [lambda it: it.movements(), lambda it: it.export(it.folder / "more")],
+    "feature": [lambda it: it.export(it.folder / "more")],
+    "member": [lambda it: it.symbols(), lambda it: it.export(it.folder / "more")],
+    "version": [lambda it: it.history()],
+    "symbol_state": [lambda it: it.recognize(it.movements()), lambda it: it.rename("wave", "other")],
+}
+
+
+@pytest.mark.parametrize("table", ENDLESS)
+def test_a_library_that_was_never_imported_is_not_read_without_end(export, tmp_path, table):
+    make_endless(export, table)
+    start = time.monotonic()
+    with ActionLibrary(_opened(export, tmp_path)) as library:
+        for read in ENDLESS[table]:
+            with pytest.raises(DataError, match=rf"{FILE} to be read within a time that its size|{FILE} once, got dam"):
+                read(library)
+        assert {one.name for one in library.folder.iterdir()} <= {FILE, f"{FILE}-wal", f"{FILE}-shm"}
+    assert time.monotonic() - start < 20
+
+
 def test_pages_that_lead_to_each_other_do_not_hang(export, tmp_path, monkeypatch):
     """A tree of ten levels, in which every branch is the same one: there is no end of rows, and no loop to be seen."""
-    _make_endless(export)
+    make_endless(export)
     start = time.monotonic()
     _is_refused(export, tmp_path, r"damaged bytes")
     monkeypatch.setattr(guard, "_SECONDS", 0.2)
     with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
         assert any("interrupted" in str(one) for one in library.verify())
     assert time.monotonic() - start < 30
-
-
-def _make_endless(path, table="feature", levels=10):
-    """Put pages behind the file, each with a hundred branches to the next one, before the root of a table."""
-    with closing(sqlite3.connect(path)) as connection:
-        size = connection.execute("PRAGMA page_size").fetchone()[0]
-        root = connection.execute("SELECT rootpage FROM sqlite_master WHERE name = ?", (table,)).fetchone()[0]
-        pages = connection.execute("PRAGMA page_count").fetchone()[0]
-    data = bytearray(path.read_bytes())
-    leaf = bytes(data[(root - 1) * size : root * size])
-    numbers = [root, *range(pages + 1, pages + levels + 1)]
-    for at, to in pairwise(numbers):
-        page = bytearray(size)
-        cells = 100
-        page[0:12] = (
-            b"\x05\0\0"
-            + cells.to_bytes(2, "big")
-            + (size - 5 * cells).to_bytes(2, "big")
-            + b"\0"
-            + to.to_bytes(4, "big")
-        )
-        for k in range(cells):
-            place = size - 5 * (k + 1)
-            page[12 + 2 * k : 14 + 2 * k] = place.to_bytes(2, "big")
-            page[place : place + 5] = to.to_bytes(4, "big") + bytes([k + 1])
-        start = (at - 1) * size
-        data[start : start + size] = page
-    data[(numbers[-1] - 1) * size :] = leaf
-    data[28:32] = (pages + levels).to_bytes(4, "big")
-    path.write_bytes(data)
 
 
 @pytest.mark.parametrize("mode", ["ro", "rw"])

@@ -96,7 +96,10 @@ def _texts(column: Any, head: str) -> Any:
     parts = [np.empty(0, dtype=object)]
     for chunk in column.chunks:
         known = np.array([*(_text(one, head) for one in chunk.dictionary.to_pylist()), ""], dtype=object)
-        parts.append(known[chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()])
+        which = chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()
+        if len(which) and not 0 <= which.min() <= which.max() < len(known):  # pyarrow does not look
+            raise DataError(f"expected names in {head!r}, got numbers of names that are not there: damaged bytes")
+        parts.append(known[which])
     return np.concatenate(parts)
 
 

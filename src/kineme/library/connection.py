@@ -21,8 +21,8 @@ from kineme.library.faults import in_plain_words
 from kineme.library.guard import defend
 from kineme.library.over_forks import Connection, open_connection
 from kineme.library.placing import LOGS, placed
-from kineme.library.rows import Row, insert
-from kineme.library.schema import APPLICATION_ID, CREATE, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
+from kineme.library.rows import Row, damage, insert, select
+from kineme.library.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 
 FILE = "library.sqlite"
 _WRITER_CACHE_KIB = 65536
@@ -39,6 +39,7 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
     try:
         connection.execute("PRAGMA synchronous = FULL")
         defend(connection)
+        connection.watch(path)
         connection.execute("PRAGMA temp_store = MEMORY")
         if mode != "ro":
             connection.execute(f"PRAGMA cache_size = -{_WRITER_CACHE_KIB}")
@@ -119,6 +120,18 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
         f"{got if found != expected else f'texts in {encoding}'}; do not use this file: take it from a backup or an "
         "export that you trust"
     )
+
+
+def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
+    """What the library says of itself, once the definitions of its tables have been found undamaged."""
+    try:
+        meta: dict[str, str] = dict(select(connection, "meta"))
+        if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(connection):
+            return meta
+    except sqlite3.OperationalError as error:
+        if "no such" not in str(error):  # table or column
+            raise
+    raise damage(f"the definitions of tables in {path}, and its specification, as they were stored", "damaged bytes")
 
 
 def _statements(version: int) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -10,8 +11,9 @@ from pathlib import Path
 from kineme.errors import DataError
 from kineme.library.connection import FILE, check_alone, check_kind, connect, migrate
 from kineme.library.faults import in_plain_words
-from kineme.library.guard import defend_foreign, limited
+from kineme.library.guard import defend_foreign, limited, limited_copy
 from kineme.library.placing import LOGS, placed
+from kineme.library.rows import damage
 from kineme.library.schema import SCHEMA_VERSION
 from kineme.library.store import Store
 from kineme.library.verify import verify
@@ -30,11 +32,26 @@ def export(store: Store, path: str | Path) -> Path:
     """
     target = Path(path)
     with _new(target) as beside:
-        with closing(connect(store.path, "ro", store.wait)) as connection:
-            connection.execute("VACUUM INTO ?", (str(beside),))
+        with (
+            closing(connect(store.path, "ro", store.wait)) as connection,
+            limited_copy(connection, store.path, beside),
+        ):
+            _copy(connection, store, beside)
         with closing(connect(beside, "rw", store.wait)) as copy:
             copy.execute("PRAGMA schema_version = 1")  # counts how often a file was compacted: no content
     return target
+
+
+def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
+    try:
+        connection.execute("VACUUM INTO ?", (str(beside),))
+    except sqlite3.IntegrityError as error:  # two rows of one key
+        raise damage(f"every row of {store.path} once", f"damaged bytes ({error})") from error
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode != sqlite3.SQLITE_INTERRUPT:  # of the new file
+            raise
+        with in_plain_words(store.path, store.wait):
+            raise
 
 
 def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:

@@ -8,11 +8,17 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from threading import get_ident
+from typing import Any
 
 _STEPS = 200_000  # of SQLite's virtual machine, between two looks at the clock: some milliseconds
+#: What one statement may take, in such steps: at least, and for each byte of the file. Reading takes up to three for
+#: each byte of a row, a hundredth of that where features are stored; endless pages hold more rows than bytes.
+_WORK, _WORK_PER_BYTE = 10_000_000, 10
+_ROOM = 1 << 24  # bytes that a copy may have more than twice those of the file
 _SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # a file may take this long, and longer by its size: a slow disk is faster
 
 #: Switches that Python can set from 3.12 on, by name: what a library needs none of, and what makes no difference to one
@@ -49,12 +55,50 @@ def _switch(connection: sqlite3.Connection, names: tuple[str, ...], on: bool) ->
             setconfig(getattr(sqlite3, name), on)
 
 
-@contextmanager
-def limited(connection: sqlite3.Connection, path: Path) -> Iterator[None]:
-    """Interrupt what takes longer than reading every byte of the file could: pages that lead in circles never end."""
+class Watched(sqlite3.Connection):
+    """Interrupts a statement that takes more work than reading every byte of the file could."""
+
+    _path: Path
+
+    def __init__(self, *database: Any, **options: Any) -> None:
+        self._looks: dict[int, int] = {}  # thread -> looks at its statement
+        self._too_much: Callable[[], bool] = bool
+        super().__init__(*database, **options)
+
+    def watch(self, path: Path) -> None:
+        """Begin to do so, for the file of that path."""
+        self._path = path
+        self.set_progress_handler(self._is_endless, _STEPS)
+
+    def execute(self, *statement: Any) -> sqlite3.Cursor:
+        """As SQLite's."""
+        if self._looks:
+            self._looks[get_ident()] = 0
+        return super().execute(*statement)
+
+    def _is_endless(self) -> bool:
+        me = get_ident()
+        self._looks[me] = looks = self._looks.get(me, 0) + 1
+        more = _STEPS * looks - _WORK
+        return self._too_much() or (more > 0 and more > _WORK_PER_BYTE * size_of(self._path))
+
+    @contextmanager
+    def stopping(self, too_much: Callable[[], bool]) -> Iterator[None]:
+        """Interrupt also once `too_much()` is true."""
+        self._too_much = too_much
+        try:
+            yield
+        finally:
+            self._too_much = bool
+
+
+def limited(connection: Watched, path: Path) -> AbstractContextManager[None]:
+    """Interrupt also what all together takes longer than reading every byte of the file could."""
     end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
-    connection.set_progress_handler(lambda: time.monotonic() > end, _STEPS)
-    try:
-        yield
-    finally:
-        connection.set_progress_handler(None, 0)
+    return connection.stopping(lambda: time.monotonic() > end)
+
+
+def limited_copy(connection: Watched, path: Path, copy: Path) -> AbstractContextManager[None]:
+    """Interrupt also what makes a copy far larger than the file."""
+    most = 2 * size_of(path) + _ROOM
+    return connection.stopping(lambda: size_of(copy) > most)

@@ -27,6 +27,7 @@ from weakref import WeakSet
 
 from kineme import forks
 from kineme.errors import DataError
+from kineme.library.guard import Watched
 
 _PATIENCE = 10.0  # seconds
 
@@ -67,7 +68,7 @@ def awake() -> Iterator[None]:
         _leave(me)
 
 
-class Connection(sqlite3.Connection):
+class Connection(Watched):
     """Keeps forks waiting until it is closed, or until who holds it lets it `rest`."""
 
     _thread: int | None = None

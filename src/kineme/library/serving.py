@@ -109,7 +109,7 @@ def members_of(store: Store) -> Members:
         query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
         try:
             pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise damage(
                 "movements and symbols as whole numbers in table member", f"something else ({error})"
             ) from error

@@ -15,11 +15,12 @@ from typing import Any
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library import over_forks
-from kineme.library.connection import check_kind, connect, create, migrate, schema_seal, transaction
+from kineme.library.connection import check_kind, checked_meta, connect, create, migrate, transaction
 from kineme.library.faults import in_plain_words
 from kineme.library.guard import size_of
-from kineme.library.rows import damage, insert, select
-from kineme.library.schema import COUNTED, LARGEST_ID, META, SCHEMA_VERSION
+from kineme.library.readers import Readers
+from kineme.library.rows import insert, select
+from kineme.library.schema import COUNTED, LARGEST_ID, SCHEMA_VERSION
 from kineme.library.specification import Specification, as_n_dims
 from kineme.library.versions import Change, Moment, moment_at
 
@@ -58,14 +59,14 @@ class Store:
         # Threads share the connection to read from; a SQLite that was built without locks of its own gets ours.
         self._look: AbstractContextManager[Any] = RLock() if sqlite3.threadsafety < 3 else nullcontext()
         self._writer: sqlite3.Connection | None = None
-        self._waking, self._asleep, self._closed = Lock(), False, False
+        self._waking, self._asleep, self._readers = Lock(), False, Readers(path)
         if not self.path.exists():
             self._create(specification)
         with in_plain_words(self.path, wait), over_forks.awake():
             self._reader = self._connect()
             try:
                 self._check_kind()
-                meta = self._checked_meta()
+                meta = checked_meta(self._reader, self.path)
                 self.id = meta["id"]
                 self.specification = Specification.from_json(meta, self.path)
                 self.as_of = self._checked_version(as_of)
@@ -80,7 +81,7 @@ class Store:
 
     def sleep(self) -> None:
         """Close the connections for a fork; the next one to read or write opens them again."""
-        if not self._closed and not self._asleep:
+        if not self._readers.closed and not self._asleep:
             self._asleep = True
             for connection in (self._writer, self._reader):
                 if connection is not None:
@@ -89,7 +90,7 @@ class Store:
 
     def carried_over(self) -> list[sqlite3.Connection]:
         """The connections that a fork found open; see `over_forks`."""
-        if self._closed or self._asleep:
+        if self._readers.closed or self._asleep:
             return []
         return [one for one in (self._writer, self._reader) if one is not None]
 
@@ -120,19 +121,6 @@ class Store:
                 "open it once without read_only to bring it up to date"
             )
         migrate(self._reader, self.path)
-
-    def _checked_meta(self) -> dict[str, str]:
-        """What the library says of itself, once the definitions of its tables have been found undamaged."""
-        try:
-            meta: dict[str, str] = dict(select(self._reader, "meta"))
-            if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(self._reader):
-                return meta
-        except sqlite3.OperationalError as error:
-            if "no such" not in str(error):  # table or column
-                raise
-        raise damage(
-            f"the definitions of tables in {self.path}, and its specification, as they were stored", "damaged bytes"
-        )
 
     def _checked_version(self, as_of: int | None) -> int:
         last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
@@ -168,7 +156,7 @@ class Store:
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
         """The connection to read from. It sees committed versions only, also while this process writes."""
-        with over_forks.awake(), in_plain_words(self.path, self.wait):
+        with over_forks.awake(), self._readers.one_more(), in_plain_words(self.path, self.wait):
             self._wake()
             with self._look:
                 yield self._reader
@@ -190,6 +178,7 @@ class Store:
         with over_forks.awake(), in_plain_words(self.path, self.wait):
             self._wake()  # first: in a child, the turn may be that of a thread that is not there
             with self._turn:
+                self._readers.check_open()
                 self.check_writable()
                 if self._writer is None:
                     self._writer = connect(self.path, "rw", self.wait).rest()
@@ -230,9 +219,10 @@ class Store:
             self.close()
 
     def close(self) -> None:
-        """Close both connections; the last one to close leaves a single file."""
+        """Close both connections, once no other thread uses them; the last one to close leaves a single file."""
+        with over_forks.awake():
+            self._readers.close()  # before its turn: who reads may want to write
         with over_forks.awake(), self._turn:
-            self._closed = True
             for connection in (self._writer, self._reader):
                 if connection is not None:
                     connection.close()

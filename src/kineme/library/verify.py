@@ -19,6 +19,7 @@ from kineme.library.store import Store
 
 _SHOWN = 100  # messages of one check
 _BATCH_BYTES = 1 << 24  # of rows whose contents are looked at together
+_ROW_BYTES = 512  # of a row beside its bytes, in memory
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def _rows(table: str, store: Store) -> Check:
                     yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
                     continue
                 good.append(row[:-2])
-                size += sum(len(value) for value in good[-1] if isinstance(value, bytes))
+                size += _ROW_BYTES + sum(len(value) for value in good[-1] if isinstance(value, bytes))
                 if size > _BATCH_BYTES:
                     yield from _contents(connection, table, good, store)
                     good, size = [], 0
