@@ -16,6 +16,7 @@ import pytest
 import kineme
 from kineme import (
     DMP,
+    ActionLibrary,
     Demonstrations,
     DMPFeatures,
     KinemeError,
@@ -185,6 +186,15 @@ USES = {
         ["penalty", "n_pieces", "n_points"],
     ),
     "segment": (lambda **wish: kineme.segment(**({"recording": _long()} | wish)), ["recording", "by"]),
+    "from_arrays": (
+        lambda **wish: Demonstrations.from_arrays(**({"arrays": [np.eye(5)] * 2} | wish)),
+        ["arrays", "labels", "times", "names"],
+    ),
+    "Trajectory": (
+        lambda **wish: repr(Trajectory(**({"times": np.arange(5), "positions": np.eye(5)} | wish))),
+        ["times", "positions", "name"],
+    ),
+    "ActionLibrary": (ActionLibrary, ["folder"]),
     "RBF": (_gram(kernels.RBF), ["sigma"]),
     "TruncatedEuclidean": (_gram(kernels.TruncatedEuclidean), ["m", "sigma"]),
     "averaged": (_gram(_averaged), ["kernel", "n_dims", "mean"]),
@@ -206,3 +216,18 @@ def test_what_cannot_be_is_refused_with_a_reason(use, name):
             continue
         except Exception as error:
             raise AssertionError(f"{use}({name}={value!r})") from error
+
+
+@pytest.mark.parametrize("folder", ["", " ", "\n", "a\0b", None, 3])
+def test_a_library_without_a_name_is_refused(folder):
+    """An empty text would be the current folder."""
+    with pytest.raises(KinemeError, match=r"expected the folder of a library, got .*; the current one is"):
+        ActionLibrary(folder, create=True)
+
+
+@pytest.mark.parametrize("power", [16, 19, 40, 90, -19, -30])
+def test_movements_that_keep_a_size_of_which_single_precision_makes_nothing_are_refused(power):
+    demos = [one.positions * 10.0**power for one in _demos()]
+    assert Recognizer().fit(demos, list("aabbcc")).predict(demos).tolist() == list("aabbcc")
+    with pytest.raises(KinemeError, match=r'expected movements of 1e-15 to 1e\+15 in their unit with scale="none"'):
+        Recognizer(scale="none").fit(demos, list("aabbcc"))

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from rotation_samples import as_rotation, random_quaternions, seeds
 from scipy.spatial.transform import Rotation, Slerp
 
+from kineme import KinemeError, orientation
 from kineme.errors import TrajectoryError
 from kineme.orientation import angle_between, conjugate, continuous, exp, log, normalized, product, slerp
 from kineme.orientation.rotation_vectors import nearest
@@ -115,3 +116,26 @@ def test_rounded_quaternions_are_normalized_on_a_copy():
 def test_what_is_no_unit_quaternion_is_refused(q, message):
     with pytest.raises(TrajectoryError, match=message):
         normalized(q)
+
+
+@pytest.mark.parametrize(
+    ("function", "n_arrays", "width"),
+    [
+        (orientation.product, 2, 4), (orientation.conjugate, 1, 4), (orientation.angle_between, 2, 4),
+        (orientation.normalized, 1, 4), (orientation.continuous, 1, 4), (orientation.log, 1, 4),
+        (lambda a, b: orientation.slerp(a, b, 0.5), 2, 4), (orientation.exp, 1, 3),
+        (orientation.angular_velocity, 2, 3),
+        (orientation.angular_acceleration, 3, 3), (orientation.rotation_vector_rate, 2, 3),
+    ],
+)  # fmt: skip
+def test_what_is_no_real_array_of_the_right_shape_is_refused(function, n_arrays, width):
+    """An imaginary part would be lost."""
+    right = np.full((5, width), 0.5)
+    assert np.isfinite(function(*[right] * n_arrays)).all()
+    complex_ones = [right + 0j, (right + 0j).astype(object), (right + 0j).tolist()]
+    for wrong in (*complex_ones, right[:, 1:], right[0, 0], "x", None, object(), []):
+        for k in range(n_arrays):
+            arrays = [right] * n_arrays
+            arrays[k] = wrong
+            with pytest.raises(KinemeError, match=r"expected"):
+                function(*arrays)

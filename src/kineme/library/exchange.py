@@ -12,7 +12,7 @@ from kineme.errors import DataError
 from kineme.library.connection import FILE, check_alone, check_kind, connect, migrate
 from kineme.library.faults import in_plain_words
 from kineme.library.guard import defend_foreign, limited, limited_copy
-from kineme.library.placing import LOGS, placed
+from kineme.library.placing import LOGS, as_folder, placed
 from kineme.library.rows import damage
 from kineme.library.schema import SCHEMA_VERSION
 from kineme.library.store import Store
@@ -66,7 +66,7 @@ def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
         There is a library already; the file is no export, is a library in use, is damaged, holds what no library does,
         or is of a later schema version.
     """
-    source, target = Path(path), Path(folder) / FILE
+    source, target = Path(path), as_folder(folder) / FILE
     _check_file(source)
     Path(folder).mkdir(parents=True, exist_ok=True)
     check_alone(target)

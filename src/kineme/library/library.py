@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kineme.errors import SpecificationError
 from kineme.library import changes, read, symbols
 from kineme.library.connection import FILE
+from kineme.library.placing import as_folder
 from kineme.library.specification import Specification
 from kineme.library.store import Store
 
@@ -77,7 +78,7 @@ class ActionLibrary:
         wait: float = 10.0,
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
-        self.store = Store(Path(folder) / FILE, specification, read_only=read_only, wait=wait)
+        self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
         made = self.specification
         if Specification.of(recognizer or made.recognizer(), dmp or made.dmp) != made:
             self.close()

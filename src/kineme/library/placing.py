@@ -8,7 +8,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
+from kineme.errors import SpecificationError
 from kineme.io.atomic import bring_to_disk, name_beside
 from kineme.library.schema import APPLICATION_ID
 
@@ -16,6 +18,20 @@ LOGS = ("-wal", "-journal")  # ends of the names of the files beside a database 
 _DAY = 86400.0  # seconds
 _LEFT = re.compile(r"\..+\.[0-9a-f]{8}")
 _COMPANIONS = ("", *LOGS, "-shm")
+
+
+def as_folder(folder: Any) -> Path:
+    """Where a library is, or is to be.
+
+    Raises
+    ------
+    SpecificationError
+        No path, or one without a name: an empty text would be the current folder.
+    """
+    name = os.fsdecode(folder) if isinstance(folder, str | os.PathLike) else ""
+    if not name.strip() or "\0" in name:
+        raise SpecificationError(f"expected the folder of a library, got {folder!r}; the current one is '.'")
+    return Path(name)
 
 
 @contextmanager

@@ -19,9 +19,23 @@ from kineme.validation import Array, as_numbers
 NORM_TOLERANCE = 0.01
 
 
+def as_quaternions(q: ArrayLike) -> Array:
+    """Quaternions (..., 4) of any norm as float64.
+
+    Raises
+    ------
+    TrajectoryError
+        Not real numbers, or of another shape.
+    """
+    q = as_numbers(q, "quaternions")
+    if q.ndim == 0 or q.shape[-1] != 4:
+        raise TrajectoryError(f"expected quaternions (w, x, y, z) of shape (..., 4), got shape {q.shape}")
+    return q
+
+
 def product(a: ArrayLike, b: ArrayLike) -> Array:
     """Quaternion product ``a b``: first b, then a; shapes (..., 4) broadcast."""
-    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    a, b = as_quaternions(a), as_quaternions(b)
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     parts = (
@@ -35,7 +49,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Array:
 
 def conjugate(q: ArrayLike) -> Array:
     """``(w, -x, -y, -z)``, for unit quaternions the inverse; shape (..., 4)."""
-    return np.asarray(q, dtype=np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+    return as_quaternions(q) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def normalized(q: ArrayLike) -> Array:
@@ -46,9 +60,7 @@ def normalized(q: ArrayLike) -> Array:
     TrajectoryError
         Not of shape (..., 4), or a norm that differs from 1 by more than `NORM_TOLERANCE`.
     """
-    q = as_numbers(q, "quaternions")
-    if q.ndim == 0 or q.shape[-1] != 4:
-        raise TrajectoryError(f"expected quaternions (w, x, y, z) of shape (..., 4), got shape {q.shape}")
+    q = as_quaternions(q)
     shape = q.shape[:-1]
 
     def where(row: int) -> str:
@@ -84,7 +96,9 @@ def continuous(q: ArrayLike) -> Array:
     ndarray of shape (..., T, 4)
         The first of each movement unchanged; ``sum(q[t] * q[t - 1]) >= 0`` afterwards.
     """
-    q = as_numbers(q, "quaternions")
+    q = as_quaternions(q)
+    if q.ndim < 2:
+        raise TrajectoryError(f"expected quaternions along time, of shape (..., T, 4), got shape {q.shape}")
     flips = (q[..., 1:, :] * q[..., :-1, :]).sum(axis=-1) < 0
     odd = np.zeros(q.shape[:-1], dtype=bool)
     np.logical_xor.accumulate(flips, axis=-1, out=odd[..., 1:])

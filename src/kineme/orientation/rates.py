@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
+from kineme.orientation.rotation_vectors import as_vectors
 from kineme.validation import Array
 
 _SMALL = 1.0  # rad; below it the closed forms cancel and the series in t^2 converge fast
@@ -85,7 +86,7 @@ def _factor_rates(z: Array, a: Array, b: Array) -> tuple[Array, Array]:
 
 # Components lead inside this file: then every operation runs over long contiguous rows.
 def _components(vectors: ArrayLike) -> Array:
-    return np.moveaxis(np.asarray(vectors, dtype=np.float64), -1, 0)
+    return np.moveaxis(as_vectors(vectors), -1, 0)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -9,12 +9,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.orientation.quaternions import conjugate, product
+from kineme.errors import TrajectoryError
+from kineme.orientation.quaternions import as_quaternions, conjugate, product
 from kineme.validation import Array, as_numbers
 
 _TURN = 2.0 * np.pi
 #: Vector parts of quaternions below this length have lost their direction to rounding.
 TINY = 1e-7
+
+
+def as_vectors(p: ArrayLike) -> Array:
+    """Rotation vectors, or their rates (..., 3), as float64.
+
+    Raises
+    ------
+    TrajectoryError
+        Not real numbers, or of another shape.
+    """
+    p = as_numbers(p, "rotation vectors")
+    if p.ndim == 0 or p.shape[-1] != 3:
+        raise TrajectoryError(f"expected vectors of shape (..., 3), got shape {p.shape}")
+    return p
 
 
 def log(q: ArrayLike) -> Array:
@@ -23,7 +38,7 @@ def log(q: ArrayLike) -> Array:
     ``p = 2 atan2(|v|, w) v / |v|`` with the sign of q = (w, v) for which w >= 0; q and -q give the same, except at
     exactly pi, where the two ends of the axis are the same rotation.
     """
-    q = as_numbers(q, "quaternions")
+    q = as_quaternions(q)
     w, v = np.abs(q[..., :1]), np.where(q[..., :1] < 0, -q[..., 1:], q[..., 1:])
     return logarithm_factor(w, np.linalg.norm(v, axis=-1, keepdims=True)) * v
 
@@ -38,7 +53,7 @@ def logarithm_factor(w: Array, length: Array) -> Array:
 
 def exp(p: ArrayLike) -> Array:
     """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad] of any length: the inverse of `log`."""
-    p = as_numbers(p, "rotation vectors")
+    p = as_vectors(p)
     half = 0.5 * np.linalg.norm(p, axis=-1, keepdims=True)
     return np.concatenate((np.cos(half), 0.5 * np.sinc(half / np.pi) * p), axis=-1)
 
@@ -48,7 +63,7 @@ def nearest(p: ArrayLike, target: ArrayLike) -> Array:
 
     The candidates are ``(|p| + 2 pi k) p / |p|``. Where p is no rotation, its axis is that of `target`.
     """
-    p, target = np.broadcast_arrays(np.asarray(p, dtype=np.float64), np.asarray(target, dtype=np.float64))
+    p, target = np.broadcast_arrays(as_vectors(p), as_vectors(target))
     angle, reach = (np.linalg.norm(a, axis=-1, keepdims=True) for a in (p, target))
     still = angle < TINY
     axis = np.where(still, target / np.where(reach == 0, 1.0, reach), p / np.where(still, 1.0, angle))
@@ -63,4 +78,4 @@ def slerp(start: ArrayLike, end: ArrayLike, share: ArrayLike) -> Array:
     shape broadcasts with the leading shape of the quaternions.
     """
     turn = log(product(end, conjugate(start)))
-    return product(exp(np.asarray(share, dtype=np.float64)[..., None] * turn), start)
+    return product(exp(as_numbers(share, "the share of the turn")[..., None] * turn), start)

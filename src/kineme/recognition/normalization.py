@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kineme.errors import TrajectoryError
 from kineme.validation import Array, check_choice, check_switch
 
 SCALES = ("path", "per-dimension", "none")
+SMALLEST, LARGEST = 1e-15, 1e15  # of movements that keep their size
 _FLAT = 1e-6  # of the whole extent; a dimension flatter than this is not blown up
 
 
@@ -23,7 +25,8 @@ class Normalization:
     scale : {"path", "per-dimension", "none"}, default "path"
         "path" divides by the root mean square distance from the center, one number for all dimensions. Merges a dot and
         a circle. "per-dimension" divides each dimension by its own. Merges a circle and an ellipse too. "none" keeps
-        the size, in the unit of the data.
+        the size, in the unit of the data, in which movements must measure 1e-15 to 1e15: they are compared in single
+        precision, whose squares reach no further.
     """
 
     translation: bool = True
@@ -35,7 +38,10 @@ class Normalization:
 
     def apply(self, paths: Array) -> Array:
         """Paths (n, d, T) minus their place, divided by their size."""
-        return np.asarray((paths - self.center(paths)) / self.size(paths))
+        centered = paths - self.center(paths)
+        if self.scale == "none":
+            _check_size(centered)
+        return np.asarray(centered / self.size(paths))
 
     def center(self, paths: Array) -> Array:
         """The place of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
@@ -52,3 +58,14 @@ class Normalization:
             return np.asarray(whole)
         own = np.sqrt(squares)
         return np.where(own > _FLAT * whole, own, whole)
+
+
+def _check_size(paths: Array) -> None:
+    """Refuse paths (n, d, T) that keep a size of which single precision makes zero or infinity."""
+    sizes = np.abs(paths).max(axis=(1, 2), initial=0.0)
+    wrong = (sizes > LARGEST) | ((sizes > 0) & (sizes < SMALLEST))
+    if wrong.any():
+        raise TrajectoryError(
+            f'expected movements of {SMALLEST:g} to {LARGEST:g} in their unit with scale="none", got '
+            f"{sizes[wrong][0]:.3g}; choose another unit, or another scale"
+        )

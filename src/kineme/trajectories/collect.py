@@ -142,6 +142,8 @@ def collect_arrays(
 ) -> Movements:
     """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
     is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
+    if names is not None:
+        _check_sized(names, "names as a list, one for each movement")
     if not is_block:
         _check_sized(arrays, "movements as a list of (T, d) arrays or one (n, T, d) array")
     positions, offsets = _from_block(arrays, copy) if is_block else _from_list(arrays, names)
@@ -185,7 +187,7 @@ def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) 
 
 
 def _check_sized(value: Any, expected: str) -> None:
-    if not hasattr(value, "__len__") or isinstance(value, (str, bytes, dict)):
+    if not hasattr(value, "__len__") or isinstance(value, (str, bytes, dict)) or getattr(value, "ndim", 1) == 0:
         raise TrajectoryError(f"expected {expected}, got {type(value).__name__}")
 
 

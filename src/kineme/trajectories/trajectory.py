@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kineme.errors import TrajectoryError
 from kineme.validation import Array, as_positions, as_times, check_extents, check_finite, check_times
 
 
@@ -42,6 +43,8 @@ class Trajectory:
     name: str | None = None
 
     def __post_init__(self) -> None:
+        if getattr(self.name, "__hash__", None) is None:
+            raise TrajectoryError(f"expected a name as text, got {type(self.name).__name__}")
         who = f"trajectory {self.name!r}" if self.name else "trajectory"
         x = as_positions(self.positions, who)
         t = as_times(self.times, len(x), who)
