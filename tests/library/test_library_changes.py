@@ -262,6 +262,11 @@ def test_history_says_what_was_done(library):
         (lambda it: it.rename("wave", it["nod"].id), r"expected a name, got 'sym-\w+', which is the id of a symbol"),
         (lambda it: it.at("1"), r"expected a version from 0 to 1, got '1'"),
         (lambda it: it.describe("wave", 5), r"expected a description, got 5"),
+        (
+            lambda it: it.describe("wave", "\ud800"),
+            r"expected a description in Unicode, got '\\ud800', which",
+        ),
+        (lambda it: it.rename("wave", "\ud800"), r"expected a name in Unicode, got '\\ud800', which"),
         (lambda it: it.at(2), r"expected a version from 0 to 1, got 2; see history\(\)"),
     ],
 )

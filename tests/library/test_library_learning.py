@@ -278,3 +278,24 @@ def test_an_empty_library_says_so(library):
     for read in (library.movements, library.features, library.primitives):
         with pytest.raises(kineme.SpecificationError, match=r"expected at least one movement, got none: the library"):
             read()
+
+
+@pytest.mark.parametrize("duration", [1e-45, 1e-41, 1e-35, 1e35, 3.5e38, 1e45])
+def test_durations_beyond_single_precision_come_back(tmp_path, duration):
+    times = duration * np.array([0.0, 0.2, 0.3, 0.5, 0.9, 1.0])
+    positions = np.random.default_rng(0).normal(size=(6, 2))
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(Demonstrations.from_arrays([positions], times=[times]))
+        assert library.verify() == []
+        np.testing.assert_allclose(library.movements().times, times, rtol=1e-12)
+
+
+def test_weights_beyond_single_precision_are_refused(tmp_path):
+    """After a fast beginning nobody knows how the path goes on until its last sample."""
+    times = np.append(1e-9 * np.arange(6.0), 1.0)
+    positions = 1e29 * np.array([0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0])[:, None]
+    with (
+        ActionLibrary(tmp_path / "actions", create=True) as library,
+        pytest.raises(TrajectoryError, match=r"trajectory 0: expected weights up to 3e\+38, got larger ones; smooth"),
+    ):
+        library.learn(Demonstrations.from_arrays([positions], times=[times]))

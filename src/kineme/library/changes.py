@@ -9,7 +9,7 @@ from typing import Any
 
 from kineme.errors import SpecificationError
 from kineme.library.read import as_ids
-from kineme.library.rows import Row, among, check_size, listed, next_key, parsed_column, select
+from kineme.library.rows import Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.schema import COLUMNS, MAX_DOCUMENT
 from kineme.library.store import NOW, Store
 from kineme.library.symbols import HOW, check_name, join, make, state_of
@@ -41,7 +41,7 @@ def describe(store: Store, who: str, **values: Any) -> None:
     if "description" in values:
         if not isinstance(values["description"], str):
             raise SpecificationError(f"expected a description, got {values['description']!r}")
-        check_size("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, written as JSON
+        check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, written as JSON
     with store.writing("describe", {"symbol": who, **values}) as change:
         _replace_state(change, state_of(change.connection, who, NOW), **values)
 

@@ -22,7 +22,7 @@ from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, describe
 
 _EVEN = 1e-9  # of a step: stamps closer to an even grid are not stored
-_SMALL, _LARGE = 1e-30, 1e30  # extents between which single precision keeps its relative error
+_SMALL, _LARGE = 1e-30, 1e30  # between which single precision keeps its relative error
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,13 @@ def _relative_times(demos: Demonstrations) -> Array:
 
 
 def pack(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> Packed:
-    """The rows of a batch that has been checked."""
+    """The rows of a batch that has been checked.
+
+    Raises
+    ------
+    TrajectoryError
+        Weights so large that single precision cannot hold them.
+    """
     return Packed(_raw(demos, even), _primitives(demos, specification), _features(demos, specification))
 
 
@@ -107,7 +113,9 @@ def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, by
 
 
 def _times(stamps: Array) -> bytes:
-    """In single precision; in double where single would make two stamps one."""
+    """In single precision; in double where single cannot hold the duration, or would make two stamps one."""
+    if not _SMALL <= stamps[-1] <= _LARGE:
+        return stamps.tobytes()
     short = stamps.astype(np.float32)
     return (short if (np.diff(short) > 0).all() else stamps).tobytes()
 
@@ -115,7 +123,15 @@ def _times(stamps: Array) -> bytes:
 def _primitives(demos: Demonstrations, specification: Specification) -> list[tuple[bytes, bytes]]:
     learned = specification.dmp.learn(demos)
     boundary = np.stack([learned.starts, learned.goals, learned.velocities, learned.extents], axis=1)
-    return list(zip(_cut(boundary), _cut(learned.scaled_weights.astype(np.float32)), strict=True))
+    with np.errstate(over="ignore"):  # refused below
+        weights = learned.scaled_weights.astype(np.float32)
+    if not (good := np.isfinite(weights).all(axis=(1, 2))).all():
+        who = describe(int(np.argmin(good)), demos.names)
+        raise TrajectoryError(
+            f"{who}: expected weights up to {np.finfo(np.float32).max:.1g}, got larger ones; smooth the movement, "
+            "or choose a unit in which it is smaller"
+        )
+    return list(zip(_cut(boundary), _cut(weights), strict=True))
 
 
 def _features(demos: Demonstrations, specification: Specification) -> list[bytes]:

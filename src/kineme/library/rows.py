@@ -157,13 +157,19 @@ def next_key(connection: sqlite3.Connection, table: str) -> int:
 def as_text(value: Any) -> str:
     """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
     text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
-    check_size("a name", text, MAX_TEXT)
+    check_text("a name", text, MAX_TEXT)
     return text
 
 
-def check_size(what: str, text: str, most: int) -> None:
-    """Refuse a text that no library holds."""
-    if len(text) > most // 4 and len(text.encode()) > most:
+def check_text(what: str, text: str, most: int) -> None:
+    """Refuse a text that no library holds: with half of a character in it, or of more bytes than `most`."""
+    try:
+        size = len(text.encode())
+    except UnicodeEncodeError as error:
         raise SpecificationError(
-            f"expected {what} of at most {most:,} bytes, got {len(text.encode()):,}: {text[:40]!r}...; shorten it"
+            f"expected {what} in Unicode, got {text[:40]!r}, which holds half of a character; decode it again"
+        ) from error
+    if size > most:
+        raise SpecificationError(
+            f"expected {what} of at most {most:,} bytes, got {size:,}: {text[:40]!r}...; shorten it"
         )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.rows import ALIVE, Row, among, check_size, damage, damaged, listed, next_key, parsed_column, select
+from kineme.library.rows import ALIVE, Row, among, check_text, damage, damaged, listed, next_key, parsed_column, select
 from kineme.library.schema import COLUMNS, MAX_TEXT
 from kineme.library.store import Store
 from kineme.library.versions import Change, Moment
@@ -156,13 +156,7 @@ def check_name(name: Any) -> str:
     """
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
-    try:
-        name.encode()
-    except UnicodeEncodeError as error:
-        raise SpecificationError(
-            f"expected a name in Unicode, got {name!r}, which holds half of a character; decode it again"
-        ) from error
-    check_size("a name", name, MAX_TEXT)
+    check_text("a name", name, MAX_TEXT)
     if "\0" in name:
         raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
     return name
