@@ -80,8 +80,11 @@ def test_an_export_holds_what_was_committed_when_it_began(eventful, tmp_path):
             lambda data: data.replace(b"to the side", b"to the left"),
             r"\(2 problems, the first: row 5 of table version: damaged bytes\); nothing was imported: export it again",
         ),
-        (lambda data: b"not a database" * 100, r"to be a library, got a file that is no database"),
-        (lambda data: b"", r"got another program's database"),
+        (
+            lambda data: b"not a database" * 100,
+            r"to be a library, got a file that is no database .*; correct the path, or take it from a backup",
+        ),
+        (lambda data: b"", r"got an empty file; correct the path, or take it from a backup"),
     ],
 )
 def test_a_spoiled_export_is_not_imported(eventful, tmp_path, spoil, message):

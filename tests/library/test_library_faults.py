@@ -235,7 +235,10 @@ def test_an_earlier_library_is_brought_up_to_date_in_one_step(folder, monkeypatc
     [
         (lambda path: None, r"expected a library in .*, found no library\.sqlite there; make one by learning"),
         (lambda path: path.write_bytes(b"PK\x03\x04" * 500), r"to be a library, got a file that is no database"),
-        (lambda path: path.write_bytes(b""), r"to be a library of kineme, got another program's database"),
+        (
+            lambda path: path.write_bytes(b""),
+            r"library of kineme, got an empty file; correct the path, or take it from a",
+        ),
         (lambda path: sqlite3.connect(path).execute("CREATE TABLE t (a)").connection.close(), r"another program's"),
         (lambda path: path.mkdir(), r"unable to open database file|read_only"),
     ],

@@ -199,6 +199,17 @@ class TestWrongWishes:
         with pytest.raises(kineme.TrajectoryError, match=r"finite numbers for goal, got \[nan, 1.0\]"):
             learn("bio-inspired").rollout(goal=[float("nan"), 1.0])
 
+    def test_which_of_many_wishes_is_bad(self):
+        goals = np.zeros((1000, 2))
+        goals[700, 1] = np.inf
+        with pytest.raises(
+            kineme.TrajectoryError, match=r"finite numbers for goal, got \[0.0, inf\] for movement 700$"
+        ):
+            learn("bio-inspired").rollout(goal=goals)
+        goals[700, 1] = 1e200
+        with pytest.raises(kineme.TrajectoryError, match=r"got \[0.0, 1e\+200\] for movement 700; choose another unit"):
+            learn("bio-inspired").rollout(goal=goals.tolist())
+
     def test_numbers_of_movements_that_do_not_go_together(self):
         with pytest.raises(kineme.TrajectoryError, match="got 3 primitives, 4 goal"):
             learn("bio-inspired").rollout(goal=np.ones((4, 2)))

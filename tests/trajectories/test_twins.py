@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.interpolate import CubicSpline
+from scipy.interpolate import make_smoothing_spline as smoothing_spline_of_numbers
 
 from kineme import Demonstrations, Resample, Smooth, preprocess
 from kineme.trajectories.arc_length import arc_length_phase, resample_by_arc_length, resample_by_phase
@@ -22,6 +23,12 @@ def compiled(request):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINEME_COMPILED", request.param)
         yield request.param
+
+
+def make_smoothing_spline(t, x, lam):
+    """SciPy's, dimension by dimension: before 1.15 it takes no more than one."""
+    splines = [smoothing_spline_of_numbers(t, one, lam=lam) for one in x.T]
+    return lambda at: np.stack([spline(at) for spline in splines], axis=-1)
 
 
 def _ragged(seed, least, n=6, origin=0.0, place=0.0, nearness=1e-3):

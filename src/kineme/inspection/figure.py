@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from kineme.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.inspection.inspect import labels_in_order
@@ -74,9 +75,9 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
 
 def _tidy_space(axes: Any) -> None:
     """Equal scales, no numbers, and planes that do not draw the eye."""
-    axes.set(xticklabels=[], yticklabels=[], zticklabels=[])
     axes.set_aspect("equal")
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 push the axes aside for empty labels
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#DDDDDD", linewidth=0.5)
         axis._axinfo["tick"].update(inward_factor=0.0, outward_factor=0.0)

@@ -93,7 +93,10 @@ def check_alone(path: Path) -> None:
 def check_kind(connection: sqlite3.Connection, path: Path) -> int:
     """The schema version of a library; refuses another program's database, a later version, and strange definitions."""
     if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID:
-        raise DataError(f"expected {path} to be a library of kineme, got another program's database")
+        got = "another program's database" if path.stat().st_size else "an empty file"
+        raise DataError(
+            f"expected {path} to be a library of kineme, got {got}; correct the path, or take it from a backup"
+        )
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])
     if not 1 <= version <= SCHEMA_VERSION:
         raise DataError(

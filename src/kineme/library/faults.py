@@ -10,8 +10,8 @@ from pathlib import Path
 from kineme.errors import DataError, KinemeError
 
 _DAMAGED = (
-    "expected {path} to be readable, got damaged bytes ({error}); kineme library verify names what is damaged: take "
-    "the file from a backup or an export"
+    "expected {path} to be readable, got damaged bytes ({error}); take the file from a backup or an export: where the "
+    "file can still be opened, kineme library verify names what is damaged"
 )
 
 #: What SQLite says of damage under no code of its own: of text that is no text any more, of a strange header.
@@ -45,7 +45,10 @@ _WORDS = {
         "it: take it from a backup or an export that you trust"
     ),
     sqlite3.SQLITE_TOOBIG: "expected {path} to hold no value larger than itself, got one ({error}): damaged bytes",
-    sqlite3.SQLITE_NOTADB: "expected {path} to be a library, got a file that is no database ({error})",
+    sqlite3.SQLITE_NOTADB: (
+        "expected {path} to be a library, got a file that is no database ({error}); correct the path, or take it from "
+        "a backup"
+    ),
 }
 _WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]
 _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
 from kineme.parallel import for_tiles
@@ -188,11 +188,19 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
     if not fits:
         shape = "a number or (n,)" if n_dims is None else f"({n_dims},) or (n, {n_dims})"
         raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(wish)}")
-    if not np.isfinite(value).all():
-        raise TrajectoryError(f"expected finite numbers for {name}, got {wish!r}")
-    if np.abs(value).max(initial=0.0) > LARGEST:
-        raise TrajectoryError(f"expected numbers up to {LARGEST:g} for {name}, got {wish!r}; choose another unit")
+    if (bad := ~np.isfinite(value)).any():
+        raise TrajectoryError(f"expected finite numbers for {name}, got {_first(value, bad)}")
+    if (bad := np.abs(value) > LARGEST).any():
+        raise TrajectoryError(
+            f"expected numbers up to {LARGEST:g} for {name}, got {_first(value, bad)}; choose another unit"
+        )
     return value
+
+
+def _first(value: Array, bad: NDArray[np.bool_]) -> str:
+    """The first bad wish, and whose it is where there are many."""
+    k = int(bad.reshape(len(value), -1).any(axis=1).argmax())
+    return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
 
 
 def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
