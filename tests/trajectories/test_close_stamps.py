@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, Resample, RhythmicDMP, preprocess
+from kineme import DMP, Demonstrations, Resample, RhythmicDMP, Smooth, preprocess
 from kineme.trajectories.close_stamps import merge_close
 
 N = 200
@@ -121,3 +121,20 @@ def test_smooth_movements_lose_nothing_by_it(make_movement):
     exact = Demonstrations.from_arrays([np.sin(k * t[:, None] / t[-1])], times=[t])
     even = preprocess(exact, [Resample(300)]).positions
     np.testing.assert_allclose(even, np.sin(k * np.linspace(0, 1, 300)[:, None]), atol=1e-6)
+
+
+@pytest.mark.parametrize("compiled", ["never", "always"])
+@pytest.mark.parametrize("gap", [1e-4, 1e-7, 1e-8, 1e-10, 1e-12])
+def test_smoothing_does_not_notice_how_close_close_stamps_are(monkeypatch, compiled, gap):
+    """A clock of nanoseconds, whose samples come in pairs."""
+    monkeypatch.setenv("KINEME_COMPILED", compiled)
+    rng = np.random.default_rng(0)
+    close = rng.random(119) < 0.3
+    noise = 1e-3 * rng.normal(size=(120, 2))
+
+    def smoothed(gap):
+        t = np.append(0.0, np.cumsum(np.where(close, gap, 1.0)))
+        path = np.column_stack((np.sin(3 * t / t[-1]), np.cos(2 * t / t[-1]))) + noise
+        return preprocess(Demonstrations.from_arrays([path], times=[t]), [Smooth(6.0)]).positions
+
+    np.testing.assert_allclose(smoothed(gap), smoothed(1e-5), atol=2e-4 if gap > 1e-5 else 2e-5)
