@@ -106,3 +106,12 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
     remove_leftovers(tmp_path / "nowhere" / "x")
     with pytest.raises(FileNotFoundError, match="expected a folder"):
         write_atomically(Path(tmp_path / "nowhere" / "x"), b"")
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "/", "there"])
+def test_a_folder_is_not_written_over(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    with pytest.raises(IsADirectoryError, match=r"expected the name of a file to write, got the folder '.+'; add a"):
+        write_atomically(Path(name), b"x")
+    assert [one.name for one in tmp_path.iterdir()] == ["there"]

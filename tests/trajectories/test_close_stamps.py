@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, Demonstrations, Resample, RhythmicDMP, preprocess
+from kineme import DMP, Demonstrations, Resample, RhythmicDMP, Smooth, preprocess
 from kineme.trajectories.close_stamps import merge_close
 
 N = 200
@@ -132,3 +132,20 @@ def test_a_group_is_shorter_than_a_tenth_of_a_step():
     assert len(inside) in {5, 6}
     assert np.diff(inside).max() < 0.12
     assert len(merged[0]) == len(times) - 26 + len(inside)
+
+
+@pytest.mark.parametrize("compiled", ["never", "always"])
+@pytest.mark.parametrize("gap", [1e-4, 1e-7, 1e-8, 1e-10, 1e-12])
+def test_smoothing_does_not_notice_how_close_close_stamps_are(monkeypatch, compiled, gap):
+    """A clock of nanoseconds, whose samples come in pairs."""
+    monkeypatch.setenv("KINEME_COMPILED", compiled)
+    rng = np.random.default_rng(0)
+    close = rng.random(119) < 0.3
+    noise = 1e-3 * rng.normal(size=(120, 2))
+
+    def smoothed(gap):
+        t = np.append(0.0, np.cumsum(np.where(close, gap, 1.0)))
+        path = np.column_stack((np.sin(3 * t / t[-1]), np.cos(2 * t / t[-1]))) + noise
+        return preprocess(Demonstrations.from_arrays([path], times=[t]), [Smooth(6.0)]).positions
+
+    np.testing.assert_allclose(smoothed(gap), smoothed(1e-5), atol=2e-4 if gap > 1e-5 else 2e-5)

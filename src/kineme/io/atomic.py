@@ -22,6 +22,8 @@ def write_atomically(path: Path, data: bytes) -> Path:
     OSError
         The folder is missing, read-only or full; what was at `path` is as it was.
     """
+    if not path.name or path.is_dir():  # an empty text is the current folder
+        raise IsADirectoryError(f"expected the name of a file to write, got the folder {str(path)!r}; add a name")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, there is none; create it")
     with replaced(path) as beside:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.trajectories.close_stamps import merge_close
+from kineme.trajectories.close_stamps import merge_close, spread_close
 from kineme.trajectories.labels import label_array
 from kineme.trajectories.trajectory import Trajectory
 from kineme.validation import (
@@ -91,6 +91,11 @@ class Movements:
         if merged is None:
             return self
         return replace(self, times=merged[0], positions=merged[1], offsets=merged[2])
+
+    @cached_property
+    def spread(self) -> Array:
+        """Time stamps (total,), none so close to the next that a smoothing spline loses its digits."""
+        return self.stamps if self.times is None else spread_close(self.times, self.offsets)
 
     def take(self, chosen: NDArray[np.intp]) -> Movements:
         """The chosen movements, in that order, copied into a block of their own."""

@@ -62,7 +62,7 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
     second ones through their values. Minus the first recorded position, so that a large offset costs no digits.
     """
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
-    times, positions = demonstrations.times, demonstrations.positions
+    times, positions = demonstrations.movements.spread, demonstrations.positions
     if not _compiled(demonstrations, offsets):
         first, lengths = offsets[0], np.diff(offsets)
         smoothed, m = smoothing_spline(times, positions, offsets, scales)
@@ -76,7 +76,7 @@ def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: f
 def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, smoothed: Array) -> None:
     """Smooth movements start:stop at their own stamps."""
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
-    times, positions = demonstrations.times, demonstrations.positions
+    times, positions = demonstrations.movements.spread, demonstrations.positions
     if _compiled(demonstrations, offsets):
         splines = compiled_module("kineme.trajectories._splines")
         splines.fill_smoothed(times, positions, offsets, scales, smoothed)
