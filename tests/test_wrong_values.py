@@ -36,10 +36,10 @@ from kineme.recognition.perturbations import Perturbation
 from kineme.recognition.representation import Representation
 
 WRONG = (
-    None, math.nan, math.inf, -math.inf, -1, 0, 10**9, 10**30, 1e-320, 1e-200, 1e160, 1e300, 1e308, -1e308, 0.5,
-    True, False, "x", "", b"x", 1j, object(), [], (), {}, [1.0], [math.nan], [[1, 2], [3]], ["a", "b"], [None, None],
-    np.zeros((2, 2)), np.zeros((3, 2)), np.zeros(0), np.array("a"), np.array([1, 2], dtype=object), np.int32(3),
-    np.float32(3), np.datetime64("2020-01-01"), [1e308, -1e308], [1e160, 1.0], [1e-320, 1.0],
+    None, math.nan, math.inf, -math.inf, -1, 0, 10**9, 10**30, 10**400, 1e-320, 1e-200, 1e160, 1e300, 1e308, -1e308,
+    0.5, True, False, "x", "", b"x", 1j, object(), [], (), {}, [1.0], [math.nan], [[1, 2], [3]], ["a", "b"],
+    [None, None], np.zeros((2, 2)), np.zeros((3, 2)), np.zeros(0), np.array("a"), np.array([1, 2], dtype=object),
+    np.int32(3), np.float32(3), np.datetime64("2020-01-01"), [1e308, -1e308], [1e160, 1.0], [1e-320, 1.0],
 )  # fmt: skip
 
 

@@ -67,7 +67,7 @@ def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers
         array = np.asarray(values)
         hidden = array.dtype.kind == "O" and any(isinstance(one, (complex, np.complexfloating)) for one in array.flat)
         numbers = None if hidden or array.dtype.kind == "c" else array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise TrajectoryError(f"{who}: expected {expected}, got {error}") from error
     if numbers is None:
         raise TrajectoryError(f"{who}: expected real numbers, got complex ones; pass both parts as columns")
@@ -202,7 +202,10 @@ def check_number(
 ) -> None:
     """Refuse a parameter that is not a finite number in its range, or too close to 0 to be divided by."""
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    try:
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    except OverflowError:  # a whole number beyond all others
+        number = math.inf
     outside = (above is not None and number <= above) or (least is not None and number < least)
     if not math.isfinite(number) or outside:
         raise SpecificationError(f"expected {name} to be a number{bound}, got {value!r}")
@@ -227,8 +230,9 @@ def check_samples(n_samples: float, n_basis: int, wish: str) -> int:
     """A number of samples, refused where what generates them does not fit into memory; `wish` asked for so many."""
     most = MOST_NUMBERS // int(n_basis)
     if not n_samples <= most:
+        got = f"{n_samples:.3g}" if n_samples < LARGEST else "far more"
         raise SpecificationError(
-            f"expected {wish} to ask for at most {most:,} samples with {n_basis} basis functions, got {n_samples:.3g}; "
+            f"expected {wish} to ask for at most {most:,} samples with {n_basis} basis functions, got {got}; "
             "lower it, or generate the movement in parts"
         )
     return math.ceil(n_samples)

@@ -299,3 +299,37 @@ def test_weights_beyond_single_precision_are_refused(tmp_path):
         pytest.raises(TrajectoryError, match=r"trajectory 0: expected weights up to 3e\+38, got larger ones; smooth"),
     ):
         library.learn(Demonstrations.from_arrays([positions], times=[times]))
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        ({"labels": "ab"}, r"one label for each of the 2 movements, got 'ab'"),
+        ({"labels": 5}, r"one label for each of the 2 movements, got 5"),
+        ({"labels": np.array("a")}, r"one label for each of the 2 movements, got array"),
+        ({"labels": ["a"]}, r"one label for each of the 2 movements, got 1"),
+        (
+            {"labels": ["a", float("nan")]},
+            r"trajectory 1 .* a label that is text or a number, got nan",
+        ),
+        ({"labels": [["a"], "b"]}, r"trajectory 0 \('no 0'\): expected a label that is text or a number, got \['a'\]"),
+        ({"source": 5}, r"one source, or one for each of the 2 movements, got 5"),
+        ({"source": ["a.csv", None]}, r"sources to be kineme.library.source.Source or None, got 'a.csv'"),
+        ({"places": 5}, r"one place for each of the 2 movements, got 5"),
+        ({"places": ["1"]}, r"one place for each of the 2 movements, got 1"),
+    ],
+)
+def test_labels_sources_and_places_that_cannot_be_are_refused(tmp_path, wish, message):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        with pytest.raises(TrajectoryError, match=message):
+            library.learn(draw_movements(2), **wish)
+        assert len(library) == 0
+
+
+@pytest.mark.parametrize("who", [object(), 10**400, [], {}, 1j, None, b"a"])
+def test_what_is_no_text_names_no_symbol(tmp_path, who):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(2), ["a", "b"])
+        for ask in (library.__getitem__, library.nearest):
+            with pytest.raises(SpecificationError, match="expected"):
+                ask(who)

@@ -97,5 +97,5 @@ def limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
 def _numbers(name: str, value: ArrayLike) -> Array:
     try:
         return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SpecificationError(f"expected {name} to be numbers, got {value!r}") from error

@@ -117,5 +117,5 @@ def _numbers(column: Any, head: str) -> Any:
         return nanoseconds(values)
     try:
         return values.astype(np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise DataError(f"expected numbers in the column {head!r}, got {column.type}") from error

@@ -12,9 +12,13 @@ from kineme.errors import SpecificationError
 
 def positive(value: object, name: str, otherwise: str) -> float:
     """`value` as a plain float, if it is a finite number above zero; the message ends with `otherwise`."""
-    if not isinstance(value, Real) or not math.isfinite(value) or value <= 0:
+    try:
+        number = float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:  # a whole number beyond all others
+        number = math.inf
+    if not math.isfinite(number) or number <= 0:
         raise SpecificationError(f"expected a finite {name} > 0, got {value!r}; {otherwise}")
-    return float(value)
+    return number
 
 
 def check_representable(value: float, name: str, dtype: np.dtype[np.floating]) -> None:

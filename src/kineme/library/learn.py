@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from kineme.library.store import Store
 from kineme.library.symbols import check_name
 from kineme.trajectories.collect import Movements
 from kineme.trajectories.demonstrations import Demonstrations
+from kineme.validation import describe as name_of
 
 Progress = Callable[[int, int], object]
 
@@ -150,27 +152,44 @@ def _as_names(demos: Demonstrations, labels: Sequence[Any] | None) -> list[str |
     given = demos.labels if labels is None else labels
     if given is None:
         return [None] * len(demos)
-    plain = given.tolist() if isinstance(given, np.ndarray) else list(given)
-    if len(plain) != len(demos):
-        raise TrajectoryError(f"expected one label for each of the {len(demos)} movements, got {len(plain)}")
+    plain = _one_each("label", given, len(demos))
+    for i, label in enumerate(plain):
+        if isinstance(label, (list, tuple, dict, np.ndarray)) or (isinstance(label, float) and math.isnan(label)):
+            raise TrajectoryError(
+                f"{name_of(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
+                "name the action, or pass None where it has no name"
+            )
     known = {label: None if label is None else check_name(str(label)) for label in dict.fromkeys(plain)}
     return [known[label] for label in plain]
+
+
+def _one_each(what: str, given: Any, n: int) -> list[Any]:
+    """What a user passes for every movement, as a list; one text is none."""
+    many = f"one {what} for each of the {n} movements"
+    try:
+        size = -1 if isinstance(given, (str, bytes)) else len(given)
+    except TypeError:
+        size = -1
+    if size != n:
+        raise TrajectoryError(f"expected {many}, got {size if size >= 0 else repr(given)}")
+    return given.tolist() if isinstance(given, np.ndarray) else list(given)
 
 
 def _as_sources(source: Source | Sequence[Source | None] | None, n: int) -> list[Source | None]:
     if source is None or isinstance(source, Source):
         return [source] * n
-    if len(source) != n:
-        raise TrajectoryError(f"expected one source, or one for each of the {n} movements, got {len(source)}")
-    return list(source)
+    sources = _one_each("source, or one", source, n)
+    for one in sources:
+        if one is not None and not isinstance(one, Source):
+            raise TrajectoryError(f"expected sources to be kineme.library.source.Source or None, got {one!r}")
+    return sources
 
 
 def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> list[str | None]:
     """Where in its source each movement is; unless that is said, movements are known by their samples alone."""
     if places is None:
         return [None] * len(sources)
-    if len(places) != len(sources):
-        raise TrajectoryError(f"expected one place for each of the {len(sources)} movements, got {len(places)}")
+    places = _one_each("place", places, len(sources))
     _check_apart(places, sources)
     return [None if place is None else str(place) for place in places]
 

@@ -97,7 +97,8 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     SpecificationError
         No such symbol; the message lists names like it.
     """
-    for condition in ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)"):
+    conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
+    for condition in conditions if isinstance(who, str) else ():
         try:
             found = select(connection, "symbol_state", f"{condition} AND {ALIVE}", {"who": who, "v": version})
         except UnicodeEncodeError:

@@ -88,7 +88,7 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
     """
     try:
         array = np.asarray(weights, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise SpecificationError(

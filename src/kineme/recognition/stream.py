@@ -92,7 +92,7 @@ class Live:
         try:
             times, positions = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)
             positions = positions.reshape(len(times), -1) if np.ndim(t) == 0 else positions
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             times, positions = np.empty(0), np.empty((0, 0))
         if times.ndim != 1 or positions.shape != (len(times), self._recognizer.n_dims_):
             self.skipped += 1
