@@ -41,15 +41,18 @@ def test_what_is_not_calibrated_is_unknown_beyond_six_tenths_of_the_way_to_anoth
     assert p[0] > 0.05 > p[2]
 
 
-def test_copies_of_one_movement_have_a_scale():
-    """A millionth of a kernel width: a copy is a member, what differs at all is not."""
+@pytest.mark.parametrize("compiled", ["never", "always"])
+def test_copies_of_one_movement_have_a_scale(monkeypatch, compiled):
+    """Above what single precision makes of copies, whichever path computes them; what differs visibly is no copy."""
+    monkeypatch.setenv("KINEME_COMPILED", "never")
     demos = draw_shapes([1] * 3, seed=3)
     copies = demos[[0, 0, 1, 1, 2, 2]]
     recognizer = Recognizer(classifier="nearest", weights="equal").fit(copies, list("aabbcc"))
-    scales = calibrate(recognizer).scales
-    np.testing.assert_array_less(scales, 1e-3)  # single precision: copies are not quite at 0
-    np.testing.assert_array_less(0.999e-6, scales)
+    np.testing.assert_allclose(calibrate(recognizer).scales, 5e-3, rtol=0, atol=1e-15)
+    monkeypatch.setenv("KINEME_COMPILED", compiled)
     assert (recognizer.p_values(copies)[range(6), [0, 0, 1, 1, 2, 2]] > 0.05).all()
+    near = [one.positions + 0.05 * np.sin(4 * one.times / one.duration)[:, None] for one in copies]
+    assert (recognizer.p_values(near) < 0.05).all()
 
 
 def test_a_typical_impostor_counts_exp_of_minus_four():

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spread
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
-_LEAST = 1e-6  # smallest scale, in kernel widths: demonstrations may be copies of each other
+_LEAST = 5e-3  # smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart
 #: Of the typical distance to another class: within it, 95 % of members are expected where nothing calibrates.
 REACH = 0.6
 
