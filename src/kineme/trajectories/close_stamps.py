@@ -71,6 +71,10 @@ def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
 
     Movement by movement, so that none depends on the others; the usual case is that none has such stamps.
     """
+    if use_compiled(len(times)):
+        any_closer = compiled_module("kineme.trajectories._compiled").any_closer
+        if not any_closer(times, offsets, CLOSEST):
+            return times
     lengths, durations = np.diff(offsets), times[offsets[1:] - 1] - times[offsets[:-1]]
     least = CLOSEST * durations / (lengths - 1)
     short = np.diff(times) < np.repeat(least, lengths)[1:]
