@@ -6,7 +6,7 @@ import json
 import sqlite3
 import uuid
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from numbers import Integral
 from pathlib import Path
@@ -56,8 +56,9 @@ class Store:
         self.read_only = read_only or as_of is not None
         self.wait = wait
         self._turn = RLock()
-        # Threads share the connection to read from; a SQLite that was built without locks of its own gets ours.
-        self._look: AbstractContextManager[Any] = RLock() if sqlite3.threadsafety < 3 else nullcontext()
+        # Threads share the connection to read from, one at a time: Python may hand a statement that it keeps to two
+        # threads that ask the same at the same moment, and each gets rows of the other.
+        self._look = RLock()
         self._writer: sqlite3.Connection | None = None
         self._waking, self._asleep, self._readers = Lock(), False, Readers(path)
         if not self.path.exists():
