@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import kineme
 from bench.rows import Row
-from kineme.anchoring import propose
-from kineme.recognition.perturbations import Perturbation
+from kineme.anchoring.proposals.proposals import propose
+from kineme.movements.preparation.perturbations import Perturbation
 
 #: All perturbations of one-shot recognition together.
 _PERTURBATION = Perturbation(shift=1.0, scale=1.0, rotation=math.radians(20), warp=0.35, noise=0.01)

@@ -11,11 +11,12 @@ import numpy as np
 
 import kineme
 from bench.rows import Row
-from kineme.evaluation.conditions import TOGETHER
-from kineme.evaluation.splits import few_shot
-from kineme.recognition import classifiers, similarity
-from kineme.recognition.perturbations import Perturbation
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS as THREE
+from kineme.comparison import similarity
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS as THREE
+from kineme.experiments.evaluation.conditions import TOGETHER
+from kineme.experiments.evaluation.splits import few_shot
+from kineme.movements.preparation.perturbations import Perturbation
+from kineme.recognition import classifiers
 
 SPLITS, SEED = 5, 0
 LEVELS = {"moderately": TOGETHER[1], "strongly": TOGETHER[2]}

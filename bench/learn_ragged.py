@@ -9,8 +9,8 @@ from bench.peers import movement_primitive
 from bench.rows import Row
 from bench.timing import alone, medians
 from kineme import DMP, Demonstrations
-from kineme.parallel import for_tiles
-from kineme.trajectories.resample import relative_rows
+from kineme.movements.preparation.resample import relative_rows
+from kineme.runtime.parallel import for_tiles
 from kineme.validation import check_finite, check_times
 
 N_POINTS, N_BASIS, N_DIMS = 200, 80, 2

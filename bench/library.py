@@ -20,7 +20,7 @@ import kineme
 from bench.library_movements import ASKED, N_SAMPLES, SHOWN, copies, kinds
 from bench.movements import SEED, Array
 from bench.rows import Row, save, table
-from kineme.library.serving import Serving
+from kineme.library.recognition.recognize import Serving
 
 _BATCH = 50_000  # movements in one call
 _PER_KIND = 200

@@ -8,7 +8,7 @@ import numpy as np
 
 import kineme
 from bench.movements import Array
-from kineme.recognition.perturbations import Perturbation
+from kineme.movements.preparation.perturbations import Perturbation
 
 N_SAMPLES = 200
 SHOWN = Perturbation(shift=1.0, scale=1.0, rotation=np.radians(20), warp=0.2, noise=0.002)

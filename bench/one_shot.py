@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 import kineme
 from bench.rows import Row
-from kineme.evaluation.conditions import TOGETHER
-from kineme.recognition.perturbations import Perturbation
+from kineme.experiments.evaluation.conditions import TOGETHER
+from kineme.movements.preparation.perturbations import Perturbation
 
 SPREADS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
 SHOWN = (1, 5)

@@ -11,7 +11,7 @@ from bench.movements import SEED, Array
 from bench.peers import dtw_nearest
 from bench.rows import Row
 from bench.timing import medians
-from kineme.recognition.perturbations import Perturbation
+from kineme.movements.preparation.perturbations import Perturbation
 
 SHORTEST, LONGEST = 120, 200
 N_POINTS = 200

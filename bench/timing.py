@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from kineme.parallel import single_threaded_blas
+from kineme.runtime.parallel import single_threaded_blas
 
 
 def medians(rivals: dict[str, Callable[[], object]], repeats: int, warm_up: int = 2) -> dict[str, float]:

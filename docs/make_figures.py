@@ -15,8 +15,8 @@ from walk_through import walk
 
 import kineme
 from kineme.control import ObstacleAvoidance
-from kineme.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
-from kineme.styles.figure import draw_morph
+from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
+from kineme.primitives.styles.figure import draw_morph
 
 _COLORS = 128  # of a picture of the tutorial
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}

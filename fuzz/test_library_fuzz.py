@@ -10,7 +10,13 @@ from library_mutants import MUTANTS, exported
 
 from limited_child import MIB, LimitedChild
 
-MODULES = ("kineme", "library_mutants", "sklearn.svm", "kineme.anchoring.propose", "kineme.recognition.recognizer")
+MODULES = (
+    "kineme",
+    "library_mutants",
+    "sklearn.svm",
+    "kineme.anchoring.proposals.propose",
+    "kineme.recognition.recognizer",
+)
 
 
 @pytest.mark.parametrize("kind", MUTANTS)

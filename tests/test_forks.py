@@ -11,9 +11,10 @@ import warnings
 import numpy as np
 import pytest
 
-from kineme import DMP, ActionLibrary, DataError, Trajectory, compiled, forks, parallel
+from kineme import DMP, ActionLibrary, DataError, Trajectory
 from kineme.kernels import Laplacian
-from kineme.library import over_forks
+from kineme.library.storage import over_forks
+from kineme.runtime import compiled, forks, parallel
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no forks here")
 

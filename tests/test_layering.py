@@ -1,4 +1,4 @@
-"""Imports go only downwards, in the order in which CONTRIBUTING.md lists the layers."""
+"""Imports go only downwards, in the order in which CONTRIBUTING.md lists chapters and their rooms."""
 
 from __future__ import annotations
 
@@ -10,14 +10,21 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "kineme"
-FRONT_DOOR = ("__init__", "__main__")  # they may import everything
+FRONT_DOOR = ("__init__", "__main__", "control", "orientation", "styles")  # they may import everything
 
 
 def _layers():
-    """Layer -> its line in the list, from the bottom up."""
+    """Chapter, or chapter/room -> its line in the list, from the bottom up."""
     listed = (ROOT / "CONTRIBUTING.md").read_text().partition("    src/kineme/\n")[2].partition("\n\n")[0]
-    rows = [re.split(r"\s{2,}", line.strip())[0].replace("/", "").split(", ") for line in listed.splitlines()]
-    return {name: height for height, row in enumerate(rows) for name in row}
+    layers, chapter = {}, ""
+    for height, line in enumerate(listed.splitlines()):
+        names = re.split(r"\s{2,}", line.strip())[0].replace("/", "").split(", ")
+        if line.startswith(" " * 8):
+            names = [f"{chapter}/{name}" for name in names]
+        else:
+            chapter = names[-1]
+        layers.update(dict.fromkeys(names, height))
+    return layers
 
 
 def _imported(path):
@@ -34,28 +41,48 @@ def _modules():
     return [path for path in sorted(PACKAGE.rglob("*.py")) if path.stem not in FRONT_DOOR or path.parent != PACKAGE]
 
 
-def _layer_of(path):
+def _chapter_of(path):
     return path.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
+def _room_of(names):
+    """Of a module's names below kineme: "chapter/room", or None for a file that lies in its chapter itself."""
+    room = "/".join(names[:2])
+    return room if (PACKAGE / room).is_dir() and len(names) > 1 else None
+
+
 @pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_from_its_own_layer_and_from_those_below(path):
-    layers, own = _layers(), _layer_of(path)
-    assert own in layers, f"list the layer {own!r} in CONTRIBUTING.md"
-    for _, layer, *_ in _imported(path):
-        assert layers[layer] <= layers[own], f"{own} is below {layer}"
+def test_a_module_imports_from_its_own_chapter_and_from_those_below(path):
+    layers, own = _layers(), _chapter_of(path)
+    assert own in layers, f"list the chapter {own!r} in CONTRIBUTING.md"
+    for _, chapter, *_ in _imported(path):
+        assert layers[chapter] <= layers[own], f"{own} is below {chapter}"
+
+
+@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_imports_from_its_own_room_and_from_those_below(path):
+    layers, own = _layers(), _room_of(path.relative_to(PACKAGE).with_suffix("").parts)
+    assert own is None or own in layers, f"list the room {own!r} in CONTRIBUTING.md"
+    for _, *names in _imported(path):
+        other = _room_of(names)
+        if own and other and own.partition("/")[0] == other.partition("/")[0]:
+            assert layers[other] <= layers[own], f"{own} is below {other}"
+
+
+def test_every_chapter_and_room_that_is_listed_exists():
+    assert not [name for name in _layers() if not (PACKAGE / name).is_dir() and not (PACKAGE / f"{name}.py").is_file()]
 
 
 def test_kernels_know_nothing_of_movements():
-    imported = {layer for path in (PACKAGE / "kernels").glob("*.py") for _, layer, *_ in _imported(path)}
-    assert imported <= {"kernels", "compiled", "parallel", "validation", "errors"}
+    imported = {chapter for path in (PACKAGE / "kernels").glob("*.py") for _, chapter, *_ in _imported(path)}
+    assert imported <= {"kernels", "runtime", "validation", "errors"}
 
 
 def _compiled_modules():
     """Modules with compiled functions, and the one that keeps their machine code: importing them imports Numba."""
     jitted = [path for path in _modules() if re.search(r"^@jit|= jit\(", path.read_text(), re.MULTILINE)]
     return {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in jitted} | {
-        "kineme.machine_code": PACKAGE / "machine_code.py"
+        "kineme.runtime.machine_code": PACKAGE / "runtime" / "machine_code.py"
     }
 
 
@@ -73,13 +100,13 @@ def test_numba_and_compiled_modules_are_loaded_in_one_place_only(path):
     """Threads that import parts of Numba at the same time break it for the rest of the process."""
     compiled = _compiled_modules()
     for name in _all_imports(path):
-        assert name.partition(".")[0] != "numba" or path in compiled.values(), f"load Numba by kineme.compiled: {name}"
+        assert name.partition(".")[0] != "numba" or path in compiled.values(), f"load Numba by runtime.compiled: {name}"
         asked = {name, name.rpartition(".")[0]} & set(compiled)
-        assert not asked or path in compiled.values(), f"use kineme.compiled.compiled_module: {name}"
+        assert not asked or path in compiled.values(), f"use kineme.runtime.compiled.compiled_module: {name}"
 
 
 def test_the_modules_that_are_asked_for_have_compiled_functions():
-    assert {"kernels", "control", "trajectories"} <= {name.split(".")[1] for name in _compiled_modules()}
+    assert {"kernels", "primitives", "movements"} <= {name.split(".")[1] for name in _compiled_modules()}
     for path in _modules():
         for name in re.findall(r"compiled_module\(\"(.*?)\"\)", path.read_text()):
             assert name in _compiled_modules(), path

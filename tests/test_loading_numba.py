@@ -11,7 +11,7 @@ from importlib import import_module, invalidate_caches
 import numpy as np
 import pytest
 
-from kineme.compiled import jit
+from kineme.runtime.compiled import jit
 
 THREADS = """
 import sys, threading, time, traceback
@@ -116,7 +116,7 @@ class Interrupt:
             raise KeyboardInterrupt
 
 sys.meta_path.insert(0, Interrupt())
-from kineme import compiled
+from kineme.runtime import compiled
 try:
     compiled.load_compiled()
     raise SystemExit("not interrupted")

@@ -29,11 +29,11 @@ from kineme import (
     TrimRest,
     kernels,
 )
-from kineme.control.obstacles import ObstacleAvoidance
+from kineme.comparison.representation import Representation
 from kineme.features.random_binning import RandomBinning
-from kineme.recognition.hypotheses import Early
-from kineme.recognition.perturbations import Perturbation
-from kineme.recognition.representation import Representation
+from kineme.movements.preparation.perturbations import Perturbation
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.recognition.early.hypotheses import Early
 
 WRONG = (
     None, math.nan, math.inf, -math.inf, -1, 0, 10**9, 10**30, 10**400, 1e-320, 1e-200, 1e160, 1e300, 1e308, -1e308,

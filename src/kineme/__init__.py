@@ -22,37 +22,37 @@ if _TYPE_CHECKING:
     )
     from kineme.features.dmp_features import DMPFeatures
     from kineme.features.rhythmic_features import RhythmicFeatures
-    from kineme.io.recordings import read_recordings
+    from kineme.files.recordings import read_recordings
     from kineme.library.library import ActionLibrary
-    from kineme.primitives.dmp import DMP
-    from kineme.primitives.primitives import Primitives
+    from kineme.movements.preparation.preprocess import preprocess
+    from kineme.movements.preparation.resample import Resample
+    from kineme.movements.preparation.smooth import Smooth
+    from kineme.movements.preparation.trim import TrimRest
+    from kineme.movements.segmentation.segment import segment
+    from kineme.movements.trajectories.demonstrations import Demonstrations
+    from kineme.movements.trajectories.trajectory import Trajectory
+    from kineme.primitives.discrete.dmp import DMP
+    from kineme.primitives.discrete.primitives import Primitives
+    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+    from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
     from kineme.recognition.recognizer import Recognizer
-    from kineme.rhythm.primitives import RhythmicPrimitives
-    from kineme.rhythm.rhythmic_dmp import RhythmicDMP
-    from kineme.segmentation.segment import segment
-    from kineme.trajectories.demonstrations import Demonstrations
-    from kineme.trajectories.preprocess import preprocess
-    from kineme.trajectories.resample import Resample
-    from kineme.trajectories.smooth import Smooth
-    from kineme.trajectories.trajectory import Trajectory
-    from kineme.trajectories.trim import TrimRest
 
 _HOME = {
-    "Trajectory": "kineme.trajectories.trajectory",
-    "Demonstrations": "kineme.trajectories.demonstrations",
-    "segment": "kineme.segmentation.segment",
-    "preprocess": "kineme.trajectories.preprocess",
-    "TrimRest": "kineme.trajectories.trim",
-    "Smooth": "kineme.trajectories.smooth",
-    "Resample": "kineme.trajectories.resample",
+    "Trajectory": "kineme.movements.trajectories.trajectory",
+    "Demonstrations": "kineme.movements.trajectories.demonstrations",
+    "segment": "kineme.movements.segmentation.segment",
+    "preprocess": "kineme.movements.preparation.preprocess",
+    "TrimRest": "kineme.movements.preparation.trim",
+    "Smooth": "kineme.movements.preparation.smooth",
+    "Resample": "kineme.movements.preparation.resample",
     "datasets": "kineme",
     "load_lasa": "kineme.datasets.lasa",
-    "read_recordings": "kineme.io.recordings",
-    "DMP": "kineme.primitives.dmp",
-    "Primitives": "kineme.primitives.primitives",
+    "read_recordings": "kineme.files.recordings",
+    "DMP": "kineme.primitives.discrete.dmp",
+    "Primitives": "kineme.primitives.discrete.primitives",
     "control": "kineme",
-    "RhythmicDMP": "kineme.rhythm.rhythmic_dmp",
-    "RhythmicPrimitives": "kineme.rhythm.primitives",
+    "RhythmicDMP": "kineme.primitives.rhythmic.rhythmic_dmp",
+    "RhythmicPrimitives": "kineme.primitives.rhythmic.primitives",
     "DMPFeatures": "kineme.features.dmp_features",
     "RhythmicFeatures": "kineme.features.rhythmic_features",
     "Recognizer": "kineme.recognition.recognizer",

@@ -13,11 +13,11 @@ from unlabeled_samples import draw_kinds
 
 import kineme
 from kineme.anchoring.align import maps_onto, moved, paths_of
-from kineme.anchoring.morph import morph
-from kineme.anchoring.prototypes import medoid_of, prototype
+from kineme.anchoring.grounding.morph import morph
+from kineme.anchoring.grounding.prototypes import medoid_of, prototype
 from kineme.anchoring.similarities import similarities
+from kineme.comparison.describe import N_POINTS
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.views import N_POINTS
 
 quick = settings(max_examples=10, deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)

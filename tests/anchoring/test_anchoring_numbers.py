@@ -8,13 +8,14 @@ from sklearn.utils import Bunch
 from unlabeled_samples import draw_kinds
 
 from kineme import DMP, Demonstrations, Recognizer
-from kineme.anchoring import count, revise
-from kineme.anchoring.morph import morph
-from kineme.anchoring.place import agreement
-from kineme.anchoring.revise import Split, suggest_splits
+from kineme.anchoring.clustering import count
+from kineme.anchoring.grounding.morph import morph
+from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.proposals import merge_split
+from kineme.anchoring.proposals.assign import agreement
+from kineme.anchoring.proposals.merge_split import Split, suggest_splits
+from kineme.anchoring.proposals.subsample import radii, spread_sample
 from kineme.anchoring.seen import see
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
-from kineme.anchoring.spread import radii, spread_sample
 
 
 def _space(ab, ac, cb):
@@ -110,7 +111,7 @@ def test_a_symbol_is_split_into_parts_with_a_stability_of_three_quarters(stabili
     def in_two(name, seen, places, widths):
         return Split(name, (places[:2], places[2:]), 0.1, stability)
 
-    monkeypatch.setattr(revise, "_in_two", in_two)
+    monkeypatch.setattr(merge_split, "_in_two", in_two)
     assert len(suggest_splits(draw_kinds([4, 1]), [0, 0, 0, 0, 1])) == n
 
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from unlabeled_samples import draw_kinds
 
 import kineme
-from kineme.anchoring.ground import SymbolName, ground
-from kineme.anchoring.regain import grounding_schema, primitive_from
-from kineme.primitives.formulations import FORMULATIONS
+from kineme.anchoring.grounding.ground import SymbolName, ground
+from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
+from kineme.primitives.discrete.formulations import FORMULATIONS
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)
 WAVE = SymbolName("sym-1", "wave", "a hand says hello", ("sym-0",))
@@ -100,7 +100,7 @@ def test_styles_move_as_the_demonstrations_did(seed):
 
 
 def test_styles_are_found_again_from_their_movements():
-    from kineme.anchoring.ground import style_model
+    from kineme.anchoring.grounding.ground import style_model
 
     grounding = ground(WAVE, _learn(6, 2, 1, spread=0.3))
     model = style_model(grounding["styles"], primitive_from(grounding).dmp)

@@ -10,14 +10,14 @@ from unlabeled_samples import draw_kinds
 import kineme
 import kineme.anchoring
 from kineme.anchoring.align import paths_of
-from kineme.anchoring.drawing import flat, principal_axes
-from kineme.anchoring.map_figure import draw_map
-from kineme.anchoring.proposal_figure import draw_proposal
-from kineme.anchoring.propose import propose
-from kineme.anchoring.sheet_figure import draw_proposals
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
-from kineme.figures import save_figure
-from kineme.recognition.perturbations import Perturbation
+from kineme.anchoring.figures.drawing import flat, principal_axes
+from kineme.anchoring.figures.proposal import draw_proposal
+from kineme.anchoring.figures.proposal_sheet import draw_proposals
+from kineme.anchoring.figures.symbol_map import draw_map
+from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.proposals.propose import propose
+from kineme.movements.preparation.perturbations import Perturbation
+from kineme.output.figures import save_figure
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 4])

@@ -12,16 +12,16 @@ from sklearn.cluster import AgglomerativeClustering
 from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
 import kineme
-from kineme.anchoring.proposals import describe_clusters
-from kineme.anchoring.propose import propose
+from kineme.anchoring.proposals.proposals import describe_clusters
+from kineme.anchoring.proposals.propose import propose
+from kineme.anchoring.proposals.subsample import assign
 from kineme.anchoring.seen import see, see_rows
 from kineme.anchoring.similarities import averaged, similarities
-from kineme.anchoring.spread import assign
-from kineme.recognition.normalization import Normalization
-from kineme.recognition.perturbations import Perturbation
+from kineme.comparison.describe import view
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
-from kineme.recognition.views import view
 
 METHODS = ("agglomerative", "hdbscan")
 seeds = st.integers(0, 10_000)

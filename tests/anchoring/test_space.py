@@ -10,9 +10,9 @@ from scipy.spatial.distance import pdist, squareform
 from unlabeled_samples import draw_kinds
 
 import kineme
-from kineme.anchoring.map_figure import apart, classical_scaling
-from kineme.anchoring.morph import morph
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.figures.symbol_map import apart, classical_scaling
+from kineme.anchoring.grounding.morph import morph
+from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.recognition.recognizer import Recognizer
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
 import kineme
-from kineme.anchoring.place import place
-from kineme.anchoring.revise import suggest_merges, suggest_splits
+from kineme.anchoring.proposals.assign import place
+from kineme.anchoring.proposals.merge_split import suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
 
 quick = settings(max_examples=5, deadline=None, derandomize=True)
@@ -65,7 +65,7 @@ def test_too_few_that_agree_stay_unknown():
 
 
 def test_many_unknown_are_gathered_through_a_sample(monkeypatch):
-    monkeypatch.setattr(import_module("kineme.anchoring.place"), "largest_clustered", lambda n_dims: 40)
+    monkeypatch.setattr(import_module("kineme.anchoring.proposals.assign"), "largest_clustered", lambda n_dims: 40)
     demos = draw_kinds([6, 6, 6, 40, 60], 2, 0, spread=0.03)
     placement = place(demos[18:], demos[:18])
     found = [demos.labels[18 + one.members] for one in placement.proposals.proposals]

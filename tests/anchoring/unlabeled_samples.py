@@ -8,7 +8,7 @@ import numpy as np
 from sklearn.metrics import adjusted_rand_score
 
 from kineme import Demonstrations
-from kineme.recognition.perturbations import Perturbation
+from kineme.movements.preparation.perturbations import Perturbation
 
 ALL_TOGETHER = Perturbation(shift=1.0, scale=1.0, rotation=math.radians(20), warp=0.35, noise=0.01)
 

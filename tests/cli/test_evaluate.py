@@ -6,9 +6,9 @@ import commands
 import pytest
 
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
-from kineme.evaluation.methods import METHODS
-from kineme.evaluation.protocols import PROTOCOLS
-from kineme.io.movements import write_movement
+from kineme.experiments.evaluation.methods import METHODS
+from kineme.experiments.evaluation.protocols import PROTOCOLS
+from kineme.files.movements import write_movement
 
 
 def run(*arguments, by=commands.run):

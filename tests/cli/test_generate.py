@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.io.movements import write_movement
-from kineme.io.recordings import read_recording
+from kineme.files.movements import write_movement
+from kineme.files.recordings import read_recording
 
 
 def run(*arguments, by=commands.run, **options):

@@ -7,7 +7,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
-from kineme.io.movements import write_movement
+from kineme.files.movements import write_movement
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ import pytest
 from commands import answer, run, start
 
 import kineme
-from kineme.anchoring.regain import grounding_schema, primitive_from
-from kineme.io.movements import write_movement
-from kineme.io.recordings import read_recording
+from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
+from kineme.files.movements import write_movement
+from kineme.files.recordings import read_recording
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ import numpy as np
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.library.connection import schema_seal
-from kineme.library.rows import seal
-from kineme.library.schema import COLUMNS
-from kineme.library.source import Source
+from kineme.library.storage.connection import schema_seal
+from kineme.library.storage.rows import seal
+from kineme.library.storage.schema import COLUMNS
+from kineme.library.storage.source import Source
 
 SAMPLES = 8  # of every movement of a victim, in two dimensions
 

@@ -17,8 +17,8 @@ from library_samples import contents
 
 import kineme
 from kineme import ActionLibrary, KinemeError
-from kineme.library.connection import FILE
-from kineme.library.schema import COLUMNS
+from kineme.library.storage.connection import FILE
+from kineme.library.storage.schema import COLUMNS
 
 VALUES = (
     "NULL", "0", "1", "-1", "2", "77", "9223372036854775807", "-9223372036854775808", "0.5", "-1e308", "9e999", "'x'",

@@ -8,8 +8,8 @@ from contextlib import closing
 import numpy as np
 
 from kineme import Demonstrations
-from kineme.library.connection import FILE
-from kineme.library.schema import COLUMNS
+from kineme.library.storage.connection import FILE
+from kineme.library.storage.schema import COLUMNS
 
 
 def draw_movements(n, d=2, seed=0, ragged=False, labels=None, n_samples=40):

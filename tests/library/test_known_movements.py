@@ -7,7 +7,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.library.source import Source
+from kineme.library.storage.source import Source
 
 
 @pytest.fixture

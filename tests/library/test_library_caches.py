@@ -12,10 +12,10 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.library import calibrated, index
-from kineme.library.serving import Serving, members_of
+from kineme.library.recognition import calibration_cache, code_cache
+from kineme.library.recognition.recognize import Serving, members_of
 
-CODES, CALIBRATION = index.FILE, calibrated.FILE
+CODES, CALIBRATION = code_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
 
 
@@ -39,24 +39,28 @@ def test_a_good_cache_is_believed(tmp_path, monkeypatch, labels):
     with ActionLibrary(tmp_path, create=True) as library:
         library.learn(draw_movements(12, n_samples=12, labels=labels))
         expected = _answers(library)
-        monkeypatch.setattr(calibrated, "calibrate_sample", None)
-        monkeypatch.setattr(index, "_write", None)
+        monkeypatch.setattr(calibration_cache, "calibrate_sample", None)
+        monkeypatch.setattr(code_cache, "_write", None)
         assert _answers(library) == expected
 
 
 def _header(data, **changes):
     """Codes with another header, and the checksum that fits."""
-    header = json.loads(data[: index._HEADER].rstrip(b"\0")) | changes
-    return json.dumps(header).encode().ljust(index._HEADER, b"\0") + data[index._HEADER :]
+    header = json.loads(data[: code_cache._HEADER].rstrip(b"\0")) | changes
+    return _headed(json.dumps(header).encode(), data)
+
+
+def _headed(header, data):
+    return header.ljust(code_cache._HEADER, b"\0") + data[code_cache._HEADER :]
 
 
 def _codes(change):
     """Codes changed as floats and as whole numbers, with the checksum that fits."""
 
     def spoil(data, _):
-        body = bytearray(data[index._HEADER :])
+        body = bytearray(data[code_cache._HEADER :])
         change(body)
-        return _header(data[: index._HEADER] + bytes(body), crc=zlib.crc32(body))
+        return _header(data[: code_cache._HEADER] + bytes(body), crc=zlib.crc32(body))
 
     return spoil
 
@@ -69,7 +73,7 @@ def _archive(**changes):
             kept = dict(arrays) | changes
         file = io.BytesIO()
         np.savez(file, **{name: array for name, array in kept.items() if array is not None})
-        return calibrated._seal(file.getvalue(), key) + file.getvalue()
+        return calibration_cache._seal(file.getvalue(), key) + file.getvalue()
 
     return spoil
 
@@ -90,11 +94,11 @@ HOSTILE = {
     "codes without end": (CODES, lambda data, _: _header(data, n=1 << 60)),
     "an endless number": (CODES, lambda data, _: _header(data, n=float("inf"))),
     "an endless version": (CODES, lambda data, _: _header(data, version=1 << 80)),
-    "a nested header": (CODES, lambda data, _: (b"[" * index._HEADER) + data[index._HEADER :]),
-    "a header that is a list": (CODES, lambda data, _: b"[]".ljust(index._HEADER, b"\0") + data[index._HEADER :]),
+    "a nested header": (CODES, lambda data, _: _headed(b"[" * code_cache._HEADER, data)),
+    "a header that is a list": (CODES, lambda data, _: _headed(b"[]", data)),
     "an empty file": (CODES, lambda data, _: b""),
-    "no archive": (CALIBRATION, lambda data, key: calibrated._seal(b"evil", key) + b"evil"),
-    "an empty archive": (CALIBRATION, lambda data, key: calibrated._seal(b"", key)),
+    "no archive": (CALIBRATION, lambda data, key: calibration_cache._seal(b"evil", key) + b"evil"),
+    "an empty archive": (CALIBRATION, lambda data, key: calibration_cache._seal(b"", key)),
     "scales of NaN": (CALIBRATION, _archive(scales=np.full(3, np.nan))),
     "scales of zero": (CALIBRATION, _archive(scales=np.zeros(3))),
     "scales of text": (CALIBRATION, _archive(scales=np.array(["a", "b", "c"]))),
@@ -116,7 +120,7 @@ def test_a_hostile_cache_is_built_again(served, attack):
         (folder / name).write_bytes(data)
     name, spoil = HOSTILE[attack]
     with ActionLibrary(folder) as library:
-        hostile = spoil(caches[name], calibrated._key(library.store, members_of(library.store)))
+        hostile = spoil(caches[name], calibration_cache._key(library.store, members_of(library.store)))
         assert hostile != caches[name]
         (folder / name).write_bytes(hostile)
         assert _answers(library) == expected

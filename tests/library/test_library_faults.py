@@ -21,8 +21,8 @@ from library_crashes import check_what_is_left, kill_while_learning
 from library_samples import contents, draw_movements
 
 from kineme import ActionLibrary, DataError
-from kineme.library import connection, store
-from kineme.library.connection import FILE
+from kineme.library.storage import connection, store
+from kineme.library.storage.connection import FILE
 
 
 @pytest.fixture

@@ -15,8 +15,8 @@ from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, ma
 from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
-from kineme.library import guard
-from kineme.library.connection import FILE, connect
+from kineme.library.storage import guard
+from kineme.library.storage.connection import FILE, connect
 
 
 @pytest.fixture(scope="module")

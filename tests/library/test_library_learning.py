@@ -12,9 +12,9 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
-from kineme.library import learn as learning
-from kineme.library.source import Source
-from kineme.recognition.views import view
+from kineme.comparison.describe import view
+from kineme.library.learning import learn as learning
+from kineme.library.storage.source import Source
 
 SINGLE = 2.0**-24  # relative error of a rounding to single precision
 
@@ -314,7 +314,7 @@ def test_weights_beyond_single_precision_are_refused(tmp_path):
         ),
         ({"labels": [["a"], "b"]}, r"trajectory 0 \('no 0'\): expected a label that is text or a number, got \['a'\]"),
         ({"source": 5}, r"one source, or one for each of the 2 movements, got 5"),
-        ({"source": ["a.csv", None]}, r"sources to be kineme.library.source.Source or None, got 'a.csv'"),
+        ({"source": ["a.csv", None]}, r"sources to be kineme.library.storage.source.Source or None, got 'a.csv'"),
         ({"places": 5}, r"one place for each of the 2 movements, got 5"),
         ({"places": ["1"]}, r"one place for each of the 2 movements, got 1"),
     ],

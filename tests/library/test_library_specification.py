@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from kineme import DMP, ActionLibrary, Recognizer, SpecificationError
-from kineme.trajectories.resample import Resample
+from kineme.movements.preparation.resample import Resample
 
 
 @pytest.mark.parametrize(

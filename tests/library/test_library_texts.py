@@ -8,7 +8,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, SpecificationError
-from kineme.library.schema import MAX_TEXT
+from kineme.library.storage.schema import MAX_TEXT
 
 LONG = 1 << 20
 

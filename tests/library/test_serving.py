@@ -10,8 +10,8 @@ from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, Recognizer
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.library import calibrated, index
-from kineme.library.serving import Serving
+from kineme.library.recognition import calibration_cache, code_cache
+from kineme.library.recognition.recognize import Serving
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):
@@ -121,11 +121,11 @@ def served(tmp_path_factory):
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(_kinds([3] * 5))
         before = _plain(Serving(library.store, exhaustive=0).recognize(asked))
-        caches = {name: (library.folder / name).read_bytes() for name in (index.FILE, calibrated.FILE)}
+        caches = {name: (library.folder / name).read_bytes() for name in (code_cache.FILE, calibration_cache.FILE)}
     return library.folder, asked, before, caches
 
 
-@pytest.mark.parametrize("name", [index.FILE, calibrated.FILE])
+@pytest.mark.parametrize("name", [code_cache.FILE, calibration_cache.FILE])
 @pytest.mark.parametrize("damage", DAMAGES)
 @given(where=st.floats(0, 0.999))
 def test_a_damaged_cache_is_made_again(served, name, damage, where):
@@ -138,7 +138,7 @@ def test_a_damaged_cache_is_made_again(served, name, damage, where):
         _same(_plain(Serving(library.store, exhaustive=0).recognize(asked)), before)
         again = (folder / name).read_bytes()
         assert len(again) == len(whole)
-        assert again == whole or name == calibrated.FILE  # whose archive holds the time of day
+        assert again == whole or name == calibration_cache.FILE  # whose archive holds the time of day
         assert not list(folder.glob(".*cache*"))
 
 
@@ -148,7 +148,7 @@ def test_the_caches_of_another_library_are_not_believed(make):
     asked = _questions(counts, seed=2)
     before = _plain(Serving(other.store, exhaustive=0).recognize(asked))
     Serving(one.store, exhaustive=0).recognize(asked)
-    for name in (index.FILE, calibrated.FILE):
+    for name in (code_cache.FILE, calibration_cache.FILE):
         (other.folder / name).write_bytes((one.folder / name).read_bytes())
     _same(_plain(Serving(other.store, exhaustive=0).recognize(asked)), before)
 
@@ -165,7 +165,7 @@ def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_
     with again:
         again.learn(_kinds(counts, seed=5)[8:])
         before = _plain(Serving(again.store, exhaustive=0).recognize(asked))
-        (again.folder / index.FILE).write_bytes((library.folder / index.FILE).read_bytes())
+        (again.folder / code_cache.FILE).write_bytes((library.folder / code_cache.FILE).read_bytes())
         _same(_plain(Serving(again.store, exhaustive=0).recognize(asked)), before)
 
 

@@ -34,21 +34,21 @@ from kineme import (
     preprocess,
     styles,
 )
+from kineme.comparison.describe import view
+from kineme.comparison.normalization import SCALES, Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.features.rows import FEATURES
 from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.procrustes import Procrustes
+from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
-from kineme.orientation.pose_features import PoseFeatures
-from kineme.primitives.basis import GATINGS
-from kineme.primitives.fits import FITS
-from kineme.primitives.formulations import FORMULATIONS
+from kineme.primitives.discrete.basis import GATINGS
+from kineme.primitives.discrete.fits import FITS
+from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.recognition.answer import Answer
-from kineme.recognition.early import cut
-from kineme.recognition.normalization import SCALES, Normalization
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
-from kineme.recognition.views import view
-from kineme.trajectories.arc_length import resample_by_arc_length
+from kineme.recognition.early.early import cut
 
 
 @dataclass(frozen=True)

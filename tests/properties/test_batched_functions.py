@@ -15,15 +15,15 @@ from kineme import DegenerateMovementWarning
 
 #: Numbers of one tile of work, set so small that every batch is many tiles, none of which begins where the batch does.
 TILES = {
-    "kineme.primitives.encode._TILE_SAMPLES": 700,
-    "kineme.primitives.rollout._TILE_SAMPLES": 700,
-    "kineme.trajectories.smooth._TILE_MOVEMENTS": 7,
-    "kineme.recognition.views._TILE_SAMPLES": 3000,
+    "kineme.primitives.discrete.encode._TILE_SAMPLES": 700,
+    "kineme.primitives.discrete.rollout._TILE_SAMPLES": 700,
+    "kineme.movements.preparation.smooth._TILE_MOVEMENTS": 7,
+    "kineme.comparison.describe._TILE_SAMPLES": 3000,
     "kineme.recognition.recognizer._TILE_PAIRS": 100,
-    "kineme.recognition.early._TILE": 5000,
+    "kineme.recognition.early.early._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
-    "kineme.orientation.tangent._TILE_SAMPLES": 400,
-    "kineme.rhythm.encode._TILE_SAMPLES": 700,
+    "kineme.primitives.pose.tangent._TILE_SAMPLES": 400,
+    "kineme.primitives.rhythmic.encode._TILE_SAMPLES": 700,
 }
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from movement_samples import draw_shapes
 
+from kineme.comparison.bounds import encode, fit_bases, log_bounds
+from kineme.comparison.describe import view
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity
 from kineme.kernels.procrustes import Procrustes
-from kineme.recognition.candidates import encode, fit_bases, log_bounds
-from kineme.recognition.normalization import Normalization
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
-from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity
-from kineme.recognition.views import view
 
 ANGLES = {1: (0.0,), 2: (0.0, 0.4, np.pi / 3, 2.0, np.pi), 3: (0.0, 0.4, np.pi / 3, np.pi), 4: (0.0,)}
 

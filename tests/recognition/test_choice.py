@@ -10,9 +10,9 @@ from movement_samples import draw_shapes
 from sklearn.base import clone
 
 from kineme import Recognizer
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.errors import SpecificationError
-from kineme.recognition.choice import CANDIDATES, aligned_weights
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
 
 
 def _timed(n, seed):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.recognition.early import cut, earliness, partial_shares
-from kineme.recognition.hypotheses import Early
-from kineme.recognition.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
-from kineme.recognition.views import N_POINTS
-from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.smooth import Smooth
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.recognition.early.early import cut, earliness, partial_shares
+from kineme.recognition.early.hypotheses import Early
+from kineme.recognition.early.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
 
 
 def _spirals(n_dims, per_class=4, n_classes=4, seed=0):

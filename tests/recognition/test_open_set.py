@@ -12,8 +12,8 @@ from sklearn.metrics import roc_auc_score
 
 import kineme
 from kineme import Recognizer, SpecificationError
+from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
-from kineme.recognition.perturbations import Perturbation
 
 ALL = Perturbation(shift=1, scale=1, rotation=np.deg2rad(20), warp=0.35, noise=0.01)
 

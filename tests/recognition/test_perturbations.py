@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kineme
-from kineme.recognition.perturbations import Perturbation, warped_phase
+from kineme.movements.preparation.perturbations import Perturbation, warped_phase
 
 STRENGTHS = {"shift": 1.0, "scale": 1.0, "rotation": math.pi, "warp": 0.35, "noise": 0.01}
 seeds = st.integers(0, 2**32 - 1)

@@ -10,15 +10,15 @@ from movement_samples import draw_shapes
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.kernels.procrustes import Prepared
-from kineme.recognition.choice import CANDIDATES, aligned_weights
+from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.classifiers import Nearest, SupportVectors, choose
 from kineme.recognition.conformal import Calibration, calibrate, typical_scale
-from kineme.recognition.decision import Decision
-from kineme.recognition.hypotheses import Early, known_hypotheses
-from kineme.recognition.perturbations import Perturbation
-from kineme.recognition.prefixes import beginnings, smooth_paths
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS
+from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.hypotheses import Early, known_hypotheses
+from kineme.recognition.early.prefixes import beginnings, smooth_paths
 from kineme.recognition.spotting import _recognized
 
 

@@ -17,9 +17,9 @@ from sklearn.svm import SVC
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
 from kineme.datasets.lasa import PAPER_LETTERS
+from kineme.movements.preparation.arc_length import arc_length_phase
+from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition import recognizer as module
-from kineme.recognition.perturbations import Perturbation
-from kineme.trajectories.arc_length import arc_length_phase
 
 any_seed = given(seed=st.integers(0, 10**6))
 planes = pytest.mark.parametrize("d", [2, 3])

@@ -10,11 +10,11 @@ import pytest
 
 import kineme
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.recognition.bounded_path import BoundedPath
-from kineme.recognition.decision import Decision
-from kineme.recognition.early import partial_shares
-from kineme.recognition.hypotheses import Early
-from kineme.recognition.live_state import LiveStatus
+from kineme.recognition.early.bounded_path import BoundedPath
+from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.early import partial_shares
+from kineme.recognition.early.hypotheses import Early
+from kineme.recognition.early.live_state import LiveStatus
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape", "Zshape")
 

@@ -2,22 +2,22 @@
 
 from typing import Any as _Any
 
-from kineme.anchoring.ground import SymbolName, ground
-from kineme.anchoring.morph import morph
-from kineme.anchoring.place import Placement, place
-from kineme.anchoring.proposals import Proposal, Proposals
-from kineme.anchoring.propose import propose
-from kineme.anchoring.prototypes import Prototype, prototype
-from kineme.anchoring.regain import grounding_schema, primitive_from
-from kineme.anchoring.revise import Merge, Split, suggest_merges, suggest_splits
+from kineme.anchoring.grounding.ground import SymbolName, ground
+from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
+from kineme.anchoring.grounding.morph import morph
+from kineme.anchoring.grounding.prototypes import Prototype, prototype
+from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
+from kineme.anchoring.proposals.assign import Placement, place
+from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
+from kineme.anchoring.proposals.proposals import Proposal, Proposals
+from kineme.anchoring.proposals.propose import propose
 from kineme.anchoring.seen import see, see_rows
 from kineme.anchoring.similarities import similarities
-from kineme.anchoring.space import ConceptualSpace, conceptual_space
 
 _PICTURES = {  # Matplotlib loads on first use, not with the numbers
-    "draw_map": "map_figure",
-    "draw_proposal": "proposal_figure",
-    "draw_proposals": "sheet_figure",
+    "draw_map": "symbol_map",
+    "draw_proposal": "proposal",
+    "draw_proposals": "proposal_sheet",
 }
 
 __all__ = [
@@ -53,4 +53,4 @@ def __getattr__(name: str) -> _Any:
         raise AttributeError(f"module 'kineme.anchoring' has no attribute {name!r}; it has {', '.join(__all__)}")
     from importlib import import_module
 
-    return getattr(import_module(f"kineme.anchoring.{_PICTURES[name]}"), name)
+    return getattr(import_module(f"kineme.anchoring.figures.{_PICTURES[name]}"), name)

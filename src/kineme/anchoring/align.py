@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kineme.comparison.describe import N_POINTS
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import Representation
 from kineme.kernels.procrustes import Procrustes
-from kineme.primitives.primitives import Primitives
-from kineme.recognition.normalization import Normalization
+from kineme.movements.preparation.preprocess import preprocess
+from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.representation import Representation
-from kineme.recognition.views import N_POINTS
-from kineme.styles.numbers import from_numbers, shared_label, to_numbers
-from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.preprocess import preprocess
-from kineme.trajectories.resample import relative_rows
-from kineme.trajectories.smooth import Smooth
 from kineme.validation import Array
 
 _LOOK = Representation("positions", arc_share=1.0)  # uneven timing turns nothing

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.describe import view
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.normalization import Normalization
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
-from kineme.recognition.views import view
-from kineme.trajectories.demonstrations import Demonstrations
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from kineme.anchoring.seen import Seen, see
 from kineme.anchoring.widths import gap_widths
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.similarity import AveragedSimilarity
 from kineme.validation import Array
 
 _TILE_PAIRS = 500_000  # at a time: each representation's kernel is held beside the average

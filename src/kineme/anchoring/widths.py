@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.anchoring.seen import Seen
+from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
-from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 _WIDTH = 0.35  # of the distance to what lies beyond the gap, as the recognizer takes of that to an impostor

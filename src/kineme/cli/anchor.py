@@ -11,7 +11,7 @@ import click
 
 from kineme.cli.options import json_option, library_option, whole
 from kineme.cli.output import count, say, write
-from kineme.text import printable
+from kineme.output.text import printable
 
 _SHOWN = 5  # movements left over, written out
 
@@ -55,8 +55,8 @@ def anchor(folder: Path, **options: Any) -> None:
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     from kineme.cli.anchor_session import Session
-    from kineme.library.anchor import join, joinable, propose_kinds
     from kineme.library.library import ActionLibrary
+    from kineme.library.symbols.proposals import join, joinable, propose_kinds
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
@@ -101,7 +101,7 @@ def _named(library: Any, ids: Any) -> str:
 
 def _names(path: Path | None) -> dict[int, str]:
     from kineme.errors import DataError
-    from kineme.library.symbols import check_name
+    from kineme.library.storage.symbols import check_name
 
     if path is None:
         return {}
@@ -119,9 +119,9 @@ def _names(path: Path | None) -> dict[int, str]:
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     """A sheet of all proposals, then a picture of each."""
-    from kineme.anchoring.proposal_figure import draw_proposal
-    from kineme.anchoring.sheet_figure import draw_proposals
-    from kineme.figures import save_figure
+    from kineme.anchoring.figures.proposal import draw_proposal
+    from kineme.anchoring.figures.proposal_sheet import draw_proposals
+    from kineme.output.figures import save_figure
 
     if not len(proposals):
         return []
@@ -186,7 +186,7 @@ def _as_data(proposals: Any) -> dict[str, Any]:
 
 
 def _text(data: dict[str, Any], alone: str) -> str:
-    from kineme.table import Table, to_text
+    from kineme.output.table import Table, to_text
 
     lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
     lines += [f"{count(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]

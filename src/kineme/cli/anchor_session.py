@@ -10,7 +10,7 @@ import click
 
 from kineme.cli.output import ask, confirm, count, write
 from kineme.errors import KinemeError
-from kineme.text import printable
+from kineme.output.text import printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name

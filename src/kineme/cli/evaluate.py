@@ -10,7 +10,8 @@ import click
 from kineme.cli.options import whole
 from kineme.cli.output import write
 
-# The names of the tables in kineme.evaluation, written out so that --help loads nothing; a test compares them.
+# The names of the tables in kineme.experiments.evaluation, written out so that --help loads nothing; a test compares
+# them.
 PROTOCOL_NAMES = ("few-shot", "leave-one-out", "cross-validation", "robustness", "any-angle", "open-set", "earliness")
 METHOD_NAMES = (
     "kineme", "paper", "paper-bio", "euclidean", "dtw", "gak-svm", "minirocket", "point-cloud", "hmm",
@@ -38,13 +39,13 @@ def evaluate(data: str, protocols: tuple[str, ...], methods: tuple[str, ...], **
     Compares the default recognizer with the paper's configuration and with other methods, under the same splits and
     perturbations. Rivals that are not installed are reported and left out: pip install 'kineme[rivals]'.
     """
-    from kineme.evaluation.data import load_data
-    from kineme.evaluation.methods import METHODS
-    from kineme.evaluation.protocols import PROTOCOLS, Settings
-    from kineme.evaluation.run import Runner
-    from kineme.evaluation.run import evaluate as run
-    from kineme.parallel import n_threads
-    from kineme.table import to_text
+    from kineme.experiments.evaluation.data import load_data
+    from kineme.experiments.evaluation.methods import METHODS
+    from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings
+    from kineme.experiments.evaluation.run import Runner
+    from kineme.experiments.evaluation.run import evaluate as run
+    from kineme.output.table import to_text
+    from kineme.runtime.parallel import n_threads
 
     quick = options["quick"]
     asked = protocols or tuple(name for name, one in PROTOCOLS.items() if one.by_default)

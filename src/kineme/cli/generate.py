@@ -10,7 +10,7 @@ from click.core import ParameterSource
 
 from kineme.cli.options import Finite, Numbers, SymbolName, json_option, library_option_of, whole
 from kineme.cli.output import write_bytes
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.command(short_help="Move again: a symbol or a recording, to a new goal.")
@@ -41,7 +41,7 @@ def generate(**options: Any) -> None:
     kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
     kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
     """  # noqa: D301 - a backspace tells click to keep the lines
-    from kineme.generation.generate import generate as make
+    from kineme.primitives.generation.generate import generate as make
 
     output = options["output"]
     primitive = _primitive(options)
@@ -58,13 +58,13 @@ def _primitive(options: dict[str, Any]) -> Any:
     """A batch of one: of a symbol, a recording or a file of primitives."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
-        from kineme.library.grounding import primitive_of
         from kineme.library.library import ActionLibrary
+        from kineme.library.symbols.grounding import primitive_of
 
         with ActionLibrary(options["folder"], read_only=True) as library:
             return primitive_of(library, source)
-    from kineme.generation.generate import primitives_from
-    from kineme.primitives.dmp import DMP
+    from kineme.primitives.discrete.dmp import DMP
+    from kineme.primitives.generation.generate import primitives_from
 
     if not Path(source).exists():
         raise FileNotFoundError(
@@ -87,7 +87,7 @@ def _is_symbol(source: str, folder: Path | None) -> bool:
 def _wishes(options: dict[str, Any]) -> Any:
     import numpy as np
 
-    from kineme.generation.generate import Wishes
+    from kineme.primitives.generation.generate import Wishes
 
     obstacles = options["obstacles"]
     if len({len(point) for point in obstacles}) > 1:
@@ -103,14 +103,14 @@ def _wishes(options: dict[str, Any]) -> Any:
 
 
 def _plot(path: Path, primitive: Any, made: Any, obstacles: Any) -> None:
-    from kineme.figures import save_figure
-    from kineme.generation.figure import draw_movement
+    from kineme.output.figures import save_figure
+    from kineme.primitives.generation.figure import draw_movement
 
     save_figure(draw_movement(primitive, made, obstacles), path)
 
 
 def _write(output: Path, made: Any, ending: str) -> None:
-    from kineme.io.movements import encode_movement, write_movement
+    from kineme.files.movements import encode_movement, write_movement
 
     if str(output) == "-":
         write_bytes(encode_movement(made, ending))

@@ -10,7 +10,7 @@ import click
 from kineme.cli.options import json_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.command(short_help="Show what a set of recordings holds.")
@@ -27,8 +27,8 @@ def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) 
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
-    from kineme.inspection.inspect import inspect as look
-    from kineme.inspection.report import as_data, as_words
+    from kineme.files.inspection.inspect import inspect as look
+    from kineme.files.inspection.report import as_data, as_words
 
     found = read(recordings, options)
     if plot is not None:
@@ -38,7 +38,7 @@ def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) 
 
 
 def _draw(found: Any, path: Path) -> None:
-    from kineme.figures import save_figure
-    from kineme.inspection.figure import draw_recordings
+    from kineme.files.inspection.figure import draw_recordings
+    from kineme.output.figures import save_figure
 
     save_figure(draw_recordings(found), path)

@@ -12,7 +12,7 @@ import click
 from kineme.cli.options import json_option, library_option
 from kineme.cli.output import count, say
 from kineme.cli.reading import layout_options, read
-from kineme.text import printable
+from kineme.output.text import printable
 
 _SHOWN = 10  # problems written out
 
@@ -84,7 +84,7 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
 
 
 def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[str | None]) -> Any:
-    from kineme.library.recordings import learn_recordings
+    from kineme.library.learning.recordings import learn_recordings
 
     with _progress(len(recordings)) as progress:
         return learn_recordings(library, recordings, options, labels, progress, root)

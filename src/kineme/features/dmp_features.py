@@ -6,8 +6,8 @@ from dataclasses import fields
 from typing import Any, Self
 
 from kineme.features.movement_features import MovementFeatures
-from kineme.primitives.dmp import DMP
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.discrete.dmp import DMP
 
 
 class DMPFeatures(MovementFeatures):

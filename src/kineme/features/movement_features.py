@@ -11,8 +11,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import TrajectoryError
 from kineme.features.rows import FEATURES, features_of
-from kineme.trajectories.axes import axis_names
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import check_choice, check_count
 
 

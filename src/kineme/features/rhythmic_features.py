@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from kineme.features.movement_features import MovementFeatures
-from kineme.rhythm.rhythmic_dmp import RhythmicDMP
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
 class RhythmicFeatures(MovementFeatures):

@@ -7,8 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from kineme.primitives.primitives import Primitives
-from kineme.rhythm.primitives import RhythmicPrimitives
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
 
 #: Feature name -> (primitives, S) -> array (n, size, d).
 FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any]]] = {

@@ -11,8 +11,8 @@ import numpy as np
 from numba.core.errors import NumbaError  # noqa: F401 - what a call of `user_sums` may raise
 from numba.extending import register_jitable
 
-from kineme.compiled import jit
 from kineme.kernels._rows import Rows
+from kineme.runtime.compiled import jit
 
 # Columns of B that are packed together: one strip of sums and four strips of features stay in L1.
 _PANEL = 128

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from kineme.compiled import jit
 from kineme.kernels.rotation import CLOSE, LEAST_STEP, STEPS
+from kineme.runtime.compiled import jit
 
 _SWEEPS = 8  # at most; off-diagonal entries vanish long before
 _SMALL = 1e-17  # of the largest entry

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from kineme.compiled import compiled_module, use_compiled
 from kineme.kernels._rows import Rows, contiguous
-from kineme.parallel import for_tiles
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.runtime.parallel import for_tiles
 
 # Pairs of 256 x 256 rows: large enough to repay packing the columns, small enough for the cache.
 _TILE = 256

@@ -12,7 +12,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels._rows import Rows
 from kineme.kernels.base import Kernel
 from kineme.kernels.means import MEANS
-from kineme.parallel import for_tiles
+from kineme.runtime.parallel import for_tiles
 
 # Bytes of per-dimension similarities that exist at a time.
 _SCRATCH = 2**24

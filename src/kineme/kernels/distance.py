@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from kineme.compiled import compiled_module
 from kineme.errors import SpecificationError
 from kineme.kernels._rows import Rows
 from kineme.kernels._sums import Term, TileSums, fill_gram
 from kineme.kernels.base import Kernel
+from kineme.runtime.compiled import compiled_module
 
 # One call of a Python function costs about as much as this many operations of NumPy.
 _PYTHON_CALL = 100

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.compiled import compiled_module, use_compiled
 from kineme.errors import SpecificationError
 from kineme.kernels.rotation import best_products, best_rotations, half_angle
-from kineme.parallel import for_tiles, single_threaded_blas
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, check_number
 
 

@@ -11,7 +11,7 @@ from kineme.kernels._rows import Rows
 from kineme.kernels._sums import SQUARED, fill_gram
 from kineme.kernels._widths import median_of_sums
 from kineme.kernels.base import Kernel
-from kineme.parallel import for_tiles
+from kineme.runtime.parallel import for_tiles
 
 # Elements of the Gram matrix that stay in cache between the passes over them.
 _STRIP = 2**17

@@ -12,26 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library import changes, read, symbols
-from kineme.library.connection import FILE
-from kineme.library.placing import as_folder
-from kineme.library.specification import Specification
-from kineme.library.store import Store
+from kineme.library.storage import changes, read, symbols
+from kineme.library.storage.connection import FILE
+from kineme.library.storage.placing import as_folder
+from kineme.library.storage.specification import Specification
+from kineme.library.storage.store import Store
 
 if TYPE_CHECKING:
-    from kineme.anchoring.proposals import Proposal
-    from kineme.anchoring.space import Between, Near
-    from kineme.library.anchor import LibraryProposals, Review
-    from kineme.library.history import Version
-    from kineme.library.learn import LearnReport
-    from kineme.library.serving import Serving
-    from kineme.library.source import Source
-    from kineme.library.symbols import Symbol
-    from kineme.library.verify import Problem
-    from kineme.primitives.dmp import DMP
-    from kineme.primitives.primitives import Primitives
+    from kineme.anchoring.grounding.space import Between, Near
+    from kineme.anchoring.proposals.proposals import Proposal
+    from kineme.library.learning.learn import LearnReport
+    from kineme.library.recognition.recognize import Serving
+    from kineme.library.storage.history import Version
+    from kineme.library.storage.source import Source
+    from kineme.library.storage.symbols import Symbol
+    from kineme.library.storage.verify import Problem
+    from kineme.library.symbols.proposals import LibraryProposals, Review
+    from kineme.movements.trajectories.demonstrations import Demonstrations
+    from kineme.primitives.discrete.dmp import DMP
+    from kineme.primitives.discrete.primitives import Primitives
     from kineme.recognition.recognizer import Recognizer
-    from kineme.trajectories.demonstrations import Demonstrations
 
 Ids = NDArray[np.int64]
 
@@ -171,7 +171,7 @@ class ActionLibrary:
         A movement is known by its samples, or by its place in a file of the same content read with the same options. A
         known movement joins the symbol of its label only if it shows none.
         """
-        from kineme.library.learn import learn
+        from kineme.library.learning.learn import learn
 
         return learn(self.store, movements, labels, source, places, progress)
 
@@ -245,13 +245,13 @@ class ActionLibrary:
 
     @cached_property
     def _serving(self) -> Serving:
-        from kineme.library.serving import Serving
+        from kineme.library.recognition.recognize import Serving
 
         return Serving(self.store)
 
     def history(self) -> tuple[Version, ...]:
         """Every change, the first one first."""
-        from kineme.library.history import history
+        from kineme.library.storage.history import history
 
         return history(self.store)
 
@@ -263,20 +263,20 @@ class ActionLibrary:
 
     def verify(self) -> list[Problem]:
         """All that is damaged, each problem with the table, the row or movement, and a text; empty if all is well."""
-        from kineme.library.verify import verify
+        from kineme.library.storage.verify import verify
 
         return verify(self.store)
 
     def export(self, path: str | Path) -> Path:
         """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
-        from kineme.library.exchange import export
+        from kineme.library.storage.exchange import export
 
         return export(self.store, path)
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
         """Make a library in `folder` of a file that `export` wrote, after checking every byte of it, and open it."""
-        from kineme.library.exchange import import_
+        from kineme.library.storage.exchange import import_
 
         import_(path, folder)
         return cls(folder, **options)
@@ -326,7 +326,7 @@ class ActionLibrary:
         dict
             Name of the symbol -> how many joined it.
         """
-        from kineme.library.anchor import join_symbols
+        from kineme.library.symbols.proposals import join_symbols
 
         return join_symbols(self, error_rate)
 
@@ -335,12 +335,12 @@ class ActionLibrary:
     ) -> LibraryProposals:
         """Kinds among the movements without a symbol, or among `ids`, for a person to name.
 
-        Where there are symbols, what makes a kind is measured by them, see `kineme.anchoring.place.place`; else, and
-        where `method` or `n_clusters` is given, the movements are clustered, see `kineme.anchoring.propose.propose`.
-        A kind of which four fifths were in one proposal that was rejected is not proposed again. Fewer than three
-        movements make no proposal.
+        Where there are symbols, what makes a kind is measured by them, see `kineme.anchoring.proposals.assign.place`;
+        else, and where `method` or `n_clusters` is given, the movements are clustered, see
+        `kineme.anchoring.proposals.propose.propose`. A kind of which four fifths were in one proposal that was rejected
+        is not proposed again. Fewer than three movements make no proposal.
         """
-        from kineme.library.anchor import propose_kinds
+        from kineme.library.symbols.proposals import propose_kinds
 
         return propose_kinds(self, ids, method, n_clusters, min_members)
 
@@ -349,21 +349,21 @@ class ActionLibrary:
 
         Members that were given to other symbols since the proposal was made stay there.
         """
-        from kineme.library.anchor import accept
+        from kineme.library.symbols.proposals import accept
 
         accept(self, proposal, name, description)
 
     def reject(self, proposal: Proposal) -> None:
         """Remember that these movements are no kind: they stay without a symbol and are not proposed again."""
-        from kineme.library.anchor import reject
+        from kineme.library.symbols.proposals import reject
 
         reject(self, proposal)
 
     def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
         """A symbol in a planner's terms: the primitive that stands for it, and the ranges that were demonstrated.
 
-        Plain data, as `kineme.anchoring.regain.grounding_schema` describes it; `kineme.anchoring.regain.primitive_from`
-        makes it move again.
+        Plain data, as `kineme.anchoring.grounding.grounding_io.grounding_schema` describes it;
+        `kineme.anchoring.grounding.grounding_io.primitive_from` makes it move again.
 
         Parameters
         ----------
@@ -374,25 +374,25 @@ class ActionLibrary:
         units : str or sequence of d str, optional
             Of the positions, as "mm", or of each dimension.
         """
-        from kineme.library.grounding import ground_symbol
+        from kineme.library.symbols.grounding import ground_symbol
 
         return ground_symbol(self, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
-        """The symbols most like one, nearest first; see `kineme.anchoring.space.ConceptualSpace`."""
-        from kineme.library.grounding import space_of
+        """The symbols most like one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
+        from kineme.library.symbols.grounding import space_of
 
         return space_of(self).nearest(self[who].name, k)
 
     def between(self, a: str, b: str, eps: float = 0.25) -> tuple[Between, ...]:
         """The symbols that lie between two, the smallest detour first."""
-        from kineme.library.grounding import space_of
+        from kineme.library.symbols.grounding import space_of
 
         return space_of(self).between(self[a].name, self[b].name, eps)
 
     def morph(self, a: str, b: str, shares: Any = 0.5) -> Primitives:
         """Primitives on the way from a symbol to another, one for each share of the way: 0 is a, 1 is b."""
-        from kineme.library.grounding import morph_symbols
+        from kineme.library.symbols.grounding import morph_symbols
 
         return morph_symbols(self, a, b, shares)
 
@@ -401,6 +401,6 @@ class ActionLibrary:
 
         Advice for `merge` and `split`; nothing is changed.
         """
-        from kineme.library.anchor import review_symbols
+        from kineme.library.symbols.proposals import review_symbols
 
         return review_symbols(self)

@@ -1,1 +1,1 @@
-"""Dynamical Movement Primitives: phase, basis, formulation, fit; encode and decode as matrix products."""
+"""Dynamical Movement Primitives: discrete, rhythmic, of poses; styles, generation, control."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.trajectories.labels import label_array
+from kineme.movements.trajectories.labels import label_array
 
 
 class Batch:

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
-from kineme.io.container import read_container, write_container
+from kineme.files.container import read_container, write_container
+from kineme.movements.preparation.resample import Resample
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.preparation.trim import TrimRest
+from kineme.movements.trajectories.labels import label_array
 from kineme.primitives.batch import Batch
-from kineme.trajectories.labels import label_array
-from kineme.trajectories.resample import Resample
-from kineme.trajectories.smooth import Smooth
-from kineme.trajectories.trim import TrimRest
 
 #: The preprocessing steps that a file can name. Files carry names of this table, never of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}

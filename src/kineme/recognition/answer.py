@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.similarity import LOG_MEANS, SHARES
 from kineme.kernels.procrustes import Prepared
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import check_error_rate
-from kineme.recognition.similarity import LOG_MEANS, SHARES
 from kineme.recognition.transform import Transform, map_onto
-from kineme.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Answer:
 
 def is_one(X: Any) -> bool:
     """Whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
-    from kineme.trajectories.trajectory import Trajectory
+    from kineme.movements.trajectories.trajectory import Trajectory
 
     return isinstance(X, Trajectory) or (isinstance(X, np.ndarray) and X.dtype != object and X.ndim <= 2)
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
-from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
 if TYPE_CHECKING:

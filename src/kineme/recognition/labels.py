@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.trajectories.demonstrations import Demonstrations, require_labels
-from kineme.trajectories.labels import label_array
+from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
+from kineme.movements.trajectories.labels import label_array
 from kineme.validation import describe
 
 

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
+from kineme.comparison.describe import tile_movements, view, view_tile
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
+from kineme.comparison.weights import CANDIDATES, chosen_weights, given_weights, suffices
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.parallel import for_tiles, single_threaded_blas
-from kineme.recognition.choice import CANDIDATES, chosen_weights, given_weights, suffices
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.labels import check_labels
-from kineme.recognition.normalization import Normalization
-from kineme.recognition.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
-from kineme.recognition.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
-from kineme.recognition.views import tile_movements, view, view_tile
-from kineme.trajectories.demonstrations import Demonstrations
-from kineme.trajectories.smooth import Smooth
+from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, check_choice, check_number
 
 _TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
@@ -251,7 +251,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         Each beginning is compared with the beginnings of every stored movement at many values of progress; see `Early`.
         """
-        from kineme.recognition.early import partial_shares
+        from kineme.recognition.early.early import partial_shares
 
         check_is_fitted(self)
         return np.asarray(self.classes_[partial_shares(self, X, early)[:, :-1].argmax(axis=1)])
@@ -268,9 +268,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         early : Early, optional
             How much size, duration and timing may vary.
         """
-        from kineme.recognition.decision import Decision
-        from kineme.recognition.hypotheses import as_early
-        from kineme.recognition.stream import Live
+        from kineme.recognition.early.decision import Decision
+        from kineme.recognition.early.hypotheses import as_early
+        from kineme.recognition.early.stream import Live
 
         check_is_fitted(self)
         return Live(self, Decision(confidence, patience), as_early(early))

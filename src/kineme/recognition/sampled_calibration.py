@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.bounds import log_bounds
+from kineme.comparison.sampling import evenly_spaced
 from kineme.kernels.procrustes import Prepared
-from kineme.recognition.candidates import log_bounds
 from kineme.recognition.conformal import Calibration, ClassDistances, distances, score_classes, typical_scale
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.shortlist import Rows, Stored
-from kineme.sampling import evenly_spaced
+from kineme.recognition.two_stage_search import Rows, Stored
 from kineme.validation import Array
 
 _CLASSES = 1000  # classes sampled, at most, evenly spaced

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.segmentation.bouts import Rows
+from kineme.movements.segmentation.motion import Motion, observe
+from kineme.movements.segmentation.rest import Rest
+from kineme.movements.segmentation.segment import as_recording, moving
+from kineme.movements.segmentation.segmentation import pieces_of
+from kineme.movements.segmentation.speed_minima import SpeedMinima
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.conformal import check_error_rate
-from kineme.segmentation.bouts import Rows
-from kineme.segmentation.motion import Motion, observe
-from kineme.segmentation.rest import Rest
-from kineme.segmentation.segment import as_recording, moving
-from kineme.segmentation.segmentation import pieces_of
-from kineme.segmentation.speed_minima import SpeedMinima
-from kineme.trajectories.trajectory import Trajectory
 from kineme.validation import Array, check_count
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.recognition.normalization import Normalization
-from kineme.recognition.representation import Representation
-from kineme.recognition.views import even_paths
-from kineme.trajectories.demonstrations import Demonstrations
+from kineme.comparison.describe import even_paths
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import Representation
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""From similarities to clusters, and how many there are."""

@@ -1,0 +1,83 @@
+"""What stands for a kind: its most typical member, and the mean of its members."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kineme.anchoring.align import Maps, maps_onto, moved, paths_of
+from kineme.anchoring.seen import see
+from kineme.anchoring.similarities import similarities
+from kineme.errors import SpecificationError
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.styles.average import AveragePrimitive, average
+from kineme.primitives.styles.parameters import check_primitives
+from kineme.recognition.recognizer import Recognizer
+
+
+@dataclass(frozen=True, eq=False)
+class Prototype:
+    """A kind of movement as one movement.
+
+    Attributes
+    ----------
+    medoid : int
+        The member most similar to the others.
+    average : AveragePrimitive
+        Mean of the members and their spread, each laid onto the medoid first; in the medoid's place, size and
+        direction, and with the (geometric) mean of all durations.
+    maps : Maps
+        From each member onto the medoid.
+    """
+
+    medoid: int
+    average: AveragePrimitive
+    maps: Maps
+
+    @property
+    def primitive(self) -> Primitives:
+        """The mean, a batch of one."""
+        return self.average.primitive
+
+
+def prototype(primitives: Primitives, medoid: int | None = None, like: Recognizer | None = None) -> Prototype:
+    """The prototype of the members of one kind.
+
+    Parameters
+    ----------
+    primitives : Primitives
+        Of the members.
+    medoid : int, optional
+        Where it is known; by default the member with the largest mean similarity to the others.
+    like : Recognizer, optional
+        Whose invariances to take out before the mean.
+
+    Raises
+    ------
+    SpecificationError
+        A medoid that is none of the members.
+    """
+    check_primitives(primitives)
+    if medoid is not None and not 0 <= medoid < len(primitives):
+        raise SpecificationError(f"expected medoid to be one of {len(primitives)} members, got {medoid!r}")
+    paths = paths_of(primitives)
+    if medoid is None:
+        medoid = medoid_of(paths.transpose(0, 2, 1), like)
+    maps = maps_onto(paths, paths[medoid], like)
+    return Prototype(medoid, average(moved(primitives, maps)), maps)
+
+
+def medoid_of(movements: object, like: Recognizer | None = None) -> int:
+    """The movement with the largest mean similarity to the others; the first of one or two."""
+    seen = see(movements, like)
+    if len(seen) < 3:
+        return 0
+    # One width serves all of them: it only weighs the representations, by how much they differ within the kind.
+    spread = []
+    for one in seen.views:
+        squares = seen.procrustes.squared_distances(one, one)
+        spread.append(float(np.sqrt(np.median(squares[~np.eye(len(seen), dtype=bool)]))))
+    if min(spread) <= 0:
+        return 0
+    return int(similarities(seen, widths=spread).sum(axis=1).argmax())

@@ -1,0 +1,1 @@
+"""Proposals of symbols for a person to name, and how they change."""

@@ -1,0 +1,109 @@
+"""From movements without labels to proposals of kinds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.anchoring.clustering.clustering import METHODS
+from kineme.anchoring.clustering.count import count_kinds
+from kineme.anchoring.clustering.resampling import Clusters, stabilities
+from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
+from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
+from kineme.anchoring.seen import see
+from kineme.anchoring.similarities import averaged, similarities
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.errors import SpecificationError
+from kineme.recognition.recognizer import Recognizer
+from kineme.validation import Array, check_choice, check_count
+
+_REPEATS = 20  # subsets that clusters must come again in
+
+
+def propose(
+    movements: Any,
+    method: str = "agglomerative",
+    n_clusters: int | None = None,
+    *,
+    min_members: int = 3,
+    like: Recognizer | None = None,
+    max_clustered: int | None = None,
+) -> Proposals:
+    """Gather movements without labels into kinds.
+
+    Distances are ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
+
+    Parameters
+    ----------
+    movements : Seen, or movements as `Demonstrations.of` accepts them
+        At least three.
+    method : {"agglomerative", "hdbscan"}, default "agglomerative"
+        Average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN), which find their number themselves.
+    n_clusters : int, optional
+        Number of clusters of the tree, those too small to be proposed included; by default `count_kinds`, at
+        least two: whether all movements are of one kind cannot be told from their own distances.
+    min_members : int, default 3
+        Movements that make a kind; fewer are left over.
+    like : Recognizer, optional
+        Whose representations, invariances and mean to take; it need not be fitted.
+    max_clustered : int, optional
+        More movements than this are clustered by a spread sample of so many, and the others join their nearest sampled
+        movement if it is within the radius of its kind, else they are left over. By default 5000, in space 800.
+
+    Returns
+    -------
+    Proposals
+
+    Raises
+    ------
+    SpecificationError
+        Parameters out of range, fewer than three movements, or copies of one movement.
+    """
+    check_choice("method", method, list(METHODS))
+    check_count("min_members", min_members, 2)
+    seen = see(movements, like)
+    _check_count_of(n_clusters, method, len(seen))
+    limit = largest_clustered(seen.n_dims) if max_clustered is None else max_clustered
+    check_count("max_clustered", limit, 3)
+    if len(seen) <= limit:
+        similarity = averaged(seen)
+        K = similarities(seen, widths=similarity.widths)
+        return _propose(K, similarity, method, n_clusters, min_members)
+    sample, similarity = spread_sample(seen, limit)
+    K = similarities(seen.take(sample), widths=similarity.widths)
+    found = _propose(K, similarity, method, n_clusters, min_members)
+    return assign(seen, sample, K, found, similarity)
+
+
+def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
+    if n_clusters is None:
+        return
+    check_count("n_clusters", n_clusters, 1)
+    if method != "agglomerative":
+        raise SpecificationError(f"expected no n_clusters with method={method!r}, got {n_clusters!r}; it finds its own")
+    if n_clusters > n:
+        raise SpecificationError(f"expected n_clusters of at most {n}, the number of movements, got {n_clusters!r}")
+
+
+def _propose(
+    K: Array, similarity: AveragedSimilarity, method: str, n_clusters: int | None, min_members: int
+) -> Proposals:
+    order = own_order(K)
+    distances = 1.0 - K[np.ix_(order, order)]
+    clusters, share = np.empty(len(K), dtype=np.intp), n_clusters or 0
+    if method == "agglomerative" and n_clusters is None:
+        share = count_kinds(distances, _REPEATS)
+
+    def again(some: Array) -> Clusters:
+        return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
+
+    found = METHODS[method](distances, share, min_members)
+    clusters[order] = found
+    return describe_clusters(K, clusters, stabilities(distances, found, again, _REPEATS), similarity.widths)
+
+
+def own_order(K: Array) -> NDArray[np.intp]:
+    """An order of the movements by their similarities: the result must not depend on the order in which they came."""
+    return np.argsort(K.sum(axis=1), kind="stable")

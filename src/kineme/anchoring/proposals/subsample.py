@@ -1,0 +1,92 @@
+"""More movements than can be compared with each other: a spread sample, and the others by their nearest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.anchoring.proposals.proposals import Proposals
+from kineme.anchoring.seen import Seen
+from kineme.anchoring.similarities import averaged, compare
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.validation import Array
+
+_WITHIN = 0.95  # of the sampled members of all kinds are within the common radius of their nearest mate
+_TILE = 20_000  # movements at a time
+
+
+def largest_clustered(n_dims: int) -> int:
+    """Movements that are all compared with each other by default; in space a pair costs a decomposition."""
+    return 800 if n_dims == 3 else 5000
+
+
+def spread_sample(seen: Seen, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:
+    """Places of `size` movements, rising, that leave no kind out; and the similarity at their widths.
+
+    Half are drawn evenly. The others are drawn with probability proportional to ``1 - K`` to the nearest of these, the
+    squared distance in the kernel's space up to a factor: one round of k-means|| (Bahmani et al., "Scalable
+    k-means++", PVLDB 5, 2012). A kind too rare for the first half is far from it, so the second half finds it.
+    """
+    random = np.random.default_rng(seed)
+    first = random.choice(len(seen), size - size // 2, replace=False)
+    far = 1.0 - nearest(averaged(seen.take(first)), seen, seen.take(first))[1]
+    far[first] = 0.0
+    candidates = np.flatnonzero(far > 0)
+    second = candidates  # usually more than are wanted
+    if len(candidates) > size // 2:
+        second = random.choice(candidates, size // 2, replace=False, p=far[candidates] / far.sum())
+    sample = np.sort(np.concatenate((first, second))).astype(np.intp)
+    return sample, averaged(seen.take(sample))
+
+
+def nearest(similarity: AveragedSimilarity, seen: Seen, stored: Seen) -> tuple[NDArray[np.intp], Array]:
+    """The most similar stored movement of each, and how similar it is."""
+    which, how = np.empty(len(seen), dtype=np.intp), np.empty(len(seen))
+    for start in range(0, len(seen), _TILE):
+        rows = slice(start, start + _TILE)
+        K = compare(similarity, seen.take(rows), stored)
+        which[rows] = K.argmax(axis=1)
+        how[rows] = K.max(axis=1)
+    return which, how
+
+
+def assign(
+    seen: Seen, sample: NDArray[np.intp], K: Array, found: Proposals, similarity: AveragedSimilarity
+) -> Proposals:
+    """The proposals of a sample, joined by the movements that are within the radius of their nearest one's kind."""
+    radius = np.append(radii(K, found), -np.inf)  # nothing joins what was left over
+    which, how = nearest(similarity, seen, seen.take(sample))
+    clusters = found.clusters[which]
+    clusters[1.0 - how > radius[clusters]] = -1
+    clusters[sample] = found.clusters
+    order = np.argsort(-np.bincount(clusters[clusters >= 0], minlength=len(found)), kind="stable")
+    rank = np.append(np.argsort(order), -1)
+    clusters = rank[clusters]
+    proposals = tuple(
+        replace(
+            found[int(k)],
+            members=np.flatnonzero(clusters == i),
+            medoid=int(sample[found[int(k)].medoid]),
+            nearest=None if found[int(k)].nearest is None else int(rank[found[int(k)].nearest]),
+        )
+        for i, k in enumerate(order)
+    )
+    return Proposals(proposals, clusters, found.widths)
+
+
+def radii(K: Array, found: Proposals) -> Array:
+    """How far ``1 - K`` a movement of each kind may be from its nearest member, shape (c,).
+
+    As far as any member is from its nearest mate, so that another of the same kind is beyond it once in m + 1 times;
+    but at least as far as 95 % of the members of all kinds, since the largest of a few is little known.
+    """
+    same = (found.clusters[:, None] == found.clusters) & (found.clusters[:, None] >= 0)
+    np.fill_diagonal(same, False)
+    mate = 1.0 - np.where(same, K, -np.inf).max(axis=1)
+    member = found.clusters >= 0
+    if not member.any():
+        return np.empty(0)
+    common = float(np.quantile(mate[member], _WITHIN))
+    return np.array([max(common, float(mate[one.members].max())) for one in found.proposals])

@@ -1,0 +1,1 @@
+"""Comparing movements: representations, normalization, averaged kernel, widths, alignment, bounds."""

@@ -1,0 +1,154 @@
+"""Short codes of movements that bound the averaged kernel from above: the first of two stages of a search.
+
+Source of the idea: C. Faloutsos, M. Ranganathan, Y. Manolopoulos, "Fast subsequence matching in time-series databases",
+SIGMOD 1994, lemma 1: a search on codes whose distance is never larger than the true one dismisses nothing falsely.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity
+from kineme.kernels.procrustes import Procrustes
+from kineme.runtime.parallel import for_tiles
+from kineme.validation import Array
+
+Single = NDArray[np.float32]
+
+N_CODES = 12  # per representation and dimension: on handwriting, hardly any of 200,000 is then in doubt
+_TILE_ROWS = 16_384  # codes at a time: what is computed of them stays in a core's cache
+_ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
+_NEWTON_STEPS = 6  # each brings the bound in space closer, and none below what it bounds
+
+
+class Code(NamedTuple):
+    """What a few functions say of the rows of one representation, and the size of what they leave out.
+
+    With P (S, k) orthonormal, each dimension of a row is ``x = P y + e``. The same P serves every dimension, so codes
+    y turn with the movement.
+    """
+
+    values: Single  # (n, d * k), y dimension-major
+    squares: Single  # (n,), |x|^2
+    rests: Single  # (n,), |e|
+
+    def take(self, chosen: Any) -> Code:
+        """The chosen movements."""
+        return Code(self.values[chosen], self.squares[chosen], self.rests[chosen])
+
+
+def fit_bases(views: tuple[NDArray[Any], ...], n_dims: int, n_codes: int = N_CODES) -> tuple[Array, ...]:
+    """For each representation, the k functions (S, k) that hold most of the rows' energy: principal components.
+
+    Dimensions are pooled and nothing is centered, so that turned rows have turned codes. Bounds hold for any
+    orthonormal basis; movements unlike those that it was fitted to only make them less tight.
+
+    Parameters
+    ----------
+    views : tuple of R ndarrays of shape (n, d * S)
+        As from `views.view`.
+    n_dims : int
+    n_codes : int, default 12
+        k, or S where that is smaller.
+    """
+    bases = []
+    for rows in views:
+        x = np.asarray(rows, dtype=np.float64).reshape(len(rows) * n_dims, -1)
+        vectors = np.linalg.eigh(x.T @ x)[1]
+        bases.append(np.ascontiguousarray(vectors[:, ::-1][:, :n_codes]))
+    return tuple(bases)
+
+
+def encode(bases: tuple[Array, ...], views: tuple[NDArray[Any], ...], n_dims: int) -> tuple[Code, ...]:
+    """Codes of rows (n, d * S), one for each representation."""
+    codes = []
+    for P, rows in zip(bases, views, strict=True):
+        x = np.asarray(rows, dtype=np.float64)
+        y = (x.reshape(len(x) * n_dims, -1) @ P).reshape(len(x), -1)
+        squares = np.einsum("ij,ij->i", x, x)
+        rests = np.sqrt(np.maximum(squares - np.einsum("ij,ij->i", y, y), 0.0))
+        codes.append(Code(y.astype(np.float32), squares.astype(np.float32), rests.astype(np.float32)))
+    return tuple(codes)
+
+
+def log_bounds(similarity: AveragedSimilarity, asked: tuple[Code, ...], stored: tuple[Code, ...]) -> Single:
+    """Numbers (n, m) that the logarithms of the averaged kernel do not exceed.
+
+    With ``x = P y + e``, and R a rotation within the limit, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
+    ``d^2 >= |x_a|^2 + |x_b|^2 - 2 (max_R <y_a, R y_b> + |e_a| |e_b|)``, and an A-average grows with each kernel.
+    In space the maximum is taken over all rotations, see `_over_rotations`.
+    """
+    n, m = len(asked[0].values), len(stored[0].values)
+    bounds = np.empty((n, m), dtype=np.float32)
+    average: Any = LOG_MEANS[similarity.mean]  # keeps single precision
+    louder = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
+    # What does not depend on the stored code is multiplied by 1 / sigma^2 beforehand.
+    scaled = [
+        Code(*(np.asarray(one / width**2, dtype=np.float32) for one in code))
+        for code, width in zip(asked, similarity.widths, strict=True)
+    ]
+
+    def fill(start: int, stop: int) -> None:
+        logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
+        for r, code in enumerate(stored):
+            half = np.float32(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
+            most = _alignments(similarity.procrustes, scaled[r].values, code.values[start:stop])
+            most += code.rests[start:stop, None] * scaled[r].rests
+            most -= half * code.squares[start:stop, None]
+            most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(louder[r])
+            np.minimum(most, np.float32(louder[r]), out=logs[r])
+        bounds[:, start:stop] = average(logs).T
+
+    for_tiles(fill, m, max(1, _TILE_ROWS // n))
+    return bounds
+
+
+def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
+    """Largest inner products (m, n) of codes after rotation; in space, numbers that are not below them."""
+    d, n = procrustes.n_dims, len(A)
+    if procrustes.max_angle == 0 or d == 1:
+        return np.asarray(B @ A.T)
+    if d == 2:
+        x, y = np.split(A, 2, axis=1)  # with a = x + i y: real and imaginary part of sum_t a_t conj(b_t)
+        return _within(B @ A.T, B @ np.concatenate((y, -x), axis=1).T, procrustes.max_angle)
+    k = A.shape[1] // 3
+    C = (B.reshape(-1, k) @ A.reshape(-1, k).T).reshape(len(B), 3, n, 3)
+    return _over_rotations(C.transpose(1, 3, 0, 2), np.linalg.norm(A, axis=1) * np.linalg.norm(B, axis=1)[:, None])
+
+
+def _within(re: Single, im: Single, max_angle: float) -> Single:
+    """Largest real part of ``(re + i im) exp(-i angle)`` within the angle, without an arc tangent."""
+    c, s = np.float32(math.cos(max_angle)), np.float32(math.sin(max_angle))
+    size = np.sqrt(re * re + im * im)
+    inside = re >= c * size
+    re *= c
+    re += s * np.abs(im)
+    np.copyto(re, size, where=inside)
+    return re
+
+
+def _over_rotations(C: NDArray[Any], most: Single) -> Single:
+    """Bounds of ``max_R tr(R^T C)`` over all rotations, for covariances C (3, 3, m, n) and a bound to begin with.
+
+    The maximum is s_1 + s_2 +- s_3, singular values of C, the sign that of det C, and the largest root of
+    ``(x^2 - |C|^2)^2 - 8 x det C - 4 |adj C|^2`` (after D. L. Theobald, Acta Crystallographica A61, 2005, who takes
+    Horn's quaternions). Right of it the quartic is convex, so Newton steps from above stay above. In double precision,
+    since for movements along a line two roots meet.
+    """
+    C = C.astype(np.float64)
+    cofactors = np.cross(C[[1, 2, 0]], C[[2, 0, 1]], axis=1)
+    square = np.einsum("ij...,ij...->...", C, C)
+    determinant = np.einsum("j...,j...->...", C[0], cofactors[0])
+    last = 4.0 * np.einsum("ij...,ij...->...", cofactors, cofactors)
+    # With s = |C|^2 and y the sum of products of two singular values, x^2 <= s + 2 y, and y <= sqrt(3) |adj C|.
+    x = np.minimum(most, np.sqrt(square + np.sqrt(3.0 * last)))
+    for _ in range(_NEWTON_STEPS):
+        over = x * x - square
+        slope = 4.0 * x * over - 8.0 * determinant
+        value = over * over - 8.0 * x * determinant - last
+        x = x - np.where(slope > 0, np.maximum(value, 0.0) / np.where(slope > 0, slope, 1.0), 0.0)
+    return np.asarray(x, dtype=np.float32)

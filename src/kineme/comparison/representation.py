@@ -1,0 +1,118 @@
+"""How a recognizer looks at a movement: which phase, which quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from kineme.errors import SpecificationError
+from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.preparation.spline import spline_matrix
+from kineme.primitives.discrete.basis import MOST_BASIS
+from kineme.primitives.discrete.dmp import DMP, MOST_POINTS
+from kineme.primitives.discrete.operators import encoder, forcing_matrix
+from kineme.validation import Array, check_choice, check_count, check_number
+
+QUANTITIES = ("positions", "forcing")
+
+
+@dataclass(frozen=True)
+class Representation:
+    """One way to describe an evenly sampled, smooth path by a row of numbers.
+
+    Parameters
+    ----------
+    quantity : {"positions", "forcing"}
+        The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
+        DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
+    arc_share : float
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length does not see uneven
+        timing; time tells movements apart that differ in nothing else.
+    n_points : int, default 100
+        Samples along the phase.
+    n_basis, stiffness, ridge
+        Of the DMP.
+    """
+
+    quantity: str
+    arc_share: float
+    n_points: int = 100
+    n_basis: int = 40
+    stiffness: float = 100.0
+    ridge: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_choice("quantity", self.quantity, QUANTITIES)
+        check_number("arc_share", self.arc_share, least=0.0)
+        if self.arc_share > 1:  # a phase that turns back
+            raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
+        check_count("n_points", self.n_points, 2, most=MOST_POINTS)
+        check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
+        check_number("stiffness", self.stiffness, above=0.0)
+        check_number("ridge", self.ridge, least=0.0)
+
+    @property
+    def name(self) -> str:
+        """As in "forcing over arc length"."""
+        phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
+        return f"{self.quantity} over {phase}"
+
+    def along(self, paths: Array) -> Array:
+        """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
+        if self.arc_share == 0:
+            every, rest = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if rest == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
+        return resample_by_arc_length(paths, self.n_points, self.arc_share)
+
+    def describe(self, paths: Array, translation: bool = True) -> Array:
+        """Rows (n, d * n_points), dimension-major, of paths (n, d, n_points) along the phase, place and size taken out.
+
+        Without `translation` the place is still in the paths, and the forcing term gets it back: f does not know the
+        place, so the average over representations would forgive a wrong one.
+        """
+        described = paths
+        if self.quantity == "forcing":
+            described = (paths.reshape(-1, self.n_points) @ _forcing_operator(self)).reshape(paths.shape)
+            if not translation:
+                described += paths.mean(axis=2, keepdims=True)
+        return described.reshape(len(paths), -1)
+
+
+#: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".
+DEFAULT_REPRESENTATIONS = (
+    Representation("positions", arc_share=1.0),
+    Representation("forcing", arc_share=1.0),
+    Representation("forcing", arc_share=0.0),
+)
+
+
+def check_representations(representations: Any) -> tuple[Representation, ...]:
+    """Refuse what is not one representation or several."""
+    try:
+        given = tuple(representations)
+    except TypeError:
+        given = ()
+    if not given or not all(isinstance(one, Representation) for one in given):
+        raise SpecificationError(
+            "expected representations to be a tuple of kineme.comparison.representation.Representation, one or more, "
+            f"or None for the usual ones, got {representations!r}"
+        )
+    return given
+
+
+@lru_cache(maxsize=32)
+def _forcing_operator(representation: Representation) -> Array:
+    """From positions to f at as many points, (T, T): relative to the start, encode, then Eq. (2)."""
+    dmp = DMP(
+        "bio-inspired",
+        n_basis=representation.n_basis,
+        stiffness=representation.stiffness,
+        fit="trajectory",
+        ridge=representation.ridge,
+        n_points=representation.n_points,
+    )
+    operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
+    operator[0] -= operator.sum(axis=0)  # (x - x0) E = x E - x0 (sum of the rows of E)
+    operator.setflags(write=False)
+    return operator

@@ -1,7 +1,0 @@
-"""A primitive under live control: one step at a time, with a moving goal, a measured state, obstacles and any tempo."""
-
-from kineme.control.controller import Controller
-from kineme.control.obstacles import ObstacleAvoidance
-from kineme.control.state import State, Status
-
-__all__ = ["Controller", "ObstacleAvoidance", "State", "Status"]

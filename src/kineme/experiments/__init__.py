@@ -1,0 +1,1 @@
+"""Experiments: the paper's, and recognizers side by side."""

@@ -1,0 +1,89 @@
+"""What came out, by protocol, method, condition and measure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from statistics import fmean
+from typing import Any, NamedTuple
+
+from kineme.experiments.evaluation.conditions import Condition
+from kineme.experiments.evaluation.methods import METHODS
+from kineme.experiments.evaluation.score_split import Verdict
+
+#: Condition -> measure -> value in each split.
+Outcome = dict[Condition, dict[str, list[float]]]
+
+
+class Results(NamedTuple):
+    """Outcomes by protocol and method, the seconds spent, and who and what did not take part, with reasons."""
+
+    outcomes: dict[str, dict[str, Outcome]]
+    spent: dict[str, dict[str, float]]
+    absent: dict[str, str]
+    skipped: dict[str, str]
+
+    def mean(self, protocol: str, method: str, condition: Condition, measure: str) -> float | None:
+        """Mean over splits; None where the method did not take part."""
+        values = self.outcomes[protocol].get(method, {}).get(condition, {}).get(measure)
+        return fmean(values) if values else None
+
+    def conditions(self, protocol: str) -> list[Condition]:
+        """All conditions of a protocol in their order, those of the method that took part in most of them."""
+        return max((list(one) for one in self.outcomes[protocol].values()), key=len, default=[])
+
+    def numbers(self) -> dict[str, Any]:
+        """Everything but the times, ready for JSON; six digits keep the order of summation out of the file."""
+        protocols = {
+            protocol: {
+                method: {
+                    condition.label: {measure: _summary(values) for measure, values in measures.items()}
+                    for condition, measures in outcome.items()
+                }
+                for method, outcome in by_method.items()
+            }
+            for protocol, by_method in self.outcomes.items()
+        }
+        return {"protocols": protocols, "absent_methods": self.absent, "skipped_protocols": self.skipped}
+
+    def seconds(self) -> dict[str, dict[str, float]]:
+        """Seconds to learn and to answer, all splits together, by protocol and method."""
+        return {
+            protocol: {method: round(value, 3) for method, value in by_method.items()}
+            for protocol, by_method in self.spent.items()
+        }
+
+
+def collect(verdicts: Mapping[Any, list[Verdict]], absent: dict[str, str], skipped: dict[str, str]) -> Results:
+    """Join the verdicts of all jobs; trials of one condition within a split, such as folds, are averaged.
+
+    Parameters
+    ----------
+    verdicts : mapping
+        (protocol, method, index of the split) -> verdicts, in the order of splits.
+    """
+    outcomes: dict[str, dict[str, Outcome]] = {}
+    spent: dict[str, dict[str, float]] = {}
+    order = {name: k for k, name in enumerate(METHODS)}
+    for (protocol, method, _), found in sorted(verdicts.items(), key=lambda item: order[item[0][1]]):
+        outcome = outcomes.setdefault(protocol, {}).setdefault(method, {})
+        for condition, values in _averaged(found).items():
+            for measure, value in values.items():
+                outcome.setdefault(condition, {}).setdefault(measure, []).append(value)
+        times = spent.setdefault(protocol, {})
+        times[method] = times.get(method, 0.0) + sum(one.seconds for one in found)
+    return Results(outcomes, spent, absent, skipped)
+
+
+def _averaged(verdicts: list[Verdict]) -> dict[Condition, dict[str, float]]:
+    grouped: dict[Condition, list[dict[str, float]]] = {}
+    for one in verdicts:
+        grouped.setdefault(one.condition, []).append(one.values)
+    return {
+        condition: {measure: fmean(values[measure] for values in all_values) for measure in all_values[0]}
+        for condition, all_values in grouped.items()
+    }
+
+
+def _summary(values: list[float]) -> dict[str, Any]:
+    rounded = [float(f"{value:.6g}") for value in values]
+    return {"mean": float(f"{fmean(values):.6g}"), "min": min(rounded), "max": max(rounded), "by_split": rounded}

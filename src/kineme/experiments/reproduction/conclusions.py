@@ -1,0 +1,178 @@
+"""What to read in a table, in sentences that follow from its numbers: other numbers, other sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from statistics import fmean
+from typing import NamedTuple
+
+from kineme.output.table import spread
+
+#: Column -> the accuracy of each draw.
+ByColumn = Mapping[str, Sequence[float]]
+
+_DIGITS = 0.001  # the paper prints three digits, and cuts rather than rounds: 0.740 for 20/27
+_ALIKE = 1.5  # the largest factor between two widths that are alike
+_LOST = 0.1  # an accuracy that is lower by this much has fallen
+_MOST = 0.5  # share of the multipliers at their bound above which the bound is the reason
+_NUMBERS = ("no", "one", "two", "three", "four")
+
+
+class Printed(NamedTuple):
+    """One accuracy of the paper, and the draws of each convention that it can mean, by the name of the feature."""
+
+    name: str
+    value: float
+    conventions: ByColumn
+
+
+def listed(items: Sequence[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``; with semicolons where an item has a comma of its own."""
+    comma = "; " if any("," in item for item in items) else ", "
+    return " and ".join(filter(None, [comma.join(items[:-1]), *items[-1:]]))
+
+
+def inside(printed: float, values: Sequence[float]) -> bool:
+    """Whether a printed number lies within the range of our draws."""
+    return min(values) - _DIGITS <= printed <= max(values) + _DIGITS
+
+
+def alike(width: float, other: float) -> bool:
+    """Whether two widths are within a factor of 1.5 of each other."""
+    return max(width, other) <= _ALIKE * min(width, other)
+
+
+def multiples(accuracies: Sequence[float], n: int) -> list[float]:
+    """Those that are k / n for a whole number k, within the digits printed."""
+    return [value for value in accuracies if abs(value - round(value * n) / n) <= _DIGITS]
+
+
+def read_counts(accuracies: Sequence[float], counted: int, drawn: int) -> str:
+    """How many movements the paper's accuracies speak of: those that it counts, or those of our draws."""
+    both = {n: multiples(accuracies, n) for n in (drawn, counted)}
+    neither = [f"{value:.3f}" for value in accuracies if all(value not in some for some in both.values())]
+    said = (
+        f"The paper counts {counted} movements. Of its {len(accuracies)} accuracies in Tables 2 and 4, "
+        f"{len(both[drawn])} are multiples of 1/{drawn} and {len(both[counted])} are multiples of 1/{counted}"
+    )
+    return f"{said}; {listed(neither)} of neither." if neither else f"{said}."
+
+
+def read_placement(what: str, printed: Mapping[str, float], ours: ByColumn) -> str:
+    """In which columns our draws contain the paper's number."""
+    within = [column for column, value in printed.items() if inside(value, ours[column])]
+    others = [
+        f"{column} ({value:.3f} against {_range(ours[column])})"
+        for column, value in printed.items()
+        if column not in within
+    ]
+    said = f"{what}: our draws contain the paper's number in "
+    if not others:
+        return f"{said}every column."
+    return f"{said}{listed(within)}, but not in {listed(others)}." if within else f"{said}no column: {listed(others)}."
+
+
+def read_nearer(printed: Mapping[str, float], readings: Mapping[str, ByColumn]) -> str:
+    """Which reading's mean is nearest to the paper's number, where they differ."""
+    nearest: dict[str, list[str]] = {}
+    for column, value in printed.items():
+        off = {name: abs(fmean(ours[column]) - value) for name, ours in readings.items()}
+        if max(off.values()) - min(off.values()) > _DIGITS:
+            nearest.setdefault(min(off, key=off.__getitem__), []).append(column)
+    parts = [f"{name} in {listed(columns)}" for name, columns in nearest.items()]
+    return f"Nearest to the paper's accuracies: {'; '.join(parts)}." if parts else ""
+
+
+def read_order(what: str, names: tuple[str, str], first: Sequence[float], second: Sequence[float]) -> str:
+    """Which of two is ahead, draw by draw."""
+    ahead = sum(a > b for a, b in zip(first, second, strict=True))
+    behind = sum(a < b for a, b in zip(first, second, strict=True))
+    means = f"{fmean(first):.3f} against {fmean(second):.3f}"
+    if not ahead + behind:
+        return f"{what}: {names[0]} and {names[1]} are equal in all {len(first)} draws ({means})."
+    return f"{what}: {names[0]} is ahead of {names[1]} in {ahead} of {len(first)} draws, behind in {behind} ({means})."
+
+
+def read_ahead(what: str, names: tuple[str, str], first: ByColumn, second: ByColumn) -> str:
+    """In which columns the mean of one is above that of the other."""
+    found: dict[str, list[str]] = {}
+    for column, values in first.items():
+        one, other = round(fmean(values), 3), round(fmean(second[column]), 3)
+        if one == other:
+            found.setdefault(f"{names[0]} and {names[1]} are equal", []).append(column)
+            continue
+        order = names if one > other else names[::-1]
+        means = f"{max(one, other):.3f} against {min(one, other):.3f}"
+        found.setdefault(f"{order[0]} is ahead of {order[1]}", []).append(f"{column} ({means})")
+    return f"{what}, {'; '.join(f'{order} in {listed(columns)}' for order, columns in found.items())}."
+
+
+def read_widths(what: str, printed: Mapping[str, float], ours: Mapping[str, float]) -> str:
+    """In which columns the paper's RBF width is like our median distance."""
+    others = [
+        f"{column} ({value:.3g} against {ours[column]:.3g})"
+        for column, value in printed.items()
+        if not alike(value, ours[column])
+    ]
+    found = f"{_NUMBERS[len(printed) - len(others)]} of {_NUMBERS[len(printed)]} columns"
+    said = f"{what}: the paper's RBF width is within a factor of {_ALIKE:g} of the median distance in {found}"
+    return f"{said}; not in {listed(others)}." if others else f"{said}."
+
+
+def read_conventions(accuracies: Sequence[Printed]) -> str:
+    """Which accuracies of the paper lie within the draws of a convention, and of which; for the others the nearest."""
+    within: list[str] = []
+    others: list[str] = []
+    for name, value, conventions in accuracies:
+        found = [feature for feature, values in conventions.items() if inside(value, values)]
+        off = {feature: abs(fmean(values) - value) for feature, values in conventions.items()}
+        chosen = found or [feature for feature in off if off[feature] - min(off.values()) <= _DIGITS]
+        shown = " or ".join(f"{feature}: {spread(conventions[feature])}" for feature in chosen)
+        (within if found else others).append(f"{name}, {value:.3f} [{shown}]")
+    said = [f"Within the draws of a convention: {listed(within)}."] if within else []
+    said += [f"Of none, with the nearest: {listed(others)}."] if others else []
+    return " ".join(said)
+
+
+def read_perfect(what: str, accuracies: ByColumn) -> str:
+    """Which features make no error in any draw."""
+    perfect = [name for name, values in accuracies.items() if min(values) == 1.0]
+    return f"{what}: {listed(perfect) or 'none'}."
+
+
+def read_penalty(
+    accuracies: Mapping[str, Mapping[float, Sequence[float]]], at_bound: Mapping[str, Sequence[float]], n_classes: int
+) -> str:
+    """Which kernels lose their accuracy at the smallest penalty, and whether the bound of the multipliers is why."""
+    said = []
+    for kernel, by_penalty in accuracies.items():
+        smallest, largest = min(by_penalty), max(by_penalty)
+        low, high, share = fmean(by_penalty[smallest]), fmean(by_penalty[largest]), fmean(at_bound[kernel])
+        if high - low < _LOST:
+            said.append(f"{kernel} does not fall: {low:.3f} at C = {smallest:g}.")
+            continue
+        text = (
+            f"{kernel} falls from {high:.3f} at C = {largest:g} to {low:.3f} at C = {smallest:g}, where chance is "
+            f"{1 / n_classes:.3f}"
+        )
+        if share > _MOST:
+            text += (
+                f": there {share:.0%} of the multipliers of the class that lost a movement to the test are at their "
+                "bound C, and the other classes, which keep all their movements, outvote it"
+            )
+        said.append(f"{text}.")
+    return " ".join(said)
+
+
+def read_left_out(names: Sequence[str]) -> str:
+    """Which movements no draw contains, and why."""
+    if not names:
+        return ""
+    return (
+        f"Left out of all columns: {listed(names)}. They end in one dimension exactly where they start, so they have "
+        "no w and no f in the original formulation."
+    )
+
+
+def _range(values: Sequence[float]) -> str:
+    return f"{min(values):.2f}-{max(values):.2f}"

@@ -1,0 +1,97 @@
+"""One draw of one data set through every representation and classifier: the numbers behind all tables."""
+
+from __future__ import annotations
+
+import warnings
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sklearn
+from numpy.typing import NDArray
+from scipy.spatial.distance import pdist
+
+from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
+from kineme.errors import DegenerateMovementWarning
+from kineme.experiments.reproduction import paper
+from kineme.experiments.reproduction.choices import PENALTIES
+from kineme.experiments.reproduction.protocol import draw, nearest_neighbor_accuracy, share_at_bound, svm_accuracy
+from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
+from kineme.experiments.reproduction.split_widths import fit_by_split
+from kineme.kernels import RBF, TruncatedEuclidean
+from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
+from kineme.validation import Array
+
+#: The paper's nine letters, and its "larger datasets".
+DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
+
+
+@lru_cache(maxsize=2)
+def _features(dataset: str) -> tuple[dict[str, Array], Any, list[str | None]]:
+    """Features of all usable recordings of a data set, per representation; labels as numbers; names of the others."""
+    demos = load_lasa(DATASETS[dataset])
+    without = without_weights(demos)
+    left_out = [name for name, missing in zip(demos.names or (), without, strict=False) if missing]
+    demos = demos[~without]
+    labels = np.unique(require_labels(demos), return_inverse=True)[1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DegenerateMovementWarning)  # the point of the experiment
+        return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels, left_out
+
+
+def without_weights(demos: Demonstrations) -> NDArray[np.bool_]:
+    """Movements with g = x0 in a dimension, so without w and f in the original formulation; shape (n,)."""
+    x, first, last = demos.positions, demos.offsets[:-1], demos.offsets[1:] - 1
+    return np.asarray((x[first] == x[last]).any(axis=1))
+
+
+def run_draw(dataset: str, seed: int, index: int, svm: bool) -> dict[str, Any]:
+    """All accuracies of one draw.
+
+    Returns
+    -------
+    dict
+        ``nearest``, ``correlation`` and ``distance`` per representation; ``left_out``, names of movements that are
+        never drawn, since they have no weights; with `svm`, ``svm`` per
+        "representation/kernel/widths" and ``penalty`` per "representation/kernel/C", and ``width`` per
+        "representation/kernel": the mean over splits of the widths of their training rows; ``at_bound`` the same way:
+        the `share_at_bound` at the smallest C.
+    """
+    features, labels, left_out = _features(dataset)
+    chosen = draw(labels, paper.PER_CLASS, seed, index)
+    rows, y = {key: X[chosen] for key, X in features.items()}, labels[chosen]
+    result: dict[str, Any] = {
+        "nearest": {key: nearest_neighbor_accuracy(X, y) for key, X in rows.items()},
+        "correlation": {key: nearest_neighbor_accuracy(rows[key], y, "cosine") for key in ("original-w", "bio-w")},
+        "distance": {key: float(np.median(pdist(X))) for key, X in rows.items()},
+        "left_out": left_out,
+    }
+    if svm:
+        with sklearn.config_context(skip_parameter_validation=True):
+            result |= _run_svm(rows, y, diagnosis=dataset == "paper")
+    return result
+
+
+def _run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
+    accuracy: dict[str, float] = {}
+    width: dict[str, float] = {}
+    by_penalty: dict[str, float] = {}
+    at_bound: dict[str, float] = {}
+    for key, X in rows.items():
+        if not any(key in keys for keys in READINGS.values()):
+            continue
+        for name, kernel, widths in (("rbf", RBF(), "sigma"), ("tre", TruncatedEuclidean(), "m")):
+            fitted = fit_by_split(kernel, X)
+            width[f"{key}/{name}"] = float(np.mean([getattr(one, widths) for one in fitted]))
+            gram = np.stack([one(X) for one in fitted])
+            accuracy[f"{key}/{name}/median"] = svm_accuracy(gram, y)
+            if diagnosis and key == "original-sa":
+                by_penalty |= {f"{key}/{name}/{C:g}": svm_accuracy(gram, y, C) for C in PENALTIES[:-1]}
+                at_bound[f"{key}/{name}"] = share_at_bound(gram, y, PENALTIES[0])
+    for row in REPRESENTATIONS.values():
+        if not (diagnosis or row.key in READINGS["closest in distances"]):
+            continue
+        X, printed = rows[row.key], paper.KERNELS[row.formulation, row.quantity]
+        accuracy[f"{row.key}/rbf/paper"] = svm_accuracy(printed.rbf(X), y)
+        accuracy[f"{row.key}/tre/paper"] = svm_accuracy(printed.truncated(X), y)
+    return {"svm": accuracy, "width": width, "penalty": by_penalty, "at_bound": at_bound}

@@ -1,0 +1,145 @@
+"""The paper's Tables 1 to 4, ours beside the printed numbers, and what follows from both."""
+
+from __future__ import annotations
+
+from statistics import fmean
+
+import numpy as np
+
+from kineme.datasets.lasa import LASA_26
+from kineme.experiments.reproduction import paper
+from kineme.experiments.reproduction.choices import PENALTY
+from kineme.experiments.reproduction.columns import (
+    CLOSEST,
+    COLUMNS,
+    DEFAULT,
+    KERNELS,
+    PRINTED,
+    Draws,
+    by_column,
+    columns_of,
+    over,
+)
+from kineme.experiments.reproduction.conclusions import (
+    read_ahead,
+    read_counts,
+    read_left_out,
+    read_nearer,
+    read_order,
+    read_placement,
+    read_widths,
+)
+from kineme.experiments.reproduction.diagnosis import diagnosis, penalty, svm_diagnosis
+from kineme.experiments.reproduction.representations import READINGS
+from kineme.output.table import Table, spread
+
+
+def make_tables(draws: dict[str, Draws]) -> tuple[list[Table], list[Table]]:
+    """The tables of the nine letters, and those of all shapes, for the draws of each data set."""
+    small, large = draws["paper"], draws["lasa-26"]
+    letters, shapes = "nine letters", f"all {len(LASA_26)} single shapes of LASA"
+    of_letters = [
+        _counts(),
+        _nearest(small, f"Table 2. Accuracy of 1-NN, leave one out, {letters}", with_paper=True),
+        _parameters(small),
+        _svm(small, f"Table 4. Accuracy of the SVM, leave one out, {letters}", with_paper=True),
+        diagnosis(small),
+        svm_diagnosis(small),
+        penalty(small),
+    ]
+    of_shapes = [_nearest(large, f"Table 2 on {shapes}", with_paper=False)]
+    if any("svm" in one for one in large):
+        of_shapes.append(_svm(large, f"Table 4 on {shapes}", with_paper=False))
+    return of_letters, of_shapes
+
+
+def _counts() -> Table:
+    n = len(paper.COUNTS)
+    printed = [value for table in (paper.NEAREST_NEIGHBOR, *PRINTED.values()) for value in table.values()]
+    return Table(
+        "Table 1. Movements per letter",
+        ("", *paper.COUNTS, "all"),
+        [
+            ("paper", *map(str, paper.COUNTS.values()), str(sum(paper.COUNTS.values()))),
+            ("ours, each draw of the 7", *[str(paper.PER_CLASS)] * n, str(n * paper.PER_CLASS)),
+        ],
+        read_counts(printed, sum(paper.COUNTS.values()), n * paper.PER_CLASS),
+    )
+
+
+def _nearest(draws: Draws, title: str, with_paper: bool) -> Table:
+    rows = [("paper", *(f"{paper.NEAREST_NEIGHBOR[cell]:.3f}" for cell in paper.CELLS))] if with_paper else []
+    by_reading = {reading: columns_of(draws, "nearest", reading) for reading in READINGS}
+    rows += [(reading, *map(spread, columns.values())) for reading, columns in by_reading.items()]
+    correlation = [spread(over(draws, "correlation", key)) for key in ("original-w", "bio-w")]
+    rows.append(("correlation of w (Ijspeert 2003)", *correlation, "-", "-"))
+    return Table(f"{title} ({len(draws)} draws: mean, range)", ("", *COLUMNS), rows, read_nearest(draws, with_paper))
+
+
+def read_nearest(draws: Draws, with_paper: bool) -> str:
+    """What follows from the accuracies of 1-NN: where the paper's lie, which feature is ahead, and what is left out."""
+    by_reading = {reading: columns_of(draws, "nearest", reading) for reading in READINGS}
+    said = []
+    if with_paper:
+        printed = by_column(paper.NEAREST_NEIGHBOR)
+        said += [read_placement(reading.capitalize(), printed, columns) for reading, columns in by_reading.items()]
+        said.append(read_nearer(printed, by_reading))
+    for formulation in ("original", "bio-inspired"):
+        pair = (by_reading[DEFAULT][f"{quantity}, {formulation}"] for quantity in ("f(t)", "weights"))
+        said.append(read_order(f"{DEFAULT.capitalize()}, {formulation}", ("f(t)", "weights"), *pair))
+    said.append(read_left_out(draws[0]["left_out"]))
+    return " ".join(filter(None, said))
+
+
+def _parameters(draws: Draws) -> Table:
+    def widths(keys: tuple[str, ...], kernel: str) -> tuple[str, ...]:
+        return tuple(f"{np.mean(over(draws, 'width', f'{key}/{kernel}')):.3g}" for key in keys)
+
+    rows = [
+        ("RBF sigma, paper", *(f"{paper.KERNELS[cell].rbf.sigma:.3g}" for cell in paper.CELLS)),
+        (f"RBF sigma, median, {CLOSEST}", *widths(READINGS[CLOSEST], "rbf")),
+        (f"RBF sigma, median, {DEFAULT}", *widths(READINGS[DEFAULT], "rbf")),
+        ("TrE m, paper", *(f"{paper.KERNELS[cell].truncated.m:.3g}" for cell in paper.CELLS)),
+        (f"TrE m, median, {CLOSEST}", *widths(READINGS[CLOSEST], "tre")),
+        (f"TrE m, median, {DEFAULT}", *widths(READINGS[DEFAULT], "tre")),
+    ]
+    return Table("Table 3. Widths of the kernels", ("", *COLUMNS), rows, read_parameters(draws))
+
+
+def read_parameters(draws: Draws) -> str:
+    """Where the paper's RBF widths are like the median distances of a reading, and like those of another."""
+    printed = {head: paper.KERNELS[cell].rbf.sigma or 0.0 for head, cell in zip(COLUMNS, paper.CELLS, strict=True)}
+    medians = {
+        reading: {head: fmean(values) for head, values in columns_of(draws, "width", reading, "/rbf").items()}
+        for reading in READINGS
+    }
+    return " ".join(read_widths(reading.capitalize(), printed, columns) for reading, columns in medians.items())
+
+
+def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
+    rows = []
+    for name, kernel in KERNELS.items():
+        if with_paper:
+            rows.append((f"{kernel}: paper", *(f"{PRINTED[name][cell]:.3f}" for cell in paper.CELLS)))
+        for reading, widths, words in (
+            (CLOSEST, "paper", "Table 3 widths"),
+            (CLOSEST, "median", "median widths"),
+            (DEFAULT, "median", "median widths"),
+        ):
+            cells = map(spread, columns_of(draws, "svm", reading, f"/{name}/{widths}").values())
+            rows.append((f"{kernel}: {reading}, {words}", *cells))
+    n = sum("svm" in one for one in draws)
+    reading = read_svm(draws, with_paper)
+    return Table(f"{title} ({n} draws: mean, range; C = {PENALTY:g})", ("", *COLUMNS), rows, reading)
+
+
+def read_svm(draws: Draws, with_paper: bool) -> str:
+    """What follows from the accuracies of the SVM: where the paper's lie, and which kernel is ahead."""
+    rbf, tre = (columns_of(draws, "svm", CLOSEST, f"/{name}/paper") for name in KERNELS)
+    said = []
+    if with_paper:
+        said += [
+            read_placement(f"{kernel} with the paper's widths", by_column(PRINTED[name]), columns)
+            for (name, kernel), columns in zip(KERNELS.items(), (rbf, tre), strict=True)
+        ]
+    return " ".join([*said, read_ahead("With the paper's widths", ("TrE", "RBF"), tre, rbf)])

@@ -1,0 +1,1 @@
+"""Arrays by name: NPZ, JSON, MATLAB."""

@@ -1,0 +1,211 @@
+"""Arrays by name, from NPZ and JSON: which of them are times and positions, of one movement or of many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.files.parsed_file import Block, Detected, Found, listed
+from kineme.files.tables.dates import nanoseconds
+from kineme.files.tables.layout import Layout
+from kineme.files.tables.time_units import in_seconds, unit_by_size
+from kineme.movements.trajectories.axes import axis_names
+from kineme.validation import Array
+
+POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
+
+_RAGGED = (
+    "expected times and positions with rows of one length, got rows that differ in length or depth; "
+    "name movements of unequal length positions_0, times_0, positions_1, ..."
+)
+
+
+def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Found:
+    """The movements that arrays hold.
+
+    - ``positions`` (T, d) or (T,), ``times`` (T,): one movement.
+    - ``positions`` (n, T, d), ``times`` (T,) or (n, T): many of equal length.
+    - ``positions`` (total, d), ``times`` (total,), ``offsets`` (n + 1,): many, one after the other, as `Demonstrations`
+      holds them.
+    - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length.
+
+    ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
+    and ``z`` that are all (T,) are the coordinates of one movement. Where there are no times, movements of
+    ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one second.
+
+    Raises
+    ------
+    DataError
+        No positions, or arrays that do not fit together.
+    """
+    arrays = _axes_joined(arrays)
+    key = _named(arrays, POSITIONS)
+    if key is not None:
+        xs, ts, how = _of_one(arrays, _numbers(arrays[key]), layout)
+    else:
+        xs, ts, how = _numbered(arrays)
+    return join(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
+
+
+def join(
+    xs: Sequence[Array],
+    ts: Sequence[Array] | None,
+    named: tuple[Sequence[str | None], str],
+    layout: Layout,
+    detected: tuple[str, str],
+) -> Found:
+    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Found`."""
+    labels, time = named
+    dims = sorted({x.shape[1] for x in xs})
+    if len(dims) != 1 or dims == [0]:
+        raise DataError(f"expected movements of the same dimensions, at least one, got {dims}")
+    if ts is not None and [len(t) for t in ts] != [len(x) for x in xs]:
+        odd = next(i for i, (t, x) in enumerate(zip(ts, xs, strict=True)) if len(t) != len(x))
+        raise DataError(f"expected one time stamp per sample, got {len(ts[odd])} for {len(xs[odd])} in movement {odd}")
+    offsets = np.concatenate(([0], np.cumsum([len(x) for x in xs]))).astype(np.intp)
+    units, known = layout.units, "given"
+    stamps = None
+    if ts is not None:
+        stamps = np.concatenate(ts)
+        if units is None:
+            units, known = unit_by_size(stamps)
+        stamps = in_seconds(stamps, units)
+    elif isinstance(units, float | int):
+        stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
+    else:
+        units, known = "s", "no times: one second each"
+    columns = tuple(axis_names(xs[0].shape[1]))
+    places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
+    block = Block(np.concatenate(xs), stamps, offsets, list(labels), places)
+    return Found(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Coordinates ``x`` (T,), ``y`` (T,), ``z`` (T,) as positions (T, d)."""
+    axes = [name for name in "xyz" if name in arrays]
+    if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
+        return arrays
+    return _Joined(arrays, axes, np.column_stack([_numbers(arrays[name]) for name in axes]))
+
+
+class _Joined(Mapping[str, Any]):
+    """Arrays with positions in place of their axes; the others are read when they are asked for, as before."""
+
+    def __init__(self, arrays: Mapping[str, Any], axes: Sequence[str], positions: Array) -> None:
+        self._arrays, self._positions = arrays, positions
+        self._names = {name: None for name in arrays if name not in axes} | {"positions": None}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._names:
+            raise KeyError(name)
+        return self._positions if name == "positions" else self._arrays[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def _numbers(values: Any) -> Array:
+    """As float64; dates and durations count in nanoseconds."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise DataError(_RAGGED) from error
+    if array.dtype.kind == "c":
+        raise DataError(f"expected real numbers, got {array.dtype}; save both parts as columns")
+    if array.dtype.kind in "mM":
+        return nanoseconds(array)
+    try:
+        return array.astype(np.float64, copy=False)
+    except (ValueError, TypeError) as error:
+        raise DataError(f"expected numbers in times and positions, got {_no_number(array)!r:.80}") from error
+
+
+def _no_number(array: NDArray[Any]) -> Any:
+    """The first entry that stands in the way."""
+    for one in array.ravel().tolist():
+        try:
+            float(np.float64(one))
+        except (ValueError, TypeError):
+            return one
+    return array.dtype.name
+
+
+def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
+    return next((name for name in names if name in arrays), None)
+
+
+def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
+    key = _named(arrays, TIMES)
+    t = None if key is None else _numbers(arrays[key])
+    if x.ndim == 3:
+        if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
+            raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
+        return list(x), None if t is None else list(np.broadcast_to(t, x.shape[:2])), "(n, T, d)"
+    x = x[:, None] if x.ndim == 1 else x
+    if x.ndim != 2:
+        raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
+    if t is None and not isinstance(layout.units, float | int):
+        raise DataError(f"expected times beside the positions, got {listed(arrays)}; say their step with units=")
+    if t is not None and t.shape != x.shape[:1]:
+        raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
+    if "offsets" not in arrays:
+        return [x], None if t is None else [t], "single"
+    inner = np.asarray(arrays["offsets"])
+    if inner.ndim != 1 or inner.dtype.kind not in "iu" or len(inner) < 2 or (inner[1:] < inner[:-1]).any():
+        raise DataError("expected offsets as whole numbers that do not decrease, (n + 1,)")
+    if inner[0] != 0 or inner[-1] != len(x):
+        raise DataError(f"expected offsets from 0 to {len(x)}, got {inner[0]} to {inner[-1]}")
+    cuts = inner[1:-1].astype(np.intp)
+    return np.split(x, cuts), None if t is None else np.split(t, cuts), "offsets"
+
+
+def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | None, str]:
+    prefix = next((one for one in POSITIONS if f"{one}_0" in arrays), None)
+    if prefix is None:
+        raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
+    count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
+    xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
+    xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    if odd := [x.shape for x in xs if x.ndim != 2]:
+        raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
+    clock = next((one for one in TIMES if f"{one}_0" in arrays), None)
+    if clock is None:
+        return xs, None, "numbered"
+    try:
+        return xs, [_numbers(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
+    except KeyError as error:
+        raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
+
+
+def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
+    key = _named(arrays, LABELS)
+    if key is None:
+        return [None] * n
+    given = arrays[key]
+    if isinstance(given, np.ndarray):
+        shape, labels = np.atleast_1d(given).shape, np.atleast_1d(given).tolist()
+    else:  # of JSON: one by one, as an array would turn numbers beside texts into texts
+        labels = given if isinstance(given, list) else [given]
+        shape = (len(labels),)
+    if shape != (n,):
+        raise DataError(f"expected one label for each of the {n} movements, got labels of shape {shape}")
+    return [_label(one) for one in labels]
+
+
+def _label(one: Any) -> str | None:
+    """A label as text; None where there is none."""
+    if isinstance(one, (list, dict, tuple)) or one != one:  # noqa: PLR0124 - only NaN differs from itself
+        raise DataError(f"expected labels that are texts or numbers, got {one!r}")
+    if isinstance(one, bytes):
+        return one.decode("utf-8", "replace") or None
+    return None if one is None else str(one) or None

@@ -1,0 +1,78 @@
+"""One file for learned things: a JSON header and plain arrays in a zip archive, as NumPy's npz.
+
+Nothing in such a file is ever executed or looked up as a class: the header is data, arrays of objects are
+refused, and what a header means is decided by tables in this library. The archive's checksums make
+truncation and damage visible.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.files.arrays.npz import Npz
+from kineme.files.limits import check_expanded
+from kineme.output.atomic import write_atomically
+
+FORMAT = "kineme"
+VERSION = 1
+_HEADER = "header"
+
+
+def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Path:
+    """Write a header and arrays to one file, atomically.
+
+    Parameters
+    ----------
+    kind : str
+        What the file holds; `read_container` refuses any other.
+    header : dict
+        Anything that JSON can hold.
+    arrays : dict
+        Name -> array of numbers.
+    """
+    full = {"format": FORMAT, "version": VERSION, "kind": kind, **header}
+    encoded = np.frombuffer(json.dumps(full, allow_nan=False).encode(), dtype=np.uint8)
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, **{_HEADER: encoded}, **arrays)
+    return write_atomically(path, buffer.getvalue())
+
+
+def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
+    """Read a file of `write_container`; an array is read when it is asked for.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    DataError
+        The file is foreign, truncated or damaged, of another kind, of a later version, or larger than
+        `kineme.files.limits` allows; the message says which.
+    """
+    check_expanded(path.stat().st_size)
+    arrays = Npz(path.read_bytes(), path)
+    try:
+        header = json.loads(arrays[_HEADER].tobytes())
+    except (ValueError, KeyError, RecursionError) as error:
+        raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
+    _check_header(path, header, kind)
+    return header, arrays
+
+
+def _check_header(path: Path, header: Any, kind: str) -> None:
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive")
+    if not isinstance(header.get("version"), int) or header["version"] > VERSION:
+        raise DataError(
+            f"expected {path} to have format version {VERSION} or earlier, got {header.get('version')!r}; "
+            "upgrade kineme"
+        )
+    if header.get("kind") != kind:
+        raise DataError(f"expected {path} to hold {kind}, got {header.get('kind')!r}")

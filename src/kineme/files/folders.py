@@ -1,0 +1,64 @@
+"""The files under a folder, in an order that does not depend on the file system."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from pathlib import Path
+
+from kineme.files.parsed_file import Problem
+
+_OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
+
+
+def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
+    """All files that are not hidden, sorted, and what is wrong with the others and with folders.
+
+    Names that begin with a dot are passed over. Links to folders are followed after everything else, and no folder is
+    entered twice. A link that leads out of the folder is a problem, and followed only with `follow_links`: a folder
+    that somebody sent must not fetch what lies elsewhere.
+    """
+    files: list[Path] = []
+    problems: list[Problem] = []
+    seen: set[tuple[int, int]] = set()
+    folders, links = deque([folder]), deque[Path]()
+    while folders or links:
+        here = folders.popleft() if folders else links.popleft()
+        try:
+            known = here.stat()
+            if (known.st_dev, known.st_ino) in seen:
+                continue
+            seen.add((known.st_dev, known.st_ino))
+            entries = sorted((one for one in os.scandir(here) if not one.name.startswith(".")), key=lambda e: e.name)
+        except OSError as error:
+            problems.append(Problem(as_text(here.relative_to(folder)), None, f"the folder cannot be listed, {error}"))
+            continue
+        for entry in entries:
+            path = here / entry.name
+            if entry.is_symlink() and not follow_links and _leads_out(path, folder):
+                problems.append(Problem(as_text(path.relative_to(folder)), None, _OUTSIDE))
+            elif not _is_folder(entry):
+                files.append(path)
+            else:
+                (links if entry.is_symlink() else folders).append(path)
+    return sorted(files, key=lambda path: path.relative_to(folder).parts), problems
+
+
+def _leads_out(link: Path, folder: Path) -> bool:
+    """Whether a link leads to something, and that lies elsewhere."""
+    target, top = os.path.realpath(link), os.path.realpath(folder)
+    return os.path.exists(target) and os.path.commonpath([target, top]) != top
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    """Not where nobody can tell, such as a link to itself: reading it as a file says why."""
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
+
+
+def as_text(path: Path | str) -> str:
+    r"""A path with forward slashes; bytes that are no text are written as ``\xff``, so that it can be stored."""
+    plain = path.as_posix() if isinstance(path, Path) else path
+    return plain.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

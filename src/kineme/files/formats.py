@@ -1,0 +1,84 @@
+"""The one table of formats: file ending to reader."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from kineme.errors import DataError
+from kineme.files.arrays.arrays import arrays_movements, join
+from kineme.files.arrays.matlab import read_demos
+from kineme.files.arrays.npz import Npz
+from kineme.files.limits import check_expanded
+from kineme.files.parsed_file import Found
+from kineme.files.tables.layout import Layout
+from kineme.files.tables.parquet import read_parquet_table
+from kineme.files.tables.table_movements import table_movements
+from kineme.files.tables.text_table import read_text_table
+
+_NUMBER, _LIST = 32, 88  # bytes that one takes in Python
+
+
+class Format(NamedTuple):
+    """How the bytes of a file become movements, and whether the file's name is their label."""
+
+    read: Callable[[bytes, Layout], Found]
+    label_is_stem: bool = False
+
+
+def _read_text(data: bytes, layout: Layout) -> Found:
+    return table_movements(*read_text_table(data, layout), layout, "CSV")
+
+
+def _read_parquet(data: bytes, layout: Layout) -> Found:
+    return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
+
+
+def _read_npz(data: bytes, layout: Layout) -> Found:
+    return arrays_movements(Npz(data, Path("it")), layout, "NPZ")
+
+
+def _read_json(data: bytes, layout: Layout) -> Found:
+    lists = data.count(b"[") + data.count(b"{")
+    check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
+    try:
+        entries = json.loads(data, object_pairs_hook=_each_once)
+    except json.JSONDecodeError as error:
+        raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
+    if not isinstance(entries, dict):
+        raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
+    return arrays_movements(entries, layout, "JSON")
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
+        raise DataError(f"expected each entry once, got {twice!r} several times")
+    return entries
+
+
+def _read_matlab(data: bytes, layout: Layout) -> Found:
+    demos = read_demos(data)
+    return join(demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos"))
+
+
+def _read_bag(data: bytes, layout: Layout) -> Found:
+    raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
+
+
+#: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
+FORMATS: dict[str, Format] = {
+    ".csv": Format(_read_text),
+    ".tsv": Format(_read_text),
+    ".txt": Format(_read_text),
+    ".npz": Format(_read_npz),
+    ".json": Format(_read_json),
+    ".parquet": Format(_read_parquet),
+    ".mat": Format(_read_matlab, label_is_stem=True),
+    ".bag": Format(_read_bag),
+    ".db3": Format(_read_bag),
+    ".mcap": Format(_read_bag),
+}

@@ -1,0 +1,45 @@
+"""Movements that occur more than once, sample for sample, wherever they start in time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.movements.trajectories.demonstrations import Demonstrations
+
+_STAMP = 1e-6  # times since the start that differ by less than this share of the duration are the same
+
+
+def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
+    """Groups of indices of equal movements, each group in order.
+
+    Equal length, ends and sum pick candidates for all movements at once; these are compared sample by sample.
+    """
+    x, offsets = demonstrations.positions, demonstrations.offsets
+    key = np.column_stack(
+        (demonstrations.lengths, x[offsets[:-1]], x[offsets[1:] - 1], np.add.reduceat(x, offsets[:-1], axis=0))
+    )
+    _, group, size = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    group = group.ravel()
+    candidates = np.flatnonzero(size[group] > 1)
+    candidates = candidates[np.argsort(group[candidates], kind="stable")]
+    found = []
+    for alike in np.split(candidates, np.flatnonzero(np.diff(group[candidates])) + 1):
+        found += _equal(demonstrations, alike.tolist())
+    return sorted(found)
+
+
+def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
+    groups: list[list[int]] = []
+    for i in alike:
+        same = next((group for group in groups if _are_equal(demonstrations, group[0], i)), None)
+        if same is None:
+            groups.append([i])
+        else:
+            same.append(i)
+    return [group for group in groups if len(group) > 1]
+
+
+def _are_equal(demonstrations: Demonstrations, i: int, k: int) -> bool:
+    one, other = demonstrations[i], demonstrations[k]
+    since = np.abs((one.times - one.times[0]) - (other.times - other.times[0])).max()
+    return np.array_equal(one.positions, other.positions) and bool(since <= _STAMP * one.duration)

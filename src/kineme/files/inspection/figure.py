@@ -1,0 +1,101 @@
+"""A picture of recordings: one panel per label, its movements over one another."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from kineme.files.inspection.inspect import labels_in_order
+from kineme.files.join_files import Recordings
+from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.output.text import drawable
+
+_PANELS = 30  # labels that are drawn
+_OVERLAID = 25  # movements of a label that are drawn, evenly chosen
+_POINTS = 400  # samples of a movement that are drawn
+_COLUMNS = 6
+_NAME = 22  # letters of a label above its panel
+
+
+def draw_recordings(recordings: Recordings) -> Figure:
+    """Small multiples, one per label.
+
+    One dimension is drawn over time, two in the plane, of three and more the first three in space. Every panel has a
+    scale of its own, the same for its axes.
+    """
+    labels = labels_in_order(recordings)
+    shown = labels[:_PANELS]
+    n_dims = recordings.demonstrations.n_dims
+    columns = min(_COLUMNS, len(shown), math.ceil(math.sqrt(1.5 * len(shown))))
+    rows = math.ceil(len(shown) / columns)
+    side = (1.6 if n_dims < 3 else 1.9) + 1.6 / columns
+    figure = new_figure(max(3.8, side * columns), (side + 0.15 if n_dims < 3 else 0.85 * side) * rows + 0.4)
+    space = {"projection": "3d"} if n_dims >= 3 else {}
+    panels = figure.subplots(rows, columns, squeeze=False, subplot_kw=space).ravel()
+    for axes, label in zip(panels, shown, strict=False):
+        _draw_label(axes, recordings, label)
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+    first = ", ".join(recordings.detected[0][0].columns[:3]) if recordings.detected else ", ".join(axis_names(n_dims))
+    across = f"{first} over time [s]" if n_dims == 1 else f"{first} of {n_dims} dimensions" if n_dims > 3 else first
+    more = f"; the first {_PANELS} of {len(labels)} labels" if len(labels) > _PANELS else ""
+    figure.legend(handles=_key(drawable(across) + more), loc="outside lower center", ncols=3, handletextpad=0.3)
+    return figure
+
+
+def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
+    chosen = [i for i, one in enumerate(recordings.labels) if one == label]
+    drawn = np.unique(np.linspace(0, len(chosen) - 1, min(len(chosen), _OVERLAID)).round().astype(int))
+    paths = [_path(recordings.demonstrations[chosen[k]]) for k in drawn]
+    opacity = max(0.25, 0.9 - 0.05 * len(paths))
+    for path in paths:
+        axes.plot(*path.T, color=BLUE, linewidth=0.9, alpha=opacity)
+    starts, ends = np.array([path[0] for path in paths]), np.array([path[-1] for path in paths])
+    axes.plot(*starts.T, "o", color=GRAY, markersize=3, zorder=3)
+    axes.plot(*ends.T, "*", color=ORANGE, markersize=5.5, markeredgewidth=0, zorder=4)
+    name = "no label" if label is None else label
+    name = name if len(name) <= _NAME else name[: _NAME - 1] + "…"
+    axes.set_title(f"{drawable(name)} ({len(chosen)})", pad=3)
+    if paths[0].shape[1] > 2:
+        _tidy_space(axes)
+    elif recordings.demonstrations.n_dims == 1:
+        axes.tick_params(labelsize=6, length=2)
+    else:
+        axes.set(xticks=[], yticks=[])
+        axes.set_aspect("equal", adjustable="datalim")
+        width = np.ptp(np.concatenate(paths)[:, 0])
+        axes.set_xlabel(f"{width:.3g} wide", fontsize=6.5, color=GRAY, labelpad=2)
+
+
+def _tidy_space(axes: Any) -> None:
+    """Equal scales, no numbers, and planes that do not draw the eye."""
+    axes.set_aspect("equal")
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 push the axes aside for empty labels
+        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+        axis._axinfo["grid"].update(color="#DDDDDD", linewidth=0.5)
+        axis._axinfo["tick"].update(inward_factor=0.0, outward_factor=0.0)
+        axis.line.set_color(GRAY)
+
+
+def _path(one: Trajectory) -> Any:
+    """What is drawn of a movement, (points, 2 or 3)."""
+    kept = np.unique(np.linspace(0, len(one) - 1, min(len(one), _POINTS)).round().astype(int))
+    x = one.positions[kept, :3]
+    return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))
+
+
+def _key(across: str) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D([], [], linestyle="none", marker="o", color=GRAY, markersize=4, label="start"),
+        Line2D([], [], linestyle="none", marker="*", color=ORANGE, markersize=7, label="end"),
+        Line2D([], [], color=BLUE, linewidth=0.9, label=across),
+    ]

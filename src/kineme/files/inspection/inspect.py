@@ -1,0 +1,145 @@
+"""What a set of recordings holds, as numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.files.inspection.duplicates import duplicates_among
+from kineme.files.inspection.sampling import Sampling, sampling_of
+from kineme.files.join_files import Recordings
+from kineme.files.parsed_file import Detected, Problem
+from kineme.files.tables.time_units import GUESSED
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+_RATES = (2.0, 20_000.0)  # people and robots are sampled between these [Hz]
+
+
+class Range(NamedTuple):
+    """Least, median and greatest of several numbers."""
+
+    least: float
+    median: float
+    greatest: float
+
+
+class LabelSummary(NamedTuple):
+    """The movements of one label, or those without.
+
+    `samples`, `duration` [s], `rate` [Hz] and `extent` (the longest side of the box around a movement) range over
+    movements; `jitter` is their median, see `Sampling`; `gaps` counts all, `longest_gap` [s] is 0 without any.
+    """
+
+    label: str | None
+    movements: int
+    samples: Range
+    duration: Range
+    rate: Range
+    extent: Range
+    jitter: float
+    gaps: int
+    longest_gap: float
+
+
+class Inspection(NamedTuple):
+    """What `inspect` finds.
+
+    Attributes
+    ----------
+    movements, files, dimensions : int
+    labels : tuple of LabelSummary
+        In alphabetic order, those without a label last.
+    detected : tuple of (Detected, int)
+    duplicates : tuple of tuple of str
+        Names of movements that are the same, sample for sample.
+    problems : tuple of Problem
+    notes : tuple of str
+        What a person should look at.
+    """
+
+    movements: int
+    files: int
+    dimensions: int
+    labels: tuple[LabelSummary, ...]
+    detected: tuple[tuple[Detected, int], ...]
+    duplicates: tuple[tuple[str, ...], ...]
+    problems: tuple[Problem, ...]
+    notes: tuple[str, ...]
+
+
+def inspect(recordings: Recordings) -> Inspection:
+    """Count and measure what was read."""
+    demos = recordings.demonstrations
+    sampling = sampling_of(demos)
+    names = demos.names or ()
+    duplicates = tuple(tuple(str(names[i]) for i in group) for group in duplicates_among(demos))
+    labels = _summaries(recordings, sampling)
+    return Inspection(
+        len(demos),
+        len({source.path for source in recordings.sources}),
+        demos.n_dims,
+        labels,
+        recordings.detected,
+        duplicates,
+        recordings.problems,
+        tuple(_notes(recordings, labels, sampling)),
+    )
+
+
+def labels_in_order(recordings: Recordings) -> list[str | None]:
+    """Each label once, in alphabetic order, None last."""
+    known = set(recordings.labels)
+    named = sorted(label for label in known if label is not None)
+    return [*named, *([None] if None in known else [])]
+
+
+def _summaries(recordings: Recordings, sampling: Sampling) -> tuple[LabelSummary, ...]:
+    demos, order = recordings.demonstrations, labels_in_order(recordings)
+    number = {label: k for k, label in enumerate(order)}
+    codes = np.array([number[label] for label in recordings.labels])
+    x, starts = demos.positions, demos.offsets[:-1]
+    extents = (np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0)).max(axis=1)
+    return tuple(_summary(order[k], np.flatnonzero(codes == k), demos, sampling, extents) for k in range(len(order)))
+
+
+def _summary(
+    label: str | None, chosen: NDArray[np.intp], demos: Demonstrations, sampling: Sampling, extents: Array
+) -> LabelSummary:
+    gaps = sampling.gaps[chosen]
+    return LabelSummary(
+        label,
+        len(chosen),
+        _range(demos.lengths[chosen].astype(float)),
+        _range(demos.durations[chosen]),
+        _range(sampling.rates[chosen]),
+        _range(extents[chosen]),
+        float(np.median(sampling.jitters[chosen])),
+        int(gaps.sum()),
+        float(sampling.longest[chosen][gaps > 0].max(initial=0.0)),
+    )
+
+
+def _range(values: Array) -> Range:
+    return Range(float(values.min()), float(np.median(values)), float(values.max()))
+
+
+def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: Sampling) -> list[str]:
+    notes = []
+    rate = float(np.median(sampling.rates))
+    if not _RATES[0] <= rate <= _RATES[1]:
+        notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")
+    guessed = sorted({str(how.units) for how, _ in recordings.detected if how.units_from in GUESSED})
+    if len(guessed) > 1:
+        notes.append(f"time counts in {' here, in '.join(guessed)} there, to judge by its size; give --units")
+    if any(how.units_from.startswith("no times") for how, _ in recordings.detected):
+        notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
+    single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]
+    if single:
+        notes.append(f"only one movement labeled {', '.join(single[:5])}{' and others' if len(single) > 5 else ''}")
+    unlabeled = sum(one.movements for one in labels if one.label is None)
+    if 0 < unlabeled < len(recordings):
+        notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
+    return notes

@@ -1,0 +1,82 @@
+"""An inspection in words for people, and as data for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
+from kineme.files.parsed_file import Detected
+from kineme.output.table import Table, to_text
+from kineme.output.text import printable
+
+_SHOWN = 20  # problems, duplicates and kinds of files that are written out
+
+Names = Callable[[Any], str]
+
+
+def as_data(found: Inspection) -> dict[str, Any]:
+    """Nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
+    return {
+        "movements": found.movements,
+        "files": found.files,
+        "dimensions": found.dimensions,
+        "labels": [
+            {name: value._asdict() if isinstance(value, Range) else value for name, value in one._asdict().items()}
+            for one in found.labels
+        ],
+        "detected": [{**how._asdict(), "files": n} for how, n in found.detected],
+        "duplicates": [list(group) for group in found.duplicates],
+        "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in found.problems],
+        "notes": list(found.notes),
+    }
+
+
+def as_words(found: Inspection, printable: Names = printable) -> str:
+    """A table of labels, how files were understood, what is double, what could not be read."""
+    rows = [_row(one, printable) for one in found.labels]
+    title = (
+        f"{_count(found.movements, 'movement')} of {_count(found.dimensions, 'dimension')} "
+        f"in {_count(found.files, 'file')}"
+    )
+    heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
+    parts = [to_text(Table(title, heads, rows))]
+    parts += _listed("read as", [f"{_understood(how)} ({_count(n, 'file')})" for how, n in found.detected], printable)
+    parts += _listed("the same movement more than once", [" = ".join(group) for group in found.duplicates], printable)
+    parts += _listed("not read", list(map(str, found.problems)), printable)
+    parts += _listed("note", list(found.notes), printable)
+    return "\n\n".join(parts)
+
+
+def _listed(head: str, lines: list[str], printable: Names) -> list[str]:
+    if not lines:
+        return []
+    more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
+    return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
+
+
+def _row(one: LabelSummary, printable: Names) -> tuple[str, ...]:
+    gaps = f"{one.gaps} (to {one.longest_gap:.3g} s)" if one.gaps else "-"
+    jitter = f"{100 * one.jitter:.2g} %" if one.jitter >= 1e-6 else "-"
+    ranges = [_range(values) for values in (one.samples, one.duration, one.rate)]
+    label = "(no label)" if one.label is None else printable(one.label)
+    return (label, f"{one.movements}", *ranges, jitter, gaps, _range(one.extent))
+
+
+def _range(values: Range) -> str:
+    """The median alone where all are alike, else also the least and the greatest."""
+    least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
+    return median if least == greatest else f"{median} ({least} to {greatest})"
+
+
+def _understood(how: Detected) -> str:
+    times = "no times" if how.time is None else f"time {how.time!r} in {how.units} ({how.units_from})"
+    parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {', '.join(how.columns)}"]
+    for what, columns in (("movement", how.movement), ("label", how.label), ("left aside", how.ignored)):
+        if columns:
+            parts.append(f"{what} {', '.join(columns)}")
+    return "; ".join(parts)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,145 @@
+"""Many files as one set of demonstrations, each movement with where it comes from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.parsed_file import Block, Detected, Problem
+from kineme.files.read_file import FileRead
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.labels import label_array
+
+
+class Source(NamedTuple):
+    """Where a movement comes from.
+
+    Attributes
+    ----------
+    path : str
+        Relative to the folder that was read, with forward slashes; the name of the file if one file was read.
+    sha256 : str
+        Of the file's bytes, in hexadecimal.
+    size : int
+        Bytes.
+    mtime : float
+        Last modification of the file, in seconds since 1970.
+    place : str
+        Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
+    label : str or None
+    """
+
+    path: str
+    sha256: str
+    size: int
+    mtime: float
+    place: str
+    label: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """What was read, where it comes from, and what could not be read.
+
+    Attributes
+    ----------
+    demonstrations : Demonstrations
+        The movements of the most frequent number of dimensions (of two equally frequent, the one met first); those
+        of other dimensions are among the problems. They carry labels if every one of them has one.
+    sources : tuple of Source
+        One per movement.
+    problems : tuple of Problem
+    detected : tuple of (Detected, int)
+        How files were understood, and how many in this way; most frequent first.
+    """
+
+    demonstrations: Demonstrations
+    sources: tuple[Source, ...]
+    problems: tuple[Problem, ...]
+    detected: tuple[tuple[Detected, int], ...]
+
+    def __len__(self) -> int:
+        return len(self.sources)
+
+    @property
+    def labels(self) -> tuple[str | None, ...]:
+        """The label of each movement, also where others have none."""
+        return tuple(source.label for source in self.sources)
+
+    def __repr__(self) -> str:
+        n_files = len({source.path for source in self.sources})
+        return f"Recordings({self.demonstrations!r}, {n_files} files, {len(self.problems)} problems)"
+
+    def without_labels(self) -> Recordings:
+        """The same movements, with no label on any."""
+        plain = Demonstrations.of_movements(replace(self.demonstrations.movements, labels=None))
+        sources = tuple(source._replace(label=None) for source in self.sources)
+        return replace(self, demonstrations=plain, sources=sources)
+
+
+def join_files(files: Sequence[FileRead], where: str, problems: Sequence[Problem] = ()) -> Recordings:
+    """One `Recordings` of all files that hold movements.
+
+    Raises
+    ------
+    DataError
+        There is none.
+    """
+    listed = [*problems, *(problem for one in files for problem in one.problems)]
+    full = [one for one in files if one.block is not None and len(one.block.labels)]
+    if not full:
+        first = f"; {len(listed)} could not be read, the first {listed[0]}" if listed else ""
+        raise DataError(f"expected recordings in {where}, found none{first}")
+    dims: Counter[int] = Counter()
+    for one in full:
+        dims[_block(one).positions.shape[1]] += len(_block(one).labels)
+    n_dims = dims.most_common(1)[0][0]
+    odd = [one for one in full if _block(one).positions.shape[1] != n_dims]
+    listed += [
+        Problem(one.path, None, f"{_block(one).positions.shape[1]} dimensions where most have {n_dims}") for one in odd
+    ]
+    full = [one for one in full if _block(one).positions.shape[1] == n_dims]
+    sources = tuple(
+        Source(one.path, one.sha256, one.size, one.mtime, place, label)
+        for one in full
+        for place, label in zip(_block(one).places, _block(one).labels, strict=True)
+    )
+    detected = Counter(one.detected for one in full if one.detected)
+    return Recordings(_demonstrations(full, sources), sources, tuple(listed), tuple(detected.most_common()))
+
+
+def _block(one: FileRead) -> Block:
+    assert one.block is not None
+    return one.block
+
+
+def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Demonstrations:
+    blocks = [_block(one) for one in files]
+    lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
+    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    positions = _joined([block.positions for block in blocks])
+    times = _joined([_stamps(block) for block in blocks])
+    labels: Any = [source.label for source in sources]
+    names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
+    durations = times[offsets[1:] - 1] - times[offsets[:-1]]
+    labeled = None if None in labels else label_array(labels, len(labels), names)
+    return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names))
+
+
+def _joined(arrays: Sequence[Any]) -> Any:
+    return np.ascontiguousarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays))
+
+
+def _stamps(block: Block) -> Any:
+    """Times, or an even second where a file has none."""
+    if block.times is not None:
+        return block.times
+    lengths = np.diff(block.offsets)
+    within = np.arange(len(block.positions)) - np.repeat(block.offsets[:-1], lengths)
+    return within / np.repeat(lengths - 1, lengths)

@@ -1,0 +1,58 @@
+"""Writing one generated movement to a file: CSV, NPZ, JSON."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.movements.trajectories.axes import axis_names
+from kineme.output.atomic import write_atomically
+from kineme.validation import Array
+
+Columns = dict[str, Array]  # times (T,), positions, velocities and accelerations (T, d)
+
+
+def encode_movement(columns: Columns, ending: str) -> bytes:
+    """The bytes of a file with that ending; see `WRITERS`.
+
+    Raises
+    ------
+    DataError
+        An ending that no writer has; the message lists those that do.
+    """
+    if ending not in WRITERS:
+        raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
+    return WRITERS[ending](columns)
+
+
+def write_movement(path: Path, columns: Columns) -> Path:
+    """Write a movement in the format that the file's ending names, atomically."""
+    return write_atomically(path, encode_movement(columns, path.suffix.lower()))
+
+
+def _csv(columns: Columns) -> bytes:
+    axes = axis_names(columns["positions"].shape[1])
+    prefixes = {"positions": "", "velocities": "v_", "accelerations": "a_"}
+    heads = ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes)]
+    table = np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
+    lines = [",".join(heads), *(",".join(map(repr, row)) for row in table.tolist())]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _npz(columns: Columns) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, allow_pickle=False, **columns)
+    return buffer.getvalue()
+
+
+def _json(columns: Columns) -> bytes:
+    return (json.dumps({name: values.tolist() for name, values in columns.items()}) + "\n").encode()
+
+
+#: File ending -> encoder. All of them keep every bit of the numbers.
+WRITERS: dict[str, Callable[[Columns], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}

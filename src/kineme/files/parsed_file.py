@@ -1,0 +1,121 @@
+"""What readers hand over: movements of one file as a block, what was detected, what was wrong and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError, KinemeError
+from kineme.validation import Array
+
+_SHOWN = 40  # names in a message
+
+
+class Problem(NamedTuple):
+    """Something that could not be read.
+
+    `line` counts from 1, None where a file has no lines. `error` is the class of error that it is where just this one
+    file is read.
+    """
+
+    file: str
+    line: int | None
+    reason: str
+    error: type[KinemeError] = DataError
+
+    @property
+    def what(self) -> str:
+        """Line and reason, without the file."""
+        return f"line {self.line}: {self.reason}" if self.line else self.reason
+
+    def __str__(self) -> str:
+        return f"{self.file}{', ' if self.line else ': '}{self.what}"
+
+
+class Detected(NamedTuple):
+    """How a file was understood.
+
+    Attributes
+    ----------
+    format : str
+        Such as ``"CSV"``.
+    layout : str
+        ``"wide"``, one movement; ``"long"``, told apart by columns; or the layout of arrays.
+    columns : tuple of str
+        The coordinates.
+    time : str or None
+        The column of the time stamps.
+    units : str or float
+        Their unit.
+    units_from : str
+        How that is known: ``"given"``, ``"head"``, ``"dates"``; or guessed: ``"since 1970"``, ``"by its steps"``, see
+        `kineme.files.tables.time_units.unit_by_size`, or ``"assumed"``.
+    movement, label, ignored : tuple of str
+        Columns that tell movements apart, that name the action, and that are left aside.
+    """
+
+    format: str
+    layout: str
+    columns: tuple[str, ...]
+    time: str | None
+    units: str | float
+    units_from: str
+    movement: tuple[str, ...] = ()
+    label: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+
+def no_lines(row: int) -> None:
+    """The line of every row of a file that has no lines: None."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Movements of one file, one after the other, not yet checked.
+
+    Attributes
+    ----------
+    positions : ndarray of shape (total, d)
+    times : ndarray of shape (total,) or None
+        In seconds. None: evenly sampled over one second, as `Demonstrations.from_arrays` takes it.
+    offsets : ndarray of shape (n + 1,)
+    labels : list of n str or None
+    places : list of n str
+        Which movement of the file; empty if there is but one.
+    rows : ndarray of shape (total,) or None
+        Row of the file that each sample comes from, if not in order.
+    line_of : callable
+        Row of the file -> its line, counted from 1, or None.
+    faults : dict
+        Row of the file -> what is wrong there.
+    """
+
+    positions: Array
+    times: Array | None
+    offsets: NDArray[np.intp]
+    labels: list[str | None]
+    places: list[str]
+    rows: NDArray[np.intp] | None = None
+    line_of: Callable[[int], int | None] = no_lines
+    faults: dict[int, str] | None = None
+
+    def row(self, k: int) -> int:
+        """Row of the file that sample k comes from."""
+        return k if self.rows is None else int(self.rows[k])
+
+
+class Found(NamedTuple):
+    """The content of one file."""
+
+    detected: Detected
+    block: Block
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names for a message; of very many the first."""
+    some = list(names)
+    return str(some) if len(some) <= _SHOWN else f"{some[:_SHOWN]} and {len(some) - _SHOWN} more"

@@ -1,0 +1,100 @@
+"""Reading recorded movements from a folder or a file, whatever the format; see `kineme.files.formats`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from kineme.errors import DataError
+from kineme.files.folders import files_under
+from kineme.files.join_files import Recordings, join_files
+from kineme.files.limits import max_file_bytes
+from kineme.files.read_file import format_of, read_bytes, read_file
+from kineme.files.tables.layout import Column, Layout
+from kineme.movements.trajectories.trajectory import Trajectory
+
+Progress = Callable[[Sequence[Path]], Iterable[Path]]
+
+
+def read_recordings(  # noqa: PLR0913 - one parameter per question that a table of samples may leave open
+    path: str | Path,
+    *,
+    time: Column | None = None,
+    columns: Column | Sequence[Column] | None = None,
+    movement: Column | Sequence[Column] | None = None,
+    label: Column | None = None,
+    units: str | float | None = None,
+    skip: str = "movement",
+    follow_links: bool = False,
+    progress: Progress | None = None,
+) -> Recordings:
+    """Read all movements of a folder or a file.
+
+    In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
+    in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
+    read. A file that would take more memory than `kineme.files.limits` allows is not read.
+
+    Parameters
+    ----------
+    path : str or Path
+        A folder, or a file of a format in `kineme.files.formats.FORMATS`.
+    time, label : str or int, optional
+        Columns of a table, by head or counted from 0. By default they are found by their heads.
+    columns, movement : str or int or sequence of them, optional
+        Columns of the coordinates, and of what tells movements apart.
+    units : {"s", "ms", "us", "ns"} or float, optional
+        Unit of the time stamps, or its length in seconds. By default told by the head or by the stamps' size. As a
+        number it is also the step between samples of files without time stamps.
+    skip : {"movement", "sample"}, default "movement"
+        Whether a missing or repeated sample costs its whole movement or is left out alone. Both are reported.
+    follow_links : bool, default False
+        Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
+    progress : callable, optional
+        Wraps the list of files, to show how far the reading is.
+
+    Raises
+    ------
+    DataError
+        Nothing there, or nothing in it that can be read; the message gives the first problem.
+    SpecificationError
+        An unknown unit or choice, or a limit of memory that is no number.
+    """
+    max_file_bytes()
+    layout = Layout(time, columns, movement, label, units, skip)
+    path = Path(path)
+    if path.is_dir():
+        files, problems = files_under(path, follow_links)
+        watched = files if progress is None else progress(files)
+        return join_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
+    if not path.exists():
+        raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
+    return join_files([read_file(path, Path(path.name), layout)], str(path))
+
+
+def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
+    """Read what a file of that name would hold, for data that come from elsewhere."""
+    return join_files([read_bytes(data, Path(name), layout)], name)
+
+
+def read_recording(path: str | Path) -> Trajectory:
+    """Read a file that holds one movement, in any format of `kineme.files.formats.FORMATS`.
+
+    Raises
+    ------
+    DataError
+        The file is not what its name says, or holds several movements; the message names the line.
+    FileNotFoundError
+        There is no such file.
+    TrajectoryError
+        The numbers are no movement, see `Trajectory`.
+    """
+    path = Path(path)
+    format_of(path)
+    path.stat()
+    read = read_file(path, Path(path.name), Layout())
+    for problem in read.problems:
+        raise problem.error(str(problem._replace(file=str(path))))
+    one = join_files([read], str(path)).demonstrations
+    if len(one) > 1:
+        raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
+    return Trajectory(one[0].times, one[0].positions, name=path.name)

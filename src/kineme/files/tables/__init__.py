@@ -1,0 +1,1 @@
+"""Tables of samples: text and Parquet, and what their columns mean."""

@@ -1,0 +1,172 @@
+"""Which column of a table is time, which coordinates, which tells movements apart, which names the action."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.files.parsed_file import listed
+from kineme.files.tables.layout import Column, Layout
+from kineme.files.tables.time_units import PER_SECOND, words_of
+
+#: Words of heads. A head is of a kind if all its words are in the kind's lists and at least one in the first of them.
+TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "elapsed", "epoch"})
+MOVEMENT_WORDS = frozenset(
+    {
+        "movement", "demonstration", "demo", "trial", "trajectory", "traj", "sequence", "episode", "recording",
+        "segment", "repetition", "rep", "subject", "participant",
+    }
+)  # fmt: skip
+LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
+_BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
+_BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
+_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # say nothing that time does not
+_DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
+
+
+class Roles(NamedTuple):
+    """Column numbers: what each is for, and those that are left aside."""
+
+    time: int | None
+    positions: tuple[int, ...]
+    movement: tuple[int, ...]
+    label: int | None
+    ignored: tuple[int, ...]
+
+
+def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
+    """Find the columns' roles.
+
+    Parameters
+    ----------
+    heads : sequence of str
+        One per column.
+    kinds : sequence of {"number", "date", "text"}
+        What the columns hold.
+    layout : Layout
+        What the caller says; it wins.
+    named : bool, default True
+        Whether the file has heads. Without, the first column that is no text is time, the others are coordinates.
+
+    Raises
+    ------
+    DataError
+        No or several columns of times, no coordinates, or a column that is not there; the message lists what is.
+    """
+    label = _label(heads, layout, named)
+    movement = _movement(heads, layout, named, label)
+    taken = {*movement, label}
+    time = _time(heads, kinds, layout, named, taken)
+    taken.add(time)
+    if layout.coordinates is not None:
+        positions = _numbers(heads, layout.coordinates)
+    else:
+        free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
+        plain = set(map(_plain, heads))
+        positions = tuple(k for k in free if not (named and _says_nothing_new(heads[k], plain)))
+    if not positions:
+        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    taken.update(positions)
+    ignored = tuple(k for k in range(len(heads)) if k not in taken)
+    return Roles(time, positions, movement, label, ignored)
+
+
+def _number(heads: Sequence[str], column: Column) -> int:
+    return _numbers(heads, [column])[0]
+
+
+def _numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
+    """Columns by head or number; digits in a string count when no head reads so."""
+    exact, plain = _places(heads), _places(map(_plain, heads))
+    return tuple(_place(heads, one, exact, plain) for one in columns)
+
+
+def _places(heads: Iterable[str]) -> dict[str, list[int]]:
+    places: dict[str, list[int]] = {}
+    for k, head in enumerate(heads):
+        places.setdefault(head, []).append(k)
+    return places
+
+
+def _place(heads: Sequence[str], column: Column, exact: dict[str, list[int]], plain: dict[str, list[int]]) -> int:
+    if isinstance(column, str):
+        if column in exact:
+            return exact[column][0]
+        if len(alike := plain.get(_plain(column), [])) == 1:
+            return alike[0]
+    if isinstance(column, int) or column.isdecimal():
+        k = int(column)
+        if -len(heads) <= k < len(heads):
+            return k % len(heads)
+    raise DataError(f"expected a column {column!r}, got {_listed(heads)}")
+
+
+def _plain(head: str) -> str:
+    return re.sub(r"[\[(].*?[\])]", "", head).strip().lower()
+
+
+def _listed(heads: Sequence[str]) -> str:
+    return "one column" if len(heads) == 1 else f"the columns {listed(heads)}"
+
+
+def _time(
+    heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool, taken: set[int | None]
+) -> int | None:
+    if layout.time is not None:
+        return _number(heads, layout.time)
+    free = [k for k in range(len(heads)) if k not in taken]
+    found = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] != "text"][:1]
+    if len(found) == 1:
+        return found[0]
+    if isinstance(layout.units, float | int) and not found:
+        return None
+    if not named:
+        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    raise DataError(
+        f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
+        "say which with time=, or the step between samples with units= where there is none"
+    )
+
+
+def is_time(head: str) -> bool:
+    """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
+    words = words_of(head)
+    if words[:-1] == [] and words != ["s"] and set(words) & set(PER_SECOND):
+        return True
+    return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
+
+
+def _named_as(head: str, kind: frozenset[str]) -> bool:
+    words = set(words_of(head))
+    return words <= kind | _BESIDE_NAMES and bool(words & kind)
+
+
+def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
+    if layout.label is not None:
+        return _number(heads, layout.label)
+    found = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
+    if len(found) > 1:
+        raise DataError(f"expected one column of labels, got {[heads[k] for k in found]}; say which with label=")
+    return found[0] if found else None
+
+
+def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
+    if layout.keys is not None:
+        return _numbers(heads, layout.keys)
+    if not named:
+        return ()
+    kind = MOVEMENT_WORDS
+    return tuple(
+        k for k, head in enumerate(heads) if k != label and (_named_as(head, kind) or words_of(head) == ["id"])
+    )
+
+
+def _says_nothing_new(head: str, plain: set[str]) -> bool:
+    """A counter of samples, or the velocity or acceleration of another column, whose plain heads these are."""
+    words = words_of(head)
+    if not head.strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+        return True
+    derived = _DERIVATIVE.fullmatch(_plain(head))
+    return derived is not None and (derived[1] or derived[2]) in plain

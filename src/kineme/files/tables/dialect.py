@@ -1,0 +1,163 @@
+"""How a table of samples is written: separator, decimal mark, heads, and what its columns hold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from itertools import islice
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.files.limits import check_expanded
+from kineme.files.tables.columns import is_time
+from kineme.files.tables.dates import is_date
+
+COMMENTS = ("#", "%", "//")
+_PEEK = 20  # samples to look at before deciding
+_CELL = 32  # bytes in Python that a cell may take, for each of its characters
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_COMMA_NUMBERS = re.compile(rf"\s*{_COMMA_NUMBER.pattern}(\s+{_COMMA_NUMBER.pattern})+\s*")  # between blanks
+
+
+class Dialect(NamedTuple):
+    """How a table is written: its separator (None: blanks), decimal comma, heads, and where the numbers begin."""
+
+    separator: str | None
+    decimal_comma: bool
+    heads: tuple[str, ...]
+    named: bool
+    first: int  # line of the first sample, counted from 0
+    kinds: tuple[str, ...]  # "number", "date" or "text" per column
+
+    def is_sample(self, line: str) -> bool:
+        """Whether a line holds a sample; a comment does not, but a name may begin as one.
+
+        A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
+        cells as there are columns, and those of numbers hold numbers.
+        """
+        if not is_skipped(line):
+            return True
+        if self.kinds[0] != "text" or not line.strip():
+            return False
+        cells = split(line, self.separator)
+        return len(cells) == len(self.kinds) and all(
+            is_number(cell, self.decimal_comma)
+            for cell, kind in zip(cells, self.kinds, strict=True)
+            if kind == "number"
+        )
+
+
+def is_skipped(line: str) -> bool:
+    """Whether a line is empty or begins as a comment."""
+    stripped = line.strip()
+    return not stripped or stripped.startswith(COMMENTS)
+
+
+def split(line: str, separator: str | None) -> list[str]:
+    """The cells of a line."""
+    plain = line.rstrip("\r\n")
+    cells = _quoted_cells(plain, separator) if '"' in line else plain.split(separator)
+    return [cell.strip() for cell in cells]
+
+
+def _quoted_cells(line: str, separator: str | None) -> list[str]:
+    """Cells of which some begin with a quote: up to the next one, what follows it included; two in a row stand for one.
+
+    Not by Python's csv, which has a limit on the length of cells for the whole process.
+    """
+    end = r"\s" if separator is None else re.escape(separator)
+    cell = re.compile(rf'[^\S{end}]*"([^"]*(?:""[^"]*)*)(?:"([^{end}]*))?|([^{end}]*)')
+    gap = re.compile(r"\s+" if separator is None else end)
+    line = line.strip() if separator is None else line
+    cells, at = [], 0
+    while found := cell.match(line, at):
+        cells.append(found[3] if found[1] is None else found[1].replace('""', '"') + (found[2] or ""))
+        if (between := gap.match(line, found.end())) is None:
+            break
+        at = between.end()
+    return cells
+
+
+def detect_dialect(text: Iterable[str]) -> Dialect:
+    """How a table is written, from its first lines; no more are taken than needed."""
+    lines, kept = [], []
+    for line in text:
+        check_expanded(_CELL * len(line), "lines")
+        lines.append(line)
+        if not is_skipped(line):
+            kept.append(len(lines) - 1)
+        if len(kept) == _PEEK:
+            break
+    if not kept:
+        raise DataError("expected samples, got an empty file")
+    kept = _with_names_like_comments(lines, kept)
+    separator = _separator([lines[k] for k in kept[:2]])
+    cells = [split(lines[k], separator) for k in kept]
+    comma = separator != "," and any(_COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
+    named = not _is_sample(cells, comma)
+    heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
+    numbered = not named and _counts_columns(cells)
+    first += numbered
+    body = cells[named or numbered :]
+    kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
+    if heads:
+        return Dialect(separator, comma, tuple(heads), True, first, kinds)
+    return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
+    """Also those lines below the first one kept that begin as comments and yet are rows: ``#1,0.0,0.25,0.75``.
+
+    As long as the first cells of all other rows are no numbers; else a row was commented out.
+    """
+    separator = _separator([lines[kept[0]]])
+    rows = [split(lines[k], separator) for k in kept]
+    if separator is None or any(is_number(row[0], separator != ",") for row in rows):
+        return kept
+    below = (k for k in range(kept[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
+    marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))
+    return sorted({*kept, *islice(marked, _PEEK)})[:_PEEK]
+
+
+def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
+    return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
+
+
+def _separator(lines: Sequence[str]) -> str | None:
+    for mark in (";", "\t", ","):
+        if all(mark in line for line in lines):
+            return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark
+    return None
+
+
+def is_number(cell: str, comma: bool) -> bool:
+    """Whether a cell reads as a number."""
+    return bool(_NUMBER.fullmatch(cell) or (comma and _COMMA_NUMBER.fullmatch(cell)))
+
+
+def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:
+    """Whether the first line holds a sample, not heads: it has as many numbers as the next, and at least one."""
+    counts = [sum(is_number(cell, comma) for cell in row) for row in cells[:2]]
+    return counts[0] > 0 and counts[0] >= counts[-1]
+
+
+def _counts_columns(cells: Sequence[list[str]]) -> bool:
+    """Whether the first line only numbers the columns, 0, 1, 2, above fractions, as data frames without heads do."""
+    return cells[0] == [str(k) for k in range(len(cells[0]))] and any("." in cell for cell in cells[-1])
+
+
+def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int) -> list[str]:
+    """The heads in the last comment above the samples, if it has as many words as columns, and one is for time."""
+    comments = [line.strip().lstrip("#%/") for line in lines if line.strip()]
+    if not comments:
+        return []
+    heads = split(comments[-1].strip(), separator)
+    return heads if len(heads) == n_columns and any(map(is_time, heads)) else []
+
+
+def _kind(cells: Sequence[str], comma: bool) -> str:
+    filled = [cell for cell in cells if cell]
+    if filled and all(map(is_date, filled)):
+        return "date"
+    return "number" if 2 * sum(is_number(cell, comma) for cell in filled) >= len(filled) else "text"

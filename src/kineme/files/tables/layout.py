@@ -1,0 +1,75 @@
+"""What a caller says about the columns of a recording; what is left open is found out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Real
+
+from kineme.errors import SpecificationError
+from kineme.files.tables.time_units import PER_SECOND, UNITS
+from kineme.validation import check_choice, check_number
+
+Column = str | int  # by its head, or counted from 0
+
+SKIP = ("movement", "sample")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which columns hold what. None: find out from heads and numbers, and report it.
+
+    Attributes
+    ----------
+    time : str or int, optional
+        Column of the time stamps.
+    columns : str or int or sequence of them, optional
+        Columns of the coordinates, in that order.
+    movement : str or int or sequence of them, optional
+        Columns that tell the movements of a long table apart.
+    label : str or int, optional
+        Column that names the action.
+    units : str or float, optional
+        Unit of the time stamps: one of `kineme.files.tables.time_units.UNITS`, or the number of seconds in one unit. As
+        a number, it is the step between samples of a file that has no time stamps at all.
+    skip : {"movement", "sample"}
+        What a missing or repeated sample costs: its whole movement, or itself alone.
+
+    Raises
+    ------
+    SpecificationError
+        An unknown unit or choice.
+    """
+
+    time: Column | None = None
+    columns: Column | Sequence[Column] | None = None
+    movement: Column | Sequence[Column] | None = None
+    label: Column | None = None
+    units: str | float | None = None
+    skip: str = "movement"
+
+    def __post_init__(self) -> None:
+        check_choice("skip", self.skip, SKIP)
+        if isinstance(self.units, Real) and not isinstance(self.units, bool):
+            check_number("units", self.units, above=0)
+        elif self.units is not None and self.units not in PER_SECOND:
+            raise SpecificationError(
+                f"expected units to be one of {', '.join(UNITS)} or a number of seconds, got {self.units!r}"
+            )
+
+    @property
+    def coordinates(self) -> tuple[Column, ...] | None:
+        """The columns of the coordinates."""
+        return _several(self.columns)
+
+    @property
+    def keys(self) -> tuple[Column, ...] | None:
+        """The columns that tell movements apart."""
+        return _several(self.movement)
+
+
+def _several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | None:
+    """One column or many, as a tuple."""
+    if columns is None:
+        return None
+    return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # none given is none said

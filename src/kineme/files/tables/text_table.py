@@ -1,0 +1,117 @@
+"""CSV and its relatives, at the speed of NumPy's C parser."""
+
+from __future__ import annotations
+
+import io
+from codecs import BOM_UTF8
+from collections.abc import Iterator
+from functools import cache
+from itertools import chain, islice
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.limits import check_expanded
+from kineme.files.tables.columns import Roles, choose_roles
+from kineme.files.tables.dates import seconds_of_dates
+from kineme.files.tables.dialect import COMMENTS, Dialect, detect_dialect
+from kineme.files.tables.layout import Layout
+from kineme.files.tables.table import Table
+from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
+
+_NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes that a cell of a number, a cell of text and a column take
+
+
+def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
+    """Read a table of samples by lines.
+
+    Separated by comma, semicolon, tab or blanks; with a head line or without; quoted or not; with decimal commas
+    where the separator is another mark. Empty lines and comments are skipped, see `Dialect.is_sample`. A head may stand
+    in the last comment, as `numpy.savetxt` writes it.
+
+    Raises
+    ------
+    DataError
+        No text, no samples, or no columns to be found.
+    """
+    encoding = _encoding(data)
+    dialect = detect_dialect(_lines(data, encoding))
+    _check_memory(data, dialect)
+    roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
+    dated = roles.time is not None and dialect.kinds[roles.time] == "date"
+    texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
+    dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
+    faults: dict[int, str] = {}
+    rows = _read_fast(data, encoding, dialect, dtype)
+    if rows is None:
+        rows, faults = read_slowly(_samples(data, encoding, dialect), dialect, dtype)
+
+    @cache
+    def lines() -> Any:
+        return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
+
+    def line_of(row: int) -> int | None:
+        return int(lines()[row])
+
+    columns = [rows[name] for name in dtype.names or ()]
+    if dated and roles.time is not None:
+        columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
+        head = dialect.heads[roles.time]
+        faults = {
+            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
+        } | faults
+    return Table(dialect.heads, columns, len(rows), line_of, faults, "s" if dated else None), roles
+
+
+def _encoding(data: bytes) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    if b"\0" in data:
+        raise DataError("expected text, got bytes that are none")
+    try:
+        data if data.isascii() else data.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"  # degree signs and the like of older programs
+    return "utf-8-sig"
+
+
+def _lines(data: bytes, encoding: str) -> Iterator[str]:
+    try:
+        for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
+            if encoding == "utf-16" and "\0" in line:
+                raise DataError("expected text, got bytes that are none")
+            yield line
+    except UnicodeError as error:
+        raise DataError(f"expected text, got bytes that are none ({error})") from error
+
+
+def _samples(data: bytes, encoding: str, dialect: Dialect) -> Iterator[tuple[int, str]]:
+    """Line number, counted from 1, and text of every sample."""
+    numbered = enumerate(islice(_lines(data, encoding), dialect.first, None), dialect.first + 1)
+    return ((k, line) for k, line in numbered if dialect.is_sample(line))
+
+
+def _check_memory(data: bytes, dialect: Dialect) -> None:
+    """Refuse a table that would take more memory than the limit, from the number of its lines and columns."""
+    n_lines = 1 + max(data.count(b"\n"), data.count(b"\r"))
+    row = sum(_TEXT if kind == "text" else _NUMBER for kind in dialect.kinds)
+    check_expanded(len(data) + _COLUMN * len(dialect.kinds) + n_lines * row)
+
+
+def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+    """All samples as a structured array, or None if a line is not as the others; as `read_slowly`, or not at all."""
+    has_text = any(dtype[name].kind == "O" for name in dtype.names or ())
+    if dialect.decimal_comma and has_text:
+        return None  # a comma in a name is not a decimal mark
+    if b'"' in data and not (encoding != "utf-16" and quotes_are_plain(data.removeprefix(BOM_UTF8), dialect)):
+        return None
+    lines: Iterator[str] = islice(_lines(data, encoding), dialect.first, None)
+    if any(mark.encode() in data for mark in COMMENTS):
+        lines = filter(dialect.is_sample, lines)
+    if dialect.decimal_comma:
+        lines = (line.replace(",", ".") for line in lines)
+    first = next(filter(dialect.is_sample, lines), None)
+    if first is None:
+        raise DataError("expected samples, got none below the heads")
+    return try_rows(chain((first,), lines), dialect, dtype)

@@ -1,0 +1,115 @@
+"""The same table where a line is not as the others: the good stretches at full speed, the bad lines one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.tables.dialect import Dialect, split
+
+_STRETCH = 1000  # lines that are tried together
+
+
+def read_slowly(
+    samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
+) -> tuple[Any, dict[int, str]]:
+    """All samples, NaN where a number is missing, and row -> what is wrong there."""
+    stretches, faults, n_rows = [], {}, 0
+    samples = iter(samples)
+    while lines := [line for _, line in islice(samples, _STRETCH)]:
+        rows, wrong = _read_stretch(lines, dialect, dtype)
+        faults.update({n_rows + row: reason for row, reason in wrong.items()})
+        stretches.append(rows)
+        n_rows += len(rows)
+    if not stretches:
+        raise DataError("expected samples, got none below the heads")
+    return np.concatenate(stretches), faults
+
+
+def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> tuple[Any, dict[int, str]]:
+    texts = [dtype[name].kind == "O" for name in dtype.names or ()]
+    if not (dialect.decimal_comma and any(texts)):
+        plain = [line.replace(",", ".") for line in lines] if dialect.decimal_comma else lines
+        quoted = any('"' in line for line in plain)
+        known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
+        if known and (read := try_rows(plain, dialect, dtype)) is not None:
+            return read, {}
+        if not quoted and not any(texts) and dialect.separator:  # the usual fault is an empty cell
+            filled = [_filled(line, dialect.separator) for line in plain]
+            if (read := try_rows(filled, dialect, dtype)) is not None:
+                return read, _empty_cells(lines, dialect)
+    rows = np.empty(len(lines), dtype)
+    faults = {}
+    for k, line in enumerate(lines):
+        rows[k], wrong = _read_line(line, dialect, texts)
+        if wrong:
+            faults[k] = wrong
+    return rows, faults
+
+
+def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
+    """Lines by NumPy's parser, texts without blanks around them; None if one is not as the others."""
+    try:
+        rows = np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
+    except ValueError:
+        return None
+    for name in dtype.names or ():
+        if dtype[name].kind == "O":
+            rows[name] = [cell.strip() for cell in rows[name].tolist()]
+    return rows
+
+
+def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
+    """Whether all quotes stand around whole cells of one line, which every parser understands in the same way."""
+    if dialect.separator is None:
+        return False
+    marks = np.frombuffer(b"\n" + text + b"\n", np.uint8)
+    quotes, ends = np.flatnonzero(marks == ord('"')), np.flatnonzero((marks == ord("\n")) | (marks == ord("\r")))
+    if len(quotes) % 2:
+        return False
+    first, last = quotes[::2], quotes[1::2]
+    beside = np.concatenate((marks[first - 1], marks[last + 1]))
+    in_one_line = np.searchsorted(ends, first) == np.searchsorted(ends, last)
+    return bool(np.isin(beside, [*b"\r\n", ord(dialect.separator)]).all() and in_one_line.all())
+
+
+def _filled(line: str, separator: str) -> str:
+    """A line with nan in its empty cells."""
+    line, empty = line.rstrip("\r\n"), separator + separator
+    if empty in line:  # twice, as of three separators in a row the first replacement sees two
+        line = line.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
+    line = f"nan{line}" if line.startswith(separator) else line
+    return f"{line}nan" if line.endswith(separator) else line
+
+
+def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
+    """Row -> which number is missing."""
+    cells = ((k, [cell.strip() for cell in line.split(dialect.separator)]) for k, line in enumerate(lines))
+    return {k: f"expected a number in {dialect.heads[row.index('')]!r}, got nothing" for k, row in cells if "" in row}
+
+
+def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
+    cells, wrong = split(line, dialect.separator), ""
+    if len(cells) != len(texts):
+        wrong = f"expected {len(texts)} columns, got {len(cells)}"
+        cells = (cells + [""] * len(texts))[: len(texts)]
+    row: list[Any] = []
+    for cell, text, head in zip(cells, texts, dialect.heads, strict=True):
+        row.append(cell if text else _number(cell, dialect.decimal_comma))
+        if row[-1] is None:
+            row[-1] = np.nan
+            wrong = wrong or f"expected a number in {head!r}, got {repr(cell) if cell else 'nothing'}"
+    return tuple(row), wrong
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    if "_" in cell:  # Python takes 1_000 for a number, no table does
+        return None
+    try:
+        return float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return None

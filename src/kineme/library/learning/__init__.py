@@ -1,0 +1,1 @@
+"""Movements and files into the database."""

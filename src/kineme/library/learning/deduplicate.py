@@ -1,0 +1,67 @@
+"""Which movements of a batch are in the library already: by their samples, or by their place in the same file."""
+
+from __future__ import annotations
+
+import sqlite3
+from dataclasses import dataclass, field
+
+from kineme.library.learning.serialize import Packed
+from kineme.library.storage.rows import among, as_text, listed
+from kineme.library.storage.source import Source
+from kineme.movements.trajectories.demonstrations import Demonstrations
+
+
+@dataclass
+class Batch:
+    """Movements to be stored, and what is said about them."""
+
+    demos: Demonstrations
+    digests: list[int]
+    labels: list[str | None]
+    sources: list[Source | None]
+    places: list[str | None]
+    packed: Packed | None = None
+    packed_rows: dict[int, int] = field(default_factory=dict)  # movement of the batch -> row of `packed`
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the library has of a batch."""
+
+    by_digest: dict[int, int]
+    sources: dict[tuple[str, str], int]  # (sha256, options) -> source
+    by_place: dict[tuple[int, str], int]  # (source, place) -> movement
+
+    def id_of(self, batch: Batch, i: int) -> int | None:
+        """The movement that is there for movement i of the batch."""
+        found, where = self.by_digest.get(batch.digests[i]), self.place_of(batch, i)
+        return self.by_place.get(where) if found is None and where is not None else found
+
+    def place_of(self, batch: Batch, i: int) -> tuple[int, str] | None:
+        """(source, place) of movement i, if its source is known."""
+        source, place = batch.sources[i], batch.places[i]
+        key = None if source is None else self.sources.get((source.sha256, source.options_json))
+        return None if key is None or place is None else (key, as_text(place))
+
+    def remember(self, batch: Batch, i: int, key: int) -> None:
+        """Movement i has been stored: the same once more is not new."""
+        self.by_digest[batch.digests[i]] = key
+        if (where := self.place_of(batch, i)) is not None:
+            self.by_place[where] = key
+
+
+def look_up(connection: sqlite3.Connection, batch: Batch) -> Known:
+    """Search the library for all movements of a batch."""
+    hashes = {source.sha256 for source in batch.sources if source is not None}
+    query = f"SELECT sha256, options, id FROM source WHERE {among('sha256')}"
+    rows = connection.execute(query, {"keys": listed(hashes)}) if hashes else ()
+    sources = {(sha256, options): key for sha256, options, key in rows}
+    query = f"SELECT source, place, id FROM movement WHERE removed IS NULL AND source IS NOT NULL AND {among('source')}"
+    rows = connection.execute(query, {"keys": listed(sources.values())}) if sources else ()
+    by_place = {(source, place): key for source, place, key in rows}
+    return Known(_by_digest(connection, batch.digests), sources, by_place)
+
+
+def _by_digest(connection: sqlite3.Connection, digests: list[int]) -> dict[int, int]:
+    query = f"SELECT digest, id FROM movement WHERE removed IS NULL AND {among('digest')}"
+    return dict(connection.execute(query, {"keys": listed(digests)}))

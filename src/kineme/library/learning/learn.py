@@ -1,0 +1,205 @@
+"""Learning: what is new is described, and stored in batches, each of them one version."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.library.learning.commit import commit, describe
+from kineme.library.learning.deduplicate import Batch, look_up
+from kineme.library.learning.serialize import check, digests, evenly_sampled
+from kineme.library.storage.source import Source
+from kineme.library.storage.store import Store
+from kineme.library.storage.symbols import check_name
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import describe as name_of
+
+Progress = Callable[[int, int], object]
+
+_BATCH_MOVEMENTS = 8192
+_SMALL_BATCH = 2048  # of fewer movements four batches are made: one is written while the next one is described
+_BATCH_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class LearnReport:
+    """What learning has done.
+
+    Attributes
+    ----------
+    added, known : int
+        Movements that were stored, and that were there already.
+    symbols : tuple of str
+        Names of the symbols that were made.
+    ids : ndarray of shape (n,)
+        Of the movements, in the order in which they were given; of known ones, the id that they have.
+    version : int
+        Of the library afterwards.
+    """
+
+    added: int
+    known: int
+    symbols: tuple[str, ...]
+    ids: NDArray[np.int64]
+    version: int
+
+    def __repr__(self) -> str:
+        return f"LearnReport(added={self.added}, known={self.known}, symbols={self.symbols!r}, version={self.version})"
+
+
+def learn(
+    store: Store,
+    movements: Any,
+    labels: Sequence[Any] | None = None,
+    source: Source | Sequence[Source | None] | None = None,
+    places: Sequence[Any] | None = None,
+    progress: Progress | None = None,
+) -> LearnReport:
+    """Store movements that are not there yet; see `ActionLibrary.learn`."""
+    store.check_writable()
+    demos = Demonstrations.of(movements)
+    _check_dimensions(store, demos)
+    check(demos)
+    names = _as_names(demos, labels)
+    sources = _as_sources(source, len(demos))
+    where = _as_places(places, sources)
+    reports = []
+    with ThreadPoolExecutor(1, "kineme-library") as pool:
+        pending: Future[Any] | None = None
+        done = 0
+        for start, stop in _ranges(demos):
+            rows = slice(start, stop)
+            batch = _describe(store, _part(demos, start, stop), (names[rows], sources[rows], where[rows]))
+            if pending is not None:  # one batch is written while the next one is described
+                reports.append(pending.result())
+                done = _tell(progress, done + len(reports[-1].ids), len(demos))
+            pending = pool.submit(commit, store, batch)
+        if pending is not None:
+            reports.append(pending.result())
+            _tell(progress, done + len(reports[-1].ids), len(demos))
+    return LearnReport(
+        sum(one.added for one in reports),
+        sum(len(one.ids) - one.added for one in reports),
+        tuple(dict.fromkeys(name for one in reports for name in one.symbols)),
+        np.concatenate([one.ids for one in reports]),
+        store.version,
+    )
+
+
+def _describe(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any]) -> Batch:
+    """A batch ready to be stored; what is known already is not described again."""
+    labels, sources, places = given
+    batch = Batch(demos, digests(demos, evenly_sampled(demos)), labels, sources, places)
+    with store.reading() as connection:
+        known = look_up(connection, batch)
+    new = [i for i in range(len(demos)) if known.id_of(batch, i) is None]
+    if new:
+        describe(store, demos, batch, new)
+    return batch
+
+
+def _tell(progress: Progress | None, done: int, total: int) -> int:
+    if progress is not None:
+        progress(done, total)
+    return done
+
+
+def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
+    """Batches of at most so many movements and samples; at least one movement."""
+    start, n = 0, len(demos)
+    most = min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-n // 4)))
+    while start < n:
+        limit = int(np.searchsorted(demos.offsets, demos.offsets[start] + _BATCH_SAMPLES, side="right")) - 1
+        stop = min(max(limit, start + 1), start + most, n)
+        yield start, stop
+        start = stop
+
+
+def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
+    """Consecutive movements, sharing the samples."""
+    whole, first, last = demos.movements, demos.offsets[start], demos.offsets[stop]
+    return Demonstrations.of_movements(
+        Movements(
+            whole.positions[first:last],
+            whole.offsets[start : stop + 1] - first,
+            whole.durations[start:stop],
+            None if whole.times is None else whole.times[first:last],
+            None,
+            None if whole.names is None else whole.names[start:stop],
+        )
+    )
+
+
+def _check_dimensions(store: Store, demos: Demonstrations) -> None:
+    n_dims = store.n_dims
+    if n_dims is not None and n_dims != demos.n_dims:
+        raise TrajectoryError(
+            f"expected movements of {n_dims} dimensions as all others of the library in {store.folder}, "
+            f"got {demos.n_dims}; select the dimensions, or make another library"
+        )
+
+
+def _as_names(demos: Demonstrations, labels: Sequence[Any] | None) -> list[str | None]:
+    """The name of each movement's symbol; None where it has no label."""
+    given = demos.labels if labels is None else labels
+    if given is None:
+        return [None] * len(demos)
+    plain = _one_each("label", given, len(demos))
+    for i, label in enumerate(plain):
+        if isinstance(label, (list, tuple, dict, np.ndarray)) or (isinstance(label, float) and math.isnan(label)):
+            raise TrajectoryError(
+                f"{name_of(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
+                "name the action, or pass None where it has no name"
+            )
+    known = {label: None if label is None else check_name(str(label)) for label in dict.fromkeys(plain)}
+    return [known[label] for label in plain]
+
+
+def _one_each(what: str, given: Any, n: int) -> list[Any]:
+    """What a user passes for every movement, as a list; one text is none."""
+    many = f"one {what} for each of the {n} movements"
+    try:
+        size = -1 if isinstance(given, (str, bytes)) else len(given)
+    except TypeError:
+        size = -1
+    if size != n:
+        raise TrajectoryError(f"expected {many}, got {size if size >= 0 else repr(given)}")
+    return given.tolist() if isinstance(given, np.ndarray) else list(given)
+
+
+def _as_sources(source: Source | Sequence[Source | None] | None, n: int) -> list[Source | None]:
+    if source is None or isinstance(source, Source):
+        return [source] * n
+    sources = _one_each("source, or one", source, n)
+    for one in sources:
+        if one is not None and not isinstance(one, Source):
+            raise TrajectoryError(f"expected sources to be kineme.library.storage.source.Source or None, got {one!r}")
+    return sources
+
+
+def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> list[str | None]:
+    """Where in its source each movement is; unless that is said, movements are known by their samples alone."""
+    if places is None:
+        return [None] * len(sources)
+    places = _one_each("place", places, len(sources))
+    _check_apart(places, sources)
+    return [None if place is None else str(place) for place in places]
+
+
+def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
+    """Refuse two movements at one place of a source: the second would be taken for the first."""
+    seen: dict[tuple[int, str], int] = {}
+    for i, (place, source) in enumerate(zip(places, sources, strict=True)):
+        if source is not None and place is not None and seen.setdefault((id(source), str(place)), i) != i:
+            raise TrajectoryError(
+                f"expected a place of its own in {source.path!r} for each movement, got {place!r} for movements "
+                f"{seen[id(source), str(place)]} and {i}; name them apart"
+            )

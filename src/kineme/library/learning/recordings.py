@@ -1,0 +1,55 @@
+"""Learning from files: every movement keeps the file that it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+from kineme.files.join_files import Recordings
+from kineme.files.join_files import Source as File
+from kineme.library.learning.learn import LearnReport, Progress
+from kineme.library.storage.source import Source
+
+if TYPE_CHECKING:
+    from kineme.library.library import ActionLibrary
+
+
+def learn_recordings(
+    library: ActionLibrary,
+    recordings: Recordings,
+    options: Mapping[str, Any] | None = None,
+    labels: Sequence[str | None] | None = None,
+    progress: Progress | None = None,
+    root: str | PurePath = "",
+) -> LearnReport:
+    """Store what `kineme.files.recordings.read_recordings` has read.
+
+    Parameters
+    ----------
+    library : ActionLibrary
+    recordings : Recordings
+    options : mapping, optional
+        What the reader was told. The same file read in another way is another source.
+    labels : sequence of n str or None, optional
+        Names of symbols; by default each movement's own label.
+    progress : callable, optional
+        As for `ActionLibrary.learn`.
+    root : str or Path, optional
+        Folder that was read: where the files come from is kept with it before their names.
+    """
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    told = {name: value for name, value in (options or {}).items() if value is not None}
+    files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
+    return library.learn(
+        recordings.demonstrations,
+        list(recordings.labels) if labels is None else labels,
+        [files[one.path] for one in recordings.sources],
+        places=[one.place for one in recordings.sources],
+        progress=progress,
+    )
+
+
+def _source(one: File, path: PurePath, told: Mapping[str, Any], now: str) -> Source:
+    return Source(path.as_posix(), one.sha256, one.size, path.suffix.lower().lstrip("."), told, now)

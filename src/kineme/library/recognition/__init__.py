@@ -1,0 +1,1 @@
+"""Recognizing with the movements of a library."""

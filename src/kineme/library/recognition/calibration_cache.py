@@ -1,0 +1,104 @@
+"""The comparison of a large library: widths, weights, calibration, from samples; the last is kept in a cache."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import zlib
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.sampling import evenly_spaced
+from kineme.library.storage import read
+from kineme.library.storage.store import Store
+from kineme.output.atomic import write_atomically
+from kineme.recognition.conformal import Calibration
+from kineme.recognition.recognizer import Recognizer
+from kineme.recognition.sampled_calibration import calibrate_sample
+from kineme.recognition.two_stage_search import Stored
+from kineme.validation import Array
+
+if TYPE_CHECKING:
+    from kineme.library.recognition.recognize import Members
+
+FILE = "calibration.cache"
+
+_FORMAT = "1"
+_SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
+_SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
+
+
+def sample_recognizer(store: Store, members: Members) -> Recognizer:
+    """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
+    chosen = evenly_spaced(len(members.ids), _SAMPLE)
+    demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
+    recognizer = store.specification.recognizer().set_params(classifier="nearest")
+    return recognizer.fit(demos, members.labels[chosen])
+
+
+def calibrate(store: Store, members: Members, recognizer: Recognizer, stored: Stored) -> Calibration:
+    """The calibration of a recognizer on all members, taken from the cache if that is of the same ones."""
+    path, key = store.folder / FILE, _key(store, members)
+    if path.is_file():  # a pipe would keep us waiting
+        with suppress(*_SPOILED):
+            return _unpacked(path.read_bytes(), key, len(members.names))
+    made = calibrate_sample(recognizer, stored)
+    if not store.read_only:
+        with suppress(OSError):  # no room, no permission: it is made again next time
+            write_atomically(path, _packed(made, key))
+    return made
+
+
+def _key(store: Store, members: Members) -> str:
+    """Changes with the library, its specification, and which movement shows which symbol."""
+    text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
+    digest = hashlib.sha256("\0".join(text).encode())
+    digest.update(members.ids.tobytes() + members.first.tobytes())
+    return digest.hexdigest()
+
+
+def _packed(calibration: Calibration, key: str) -> bytes:
+    pooled = {id(one): one for one in calibration.pooled}  # classes of one size share theirs
+    numbers = {name: k for k, name in enumerate(pooled)}
+    arrays: dict[str, Any] = {f"pooled {k}": one for k, one in enumerate(pooled.values())}
+    arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
+    arrays |= {"own": np.concatenate(calibration.own), "ends": np.cumsum([len(one) for one in calibration.own])}
+    file = io.BytesIO()
+    np.savez(file, scales=calibration.scales, **arrays)
+    return _seal(file.getvalue(), key) + file.getvalue()
+
+
+def _seal(data: bytes, key: str) -> bytes:
+    """Fits these bytes, for these members, alone."""
+    return hashlib.sha256(key.encode() + data).digest()
+
+
+def _unpacked(data: bytes, key: str, n: int) -> Calibration:
+    """The calibration of n classes; a ValueError or KeyError if this is none: the checksum has no key."""
+    data, seal = data[32:], data[:32]
+    if seal != _seal(data, key):
+        raise ValueError("damaged, or of other members")
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        which, ends = _whole(arrays["which"], n, n), _whole(arrays["ends"], n, len(data))
+        pooled = [_real(arrays[f"pooled {k}"]) for k in range(int(which.max()) + 1)]
+        scales, own = _real(arrays["scales"]), _real(arrays["own"])
+    sound = scales.shape == (n,) and ((scales > 0) & np.isfinite(scales)).all()
+    if not sound or (np.diff(ends) < 0).any() or ends[-1] != len(own):
+        raise ValueError("no calibration")
+    return Calibration(scales, tuple(np.split(own, ends[:-1])), tuple(pooled[k] for k in which))
+
+
+def _whole(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:
+    if array.shape != (n,) or array.dtype.kind not in "iu" or (array < 0).any() or (array > end).any():
+        raise ValueError("no calibration")
+    return array
+
+
+def _real(array: NDArray[Any]) -> Array:
+    if array.ndim != 1 or array.dtype != np.float64 or not (array >= 0).all():  # NaN is not
+        raise ValueError("no calibration")
+    return array

@@ -1,0 +1,193 @@
+"""Codes of every movement of a library, in a file beside the database that can be built again at any time.
+
+The file is written whole, under another name, and renamed. It is used if it says that it belongs to this library, this
+specification and this history, and if its checksum holds; else it is built again, in silence: it holds
+nothing of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import zlib
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.bounds import N_CODES, Code, encode, fit_bases
+from kineme.comparison.sampling import evenly_spaced
+from kineme.library.storage import read
+from kineme.library.storage.store import Store
+from kineme.output.atomic import replaced
+from kineme.validation import Array
+
+FILE = "codes.cache"
+
+_FORMAT = 1
+_HEADER = 4096  # bytes; what follows begins on a page of its own
+_SAMPLE = 2000  # movements that the functions behind the codes are fitted to
+_ROWS = 8192  # movements coded at a time
+_GROWN = 0.1  # movements that the file does not know, as a share of those it does, from which on it is written again
+_FEW = 2000  # fewer are never worth it
+
+Ids = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Index:
+    """Codes of the movements `ids` (ascending), in one block or two: what is in the file, and what came later."""
+
+    ids: Ids
+    bases: tuple[Array, ...]
+    blocks: tuple[tuple[Code, ...], ...]
+
+    def rows(self, ids: Ids) -> NDArray[np.intp]:
+        """Where the codes of those movements are."""
+        return np.searchsorted(self.ids, ids)
+
+
+def open_index(store: Store) -> Index:
+    """Codes of all movements that the library ever held, as far as they are not in its cache made now."""
+    path = store.folder / FILE
+    index = _load(store, path)
+    known = int(index.ids[-1]) if index is not None else -1
+    later = _ids_after(store, known)
+    if index is not None and len(later) <= max(_FEW, _GROWN * len(index.ids)):
+        return index if not len(later) else grown(store, index, later)
+    everything = _ids_after(store, -1)
+    if not store.read_only:
+        with suppress(OSError):  # no room, no permission: memory does as well
+            _write(store, path, everything)
+            if (index := _load(store, path)) is not None:
+                return index
+    buffer = np.zeros(_HEADER + _layout(store, len(everything))[1], dtype=np.uint8)
+    _fill(store, buffer, everything)
+    return _view(store, buffer, len(everything))
+
+
+def grown(store: Store, index: Index, later: Ids) -> Index:
+    """The index with the codes of movements that came later."""
+    new = encode(index.bases, _features(store, later), store.n_dims or 0)
+    if len(index.blocks) > 1:
+        pairs = zip(index.blocks[1], new, strict=True)
+        new = tuple(Code(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
+    return Index(np.concatenate((index.ids, later)), index.bases, (index.blocks[0], new))
+
+
+def refreshed(store: Store, index: Index) -> Index:
+    """The index of a library that may have grown since."""
+    later = _ids_after(store, int(index.ids[-1]))
+    if len(later) > max(_FEW, _GROWN * len(index.blocks[0][0].values)):
+        return open_index(store)
+    return grown(store, index, later) if len(later) else index
+
+
+def _ids_after(store: Store, key: int) -> Ids:
+    with store.reading() as connection:
+        rows = connection.execute("SELECT id FROM movement WHERE id > ? ORDER BY id", (key,))
+        return np.fromiter((one for (one,) in rows), dtype=np.int64)
+
+
+def _features(store: Store, ids: Ids) -> tuple[NDArray[np.float32], ...]:
+    """Rows (n, d * S) per representation."""
+    ends = np.cumsum(store.specification.widths(store.n_dims or 0))
+    return tuple(np.split(read.features(store, ids), ends[:-1], axis=1))
+
+
+def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]]], int]:
+    """Types and shapes of the arrays in the file, one after the other, and the bytes they take."""
+    d = store.n_dims or 0
+    parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
+    for one in store.specification.representations:
+        k = min(N_CODES, one.n_points)
+        parts += [(np.float64, (one.n_points, k)), (np.float32, (n, d * k)), (np.float32, (n,)), (np.float32, (n,))]
+    return parts, sum(_size(*part) for part in parts)
+
+
+def _size(kind: type[Any], shape: tuple[int, ...]) -> int:
+    return -(-int(np.prod(shape)) * np.dtype(kind).itemsize // 64) * 64
+
+
+def _view(store: Store, buffer: Bytes, n: int) -> Index:
+    """The arrays in a buffer."""
+    arrays, place = [], _HEADER
+    for kind, shape in _layout(store, n)[0]:
+        count = int(np.prod(shape))
+        arrays.append(np.frombuffer(buffer, kind, count, place).reshape(shape))
+        place += _size(kind, shape)
+    ids, *rest = arrays
+    block = tuple(Code(*rest[r + 1 : r + 4]) for r in range(0, len(rest), 4))
+    return Index(ids, tuple(rest[::4]), (block,))
+
+
+def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
+    """Write the codes of all movements into a buffer."""
+    index = _view(store, buffer, len(ids))
+    index.ids[:] = ids
+    sample = ids[evenly_spaced(len(ids), _SAMPLE)]
+    for to, basis in zip(index.bases, fit_bases(_features(store, sample), store.n_dims or 0), strict=True):
+        to[:] = basis
+    for start in range(0, len(ids), _ROWS):
+        rows = slice(start, start + _ROWS)
+        codes = encode(index.bases, _features(store, ids[rows]), store.n_dims or 0)
+        for block, code in zip(index.blocks[0], codes, strict=True):
+            for into, values in zip(block, code, strict=True):
+                into[rows] = values
+
+
+def _write(store: Store, path: Path, ids: Ids) -> None:
+    with replaced(path) as beside:
+        size = _HEADER + _layout(store, len(ids))[1]
+        with beside.open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)
+        buffer: Any = np.memmap(beside, np.uint8, "r+")
+        _fill(store, buffer, ids)
+        header = {**_tie(store, store.version), "n": len(ids), "crc": zlib.crc32(buffer[_HEADER:])}
+        text = json.dumps(header).encode()
+        buffer[: len(text)] = np.frombuffer(text, np.uint8)
+        buffer.flush()
+        del buffer
+
+
+def _tie(store: Store, version: int) -> dict[str, Any]:
+    """What a cache must say to be believed: which library, seen how, and which history (a copy may have gone on)."""
+    with store.reading() as connection:
+        found = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
+    seen = zlib.crc32(json.dumps(store.specification.to_json()).encode())
+    at = found[0] if found else None
+    return {"format": _FORMAT, "library": store.id, "seen": seen, "dims": store.n_dims, "version": version, "at": at}
+
+
+def _load(store: Store, path: Path) -> Index | None:
+    """The index in a file; None if there is none to be trusted."""
+    if not path.is_file():  # a pipe would keep us waiting
+        return None
+    try:
+        buffer: Any = np.memmap(path, np.uint8, "r")
+        header = json.loads(bytes(buffer[:_HEADER]).rstrip(b"\0"))
+        tie = _tie(store, int(header["version"]))
+        n = int(header["n"])
+        fits = all(header[key] == value for key, value in tie.items()) and tie["at"] is not None
+        whole = len(buffer) == _HEADER + _layout(store, n)[1] and zlib.crc32(buffer[_HEADER:]) == header["crc"]
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError, sqlite3.Error):
+        return None
+    if not (fits and whole and n > 0):
+        return None
+    index = _view(store, buffer, n)
+    return index if _makes_sense(index) else None
+
+
+def _makes_sense(index: Index) -> bool:
+    """Whether these could be codes: a checksum has no key, and anybody can write a file with the right one."""
+    return (
+        bool((index.ids == np.arange(1, len(index.ids) + 1)).all())
+        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in index.bases)
+        and all(bool(np.isfinite(part).all()) for code in index.blocks[0] for part in code)
+        and all(bool((code.squares >= 0).all() and (code.rests >= 0).all()) for code in index.blocks[0])
+    )

@@ -1,0 +1,1 @@
+"""The database: tables, versions, checksums, locks; reading and verifying."""

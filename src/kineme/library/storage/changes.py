@@ -1,0 +1,180 @@
+"""Changes to symbols and to who shows them; each is one version, and none deletes what was there before."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Sequence
+from typing import Any
+
+from kineme.errors import SpecificationError
+from kineme.library.storage.read import as_ids
+from kineme.library.storage.rows import Row, among, check_text, listed, next_key, parsed_column, select
+from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
+from kineme.library.storage.store import NOW, Store
+from kineme.library.storage.symbols import HOW, check_name, join, make, state_of
+from kineme.library.storage.versions import Change
+from kineme.validation import check_choice, check_number
+
+_STATE = COLUMNS["symbol_state"]
+_SAID = ("description", "prototype", "threshold")  # what `describe` changes
+
+
+def rename(store: Store, old: str, new: str) -> None:
+    """Give a symbol another name; its id stays."""
+    check_name(new)
+    with store.writing("rename", {"old": old, "new": new}) as change:
+        state = state_of(change.connection, old, NOW)
+        _check_free(change.connection, new)
+        _replace_state(change, state, name=new)
+
+
+def describe(store: Store, who: str, **values: Any) -> None:
+    """Change what a symbol says about itself: description, prototype (id of a movement), threshold."""
+    for name in values:
+        check_choice("what is described", name, _SAID)
+    if (prototype := values.get("prototype")) is not None:
+        values["prototype"] = int(as_ids(store, prototype)[0])
+    if (threshold := values.get("threshold")) is not None:
+        check_number("threshold", threshold)
+        values["threshold"] = float(threshold)
+    if "description" in values:
+        if not isinstance(values["description"], str):
+            raise SpecificationError(f"expected a description, got {values['description']!r}")
+        check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, written as JSON
+    with store.writing("describe", {"symbol": who, **values}) as change:
+        _replace_state(change, state_of(change.connection, who, NOW), **values)
+
+
+def delete_symbol(store: Store, who: str) -> None:
+    """Take a symbol away; its movements stay, without a symbol."""
+    with store.writing("delete", {"symbol": who}) as change:
+        state = state_of(change.connection, who, NOW)
+        _leave(change, "symbol = :key", {"key": state[1]})
+        change.retire("symbol_state", [state])
+
+
+def delete_movements(store: Store, ids: Any) -> None:
+    """Take movements away; a symbol whose prototype is among them has none any more."""
+    wanted = as_ids(store, ids)
+    detail = {"movements": len(wanted), "first": int(wanted[0])}
+    with store.writing("delete", detail) as change:
+        keys = {"keys": listed(wanted)}
+        _leave(change, among("movement"), keys)
+        for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys):
+            _replace_state(change, state, prototype=None)
+        gone = select(change.connection, "movement", f"removed IS NULL AND {among('id')}", keys)
+        change.retire("movement", gone)
+
+
+def merge(store: Store, names: Sequence[str], into: str) -> None:
+    """Make one symbol of several.
+
+    If `into` is the name or id of a symbol, that one takes the members of the others; else a new one is made. The ids
+    of those that went into it become its parents.
+    """
+    if isinstance(names, str) or len(set(names)) < 1:
+        raise SpecificationError(f"expected a list of symbols to merge, got {names!r}")
+    with store.writing("merge", {"names": list(names), "into": into}) as change:
+        states = {state[1]: state for state in (state_of(change.connection, name, NOW) for name in names)}
+        target = _find(change.connection, into)
+        merged = [state for key, state in states.items() if target is None or key != target[1]]
+        if not merged:
+            raise SpecificationError(f"expected symbols other than {into!r} to merge into it, got {list(names)}")
+        parents = _ids_of(change.connection, merged)
+        if target is None:
+            check_name(into)
+            key = make(change, into, parents)
+        else:
+            key = target[1]
+            _replace_state(
+                change, target, parents=json.dumps([*parsed_column("symbol_state", target, "parents", list), *parents])
+            )
+        for state in merged:
+            members = _leave(change, "symbol = :key", {"key": state[1]})
+            _rejoin(change, members, key)
+            change.retire("symbol_state", [state])
+
+
+def split(store: Store, name: str, ids: Any, new: str) -> None:
+    """Make a new symbol of some members of another one, which becomes its parent."""
+    check_name(new)
+    wanted = as_ids(store, ids)
+    with store.writing("split", {"symbol": name, "new": new, "movements": len(wanted)}) as change:
+        state = state_of(change.connection, name, NOW)
+        _check_free(change.connection, new)
+        key = make(change, new, _ids_of(change.connection, [state]))
+        where = f"symbol = :key AND {among('movement')}"
+        members = _leave(change, where, {"key": state[1], "keys": listed(wanted)})
+        if len(members) != len(set(wanted.tolist())):
+            strange = sorted(set(wanted.tolist()) - {row[1] for row in members})
+            raise SpecificationError(f"expected movements of {name!r}, got {strange[0]}, which is not one of them")
+        _forget_prototypes(change, members)
+        _rejoin(change, members, key)
+
+
+def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
+    """Let movements show a symbol, which is made if there is none; the one that they showed before, they leave."""
+    check_choice("how", how, HOW)
+    wanted = as_ids(store, ids)
+    with store.writing("assign", {"symbol": who, "movements": len(wanted), "how": how}) as change:
+        state = _find(change.connection, who)
+        key = make(change, check_name(who)) if state is None else state[1]
+        left = _leave(change, among("movement"), {"keys": listed(wanted)})
+        _forget_prototypes(change, [row for row in left if row[2] != key])
+        join(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
+
+
+def release(store: Store, ids: Any) -> None:
+    """Let movements show no symbol any more."""
+    wanted = as_ids(store, ids)
+    with store.writing("release", {"movements": len(wanted)}) as change:
+        _forget_prototypes(change, _leave(change, among("movement"), {"keys": listed(wanted)}))
+
+
+def _replace_state(change: Change, state: Row, **values: Any) -> None:
+    """The same symbol with other values from this version on."""
+    change.retire("symbol_state", [state])
+    record = dict(zip(_STATE, state, strict=True)) | values
+    record |= {"id": next_key(change.connection, "symbol_state"), "added": change.version, "removed": None}
+    change.insert("symbol_state", [tuple(record[name] for name in _STATE)])
+
+
+def _leave(change: Change, where: str, parameters: dict[str, Any]) -> list[Row]:
+    """End memberships; gives the rows that were ended."""
+    rows = select(change.connection, "member", f"removed IS NULL AND {where}", parameters)
+    change.retire("member", rows)
+    return rows
+
+
+def _forget_prototypes(change: Change, left: Sequence[Row]) -> None:
+    """A symbol whose prototype is among the members that left it has none any more."""
+    pairs = {(row[2], row[1]) for row in left}
+    keys = {"keys": listed(key for key, _ in pairs)}
+    for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('symbol')}", keys):
+        if (state[1], state[4]) in pairs:
+            _replace_state(change, state, prototype=None)
+
+
+def _rejoin(change: Change, members: Sequence[Row], key: int) -> None:
+    for how in HOW:
+        join(change, [(row[1], key) for row in members if row[3] == how], how)
+
+
+def _find(connection: sqlite3.Connection, who: str) -> Row | None:
+    try:
+        return state_of(connection, who, NOW)
+    except SpecificationError:
+        return None
+
+
+def _ids_of(connection: sqlite3.Connection, states: Sequence[Row]) -> list[str]:
+    keys = listed(state[1] for state in states)
+    return [row[1] for row in select(connection, "symbol", among("key"), {"keys": keys})]
+
+
+def _check_free(connection: sqlite3.Connection, name: str) -> None:
+    if select(connection, "symbol_state", "removed IS NULL AND name = :name", {"name": name}):
+        raise SpecificationError(f"expected a name that no symbol has, got {name!r}; merge the two, or choose another")
+    if select(connection, "symbol", "id = :name", {"name": name}):
+        raise SpecificationError(f"expected a name, got {name!r}, which is the id of a symbol for good; choose another")

@@ -1,0 +1,180 @@
+"""Opening the database of a library: what it must be, and what keeps its writes safe.
+
+Write-ahead log: one writer and any number of readers, and a transaction is there as a whole or not at all.
+``synchronous = FULL``: a commit is on the disk when it returns, also after a power cut. It costs one fsync a commit,
+and learning commits thousands of movements at a time.
+"""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import zlib
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+from urllib.parse import quote
+
+from kineme.errors import DataError
+from kineme.library.storage.guard import defend
+from kineme.library.storage.over_forks import Connection, open_connection
+from kineme.library.storage.placing import LOGS, placed
+from kineme.library.storage.rows import Row, damage, insert, select
+from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
+from kineme.library.storage.sqlite_errors import in_plain_words
+
+FILE = "library.sqlite"
+_WRITER_CACHE_KIB = 65536
+_LOG_BYTES = 1 << 26  # what the write-ahead log is cut back to
+_DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
+
+
+def connect(path: Path, mode: str, wait: float) -> Connection:
+    """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun by hand."""
+    address = f"file:{quote(str(path))}?mode={mode}"
+    if mode == "ro" and _cannot_keep_a_log(path):
+        address += "&immutable=1"
+    connection = open_connection(address, uri=True, timeout=wait, isolation_level=None, check_same_thread=False)
+    try:
+        connection.execute("PRAGMA synchronous = FULL")
+        defend(connection)
+        connection.watch(path)
+        connection.execute("PRAGMA temp_store = MEMORY")
+        if mode != "ro":
+            connection.execute(f"PRAGMA cache_size = -{_WRITER_CACHE_KIB}")
+            connection.execute(f"PRAGMA journal_size_limit = {_LOG_BYTES}")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _cannot_keep_a_log(path: Path) -> bool:
+    """Whether the folder is read-only to us and holds no log: then SQLite cannot lock, and reads without.
+
+    It takes the file for one that does not change. Should another user, who may write there, do so meanwhile, what is
+    read is refused as damaged until the library is opened again.
+    """
+    return (
+        not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+        and not path.with_name(path.name + "-wal").exists()
+    )
+
+
+def create(path: Path, meta: dict[str, str]) -> None:
+    """Make an empty library: all of it or, if anything fails, nothing."""
+    with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may make it at the same time
+        path.parent.mkdir(parents=True, exist_ok=True)
+        check_alone(path)
+        with placed(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
+            connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
+            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("BEGIN")
+            for statement in _statements(SCHEMA_VERSION):
+                connection.execute(statement)
+            insert(connection, "meta", [*meta.items(), ("schema", schema_seal(connection))])
+            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            connection.execute("COMMIT")
+
+
+def check_alone(path: Path) -> None:
+    """Refuse to make a library where the log of one that is gone still lies: SQLite would add that to the new one."""
+    logs = [path.with_name(path.name + end) for end in LOGS]
+    left = [log for log in logs if log.exists() and log.stat().st_size]
+    if left and not path.exists():  # in this order: a log of another process that makes it now comes after the library
+        raise DataError(
+            f"expected no log without its library, found {left[0]} and no {path.name}; put the library back, or delete "
+            "the log, which is of no use without it"
+        )
+
+
+def check_kind(connection: sqlite3.Connection, path: Path) -> int:
+    """The schema version of a library; refuses another program's database, a later version, and strange definitions."""
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID:
+        got = "another program's database" if path.stat().st_size else "an empty file"
+        raise DataError(
+            f"expected {path} to be a library of kineme, got {got}; correct the path, or take it from a backup"
+        )
+    version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+    if not 1 <= version <= SCHEMA_VERSION:
+        raise DataError(
+            f"expected {path} to have schema version {SCHEMA_VERSION} or earlier, got {version}; upgrade kineme"
+        )
+    _check_definitions(connection, path, version)
+    return version
+
+
+def _check_definitions(connection: sqlite3.Connection, path: Path, version: int) -> None:
+    """Refuse a database that defines anything but the tables and indexes of a library, word for word.
+
+    A trigger would change what is written, a view or a computed column could answer anything, and never end.
+    """
+    encoding = connection.execute("PRAGMA encoding").fetchone()[0]
+    expected = _definitions(_statements(version))
+    found = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
+    if found == expected and encoding == "UTF-8":
+        return
+    strange = [one for one in found if one not in expected]
+    got = f"the {strange[0][0]} {strange[0][1]!r}, which is none of them" if strange else "fewer"
+    raise DataError(
+        f"expected {path} to define the tables and indexes of a library and nothing else, got "
+        f"{got if found != expected else f'texts in {encoding}'}; do not use this file: take it from a backup or an "
+        "export that you trust"
+    )
+
+
+def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
+    """What the library says of itself, once the definitions of its tables have been found undamaged."""
+    try:
+        meta: dict[str, str] = dict(select(connection, "meta"))
+        if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(connection):
+            return meta
+    except sqlite3.OperationalError as error:
+        if "no such" not in str(error):  # table or column
+            raise
+    raise damage(f"the definitions of tables in {path}, and its specification, as they were stored", "damaged bytes")
+
+
+def _statements(version: int) -> tuple[str, ...]:
+    """What makes an empty file a library of this schema version: the same definitions, word for word, as migrating."""
+    return (*CREATE, *(statement for earlier in range(1, version) for statement in MIGRATIONS[earlier]))
+
+
+@lru_cache(maxsize=8)
+def _definitions(statements: tuple[str, ...]) -> list[Row]:
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as connection:
+        for statement in statements:
+            connection.execute(statement)
+        return connection.execute(_DEFINITIONS).fetchall()
+
+
+def migrate(connection: sqlite3.Connection, path: Path) -> None:
+    """Bring an older library to today's schema, in one transaction."""
+    with transaction(connection):
+        for version in range(check_kind(connection, path), SCHEMA_VERSION):
+            for statement in MIGRATIONS[version]:
+                connection.execute(statement)
+        connection.execute("DELETE FROM meta WHERE key = 'schema'")
+        insert(connection, "meta", [("schema", schema_seal(connection))])
+        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        _check_definitions(connection, path, SCHEMA_VERSION)
+
+
+def schema_seal(connection: sqlite3.Connection) -> str:
+    """A checksum of the tables' definitions, without which the other checksums would mean nothing."""
+    return str(zlib.crc32(repr(connection.execute(_DEFINITIONS).fetchall()).encode()))
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing. Waits for its turn to write at the beginning, never in the middle."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise

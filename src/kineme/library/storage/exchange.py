@@ -1,0 +1,154 @@
+"""A whole library as one file, and back: every row of every table, with all versions."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from kineme.errors import DataError
+from kineme.library.storage.connection import FILE, check_alone, check_kind, connect, migrate
+from kineme.library.storage.guard import defend_foreign, limited, limited_copy
+from kineme.library.storage.placing import LOGS, as_folder, placed
+from kineme.library.storage.rows import damage
+from kineme.library.storage.schema import SCHEMA_VERSION
+from kineme.library.storage.sqlite_errors import in_plain_words
+from kineme.library.storage.store import Store
+from kineme.library.storage.verify import verify
+
+
+def export(store: Store, path: str | Path) -> Path:
+    """Write the library, with all its versions, to one new file; it is there as a whole or not at all.
+
+    Libraries with the same rows give the same bytes.
+
+    Raises
+    ------
+    DataError
+        The file exists; the disk is full; the library's structure is damaged. Rows with a wrong checksum are copied as
+        they are: `verify` finds them, and `import_` refuses them.
+    """
+    target = Path(path)
+    with _new(target) as beside:
+        with (
+            closing(connect(store.path, "ro", store.wait)) as connection,
+            limited_copy(connection, store.path, beside),
+        ):
+            _copy(connection, store, beside)
+        with closing(connect(beside, "rw", store.wait)) as copy:
+            copy.execute("PRAGMA schema_version = 1")  # counts how often a file was compacted: no content
+    return target
+
+
+def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
+    try:
+        connection.execute("VACUUM INTO ?", (str(beside),))
+    except sqlite3.IntegrityError as error:  # two rows of one key
+        raise damage(f"every row of {store.path} once", f"damaged bytes ({error})") from error
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode != sqlite3.SQLITE_INTERRUPT:  # of the new file
+            raise
+        with in_plain_words(store.path, store.wait):
+            raise
+
+
+def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
+    """Make a library in `folder` of a file that `export` wrote, once every byte and every value has been checked.
+
+    The file may come from anywhere: a copy of it is looked at, by a connection that nothing in it can make act, and
+    becomes a library only if it defines and holds nothing but what a library does.
+
+    Raises
+    ------
+    DataError
+        There is a library already; the file is no export, is a library in use, is damaged, holds what no library does,
+        or is of a later schema version.
+    """
+    source, target = Path(path), as_folder(folder) / FILE
+    _check_file(source)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    check_alone(target)
+    with _new(target) as beside:
+        _check_room(source, target)
+        shutil.copyfile(source, beside)
+        with _named(beside, source), in_plain_words(source, wait):
+            _check_structure(beside, source, wait)
+            with closing(connect(beside, "rw", wait)) as copy:
+                if check_kind(copy, source) < SCHEMA_VERSION:
+                    migrate(copy, source)
+                copy.execute("PRAGMA journal_mode = WAL")
+            _check(beside, source, wait)
+    return target
+
+
+def _check_file(source: Path) -> None:
+    """Refuse what is not one whole file."""
+    if not source.is_file():
+        got = "something else" if source.exists() else "no file"
+        raise DataError(f"expected an exported library at {source}, found {got} there")
+    for log in (source.with_name(source.name + end) for end in LOGS):
+        if log.exists() and log.stat().st_size:  # changes are there, and the file alone would be another state
+            raise DataError(
+                f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
+                "import that file"
+            )
+
+
+def _check_room(source: Path, target: Path) -> None:
+    """Refuse a file that would fill the disk; one with holes may be larger than the disk it comes from."""
+    size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
+    if size > free:
+        raise DataError(f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some")
+
+
+def _check_structure(beside: Path, source: Path, wait: float) -> None:
+    """Refuse definitions that are not ours, and pages that do not form tables, before anything in them is read."""
+    with closing(connect(beside, "ro", wait)) as copy, limited(copy, beside):
+        defend_foreign(copy, beside)
+        check_kind(copy, source)
+        found = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
+        if found != "ok":
+            raise _refusal(source, 1, f"the file: {' '.join(found.split())}")
+
+
+def _check(beside: Path, source: Path, wait: float) -> None:
+    store = Store(beside, read_only=True, wait=wait)
+    try:
+        problems = verify(store, pages=False)
+    finally:
+        store.close()
+    if problems:
+        raise _refusal(source, len(problems), str(problems[0]))
+
+
+def _refusal(source: Path, n: int, first: str) -> DataError:
+    found = "1 problem" if n == 1 else f"{n} problems, the first"
+    return DataError(
+        f"expected {source} as it was exported, got damaged bytes, or values that no library holds ({found}: {first}); "
+        "nothing was imported: export it again, or take it from a backup that you trust"
+    )
+
+
+@contextmanager
+def _named(beside: Path, source: Path) -> Iterator[None]:
+    """Errors name the file that the user knows, not the copy that is looked at."""
+    try:
+        yield
+    except DataError as error:
+        if str(beside) not in str(error):
+            raise
+        raise DataError(str(error).replace(str(beside), str(source))) from error
+
+
+@contextmanager
+def _new(target: Path) -> Iterator[Path]:
+    """As `placed`, with errors that users can act on."""
+    if not target.parent.is_dir():
+        raise DataError(f"expected a folder {target.parent} to write {target.name} into, there is none; create it")
+    try:
+        with in_plain_words(target, 0.0), placed(target) as beside:
+            yield beside
+    except FileExistsError as error:
+        raise DataError(f"expected a new file, but {target} is there already; choose another, or move it") from error

@@ -1,0 +1,243 @@
+"""Reading movements, features and primitives back, a few thousand rows at a time, each checked against its checksum."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, listed, select, strange
+from kineme.library.storage.schema import COLUMNS
+from kineme.library.storage.store import Store
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.labels import label_array
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.validation import Array
+
+Ids = NDArray[np.int64]
+
+_ROWS = 4096  # fetched at a time
+
+
+def all_ids(store: Store) -> Ids:
+    """Ids of all movements, ascending."""
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        query = f"SELECT id FROM movement WHERE {ALIVE} ORDER BY id"
+        return _column(connection, query, moment.version, moment.movements)
+
+
+def unlabeled_ids(store: Store) -> Ids:
+    """Ids of the movements that show no symbol, ascending."""
+    members = f"SELECT movement FROM member WHERE {ALIVE}"
+    query = f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id"
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        return _column(connection, query, moment.version, moment.movements - moment.members)
+
+
+def count(store: Store) -> int:
+    """Number of movements."""
+    with store.reading() as connection:
+        return store.moment(connection).movements
+
+
+def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
+    """Ids, if they are as many as there should be; ids are given one after the other, so that none is left out."""
+    found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
+    last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
+    if len(found) != expected or last != n or (np.diff(found) <= 0).any():
+        raise damage(f"{expected} ids of {last} movements, each once", f"{len(found)} of {n}: damaged bytes")
+    return found
+
+
+def as_ids(store: Store, ids: Any) -> Ids:
+    """Ids that a user passes, as an array; all must be in the library.
+
+    Raises
+    ------
+    SpecificationError
+        Not whole numbers, none at all, or no such movement at this version.
+    """
+    wanted = np.atleast_1d(np.asarray(ids))
+    if wanted.dtype.kind not in "iu" or wanted.ndim != 1 or not len(wanted):
+        raise SpecificationError(f"expected ids of movements, whole numbers, at least one, got {ids!r}")
+    with store.reading() as connection:
+        query = f"SELECT id FROM movement WHERE {ALIVE} AND {among('id')}"
+        rows = connection.execute(query, {"v": store.as_of, "keys": listed(wanted)})
+        missing = np.setdiff1d(wanted, [key for (key,) in rows])
+        for table in ("raw", "feature"):  # these have no removed rows: the movement must be there, if not alive
+            query = (
+                f"SELECT movement FROM {table} WHERE {among('movement')} AND movement NOT IN (SELECT id FROM movement)"
+            )
+            for row in connection.execute(query, {"keys": listed(missing)}) if len(missing) else ():
+                raise damaged("movement", row)
+    if len(missing):
+        raise SpecificationError(
+            f"expected ids of movements in the library, got {missing[0]}, which is not there "
+            f"({len(missing)} of {len(wanted)} are not)"
+        )
+    return wanted.astype(np.int64)
+
+
+def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
+    """Rows of the table `movement`, as dictionaries, in the order of `ids`."""
+    wanted, order = _sorted(ids)
+    rows = [row for chunk in _chunks(store, "movement", "id", wanted) for row in chunk]
+    return [dict(zip(COLUMNS["movement"], rows[i], strict=True)) for i in order.tolist()]
+
+
+def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstrations:
+    """The recordings, in the order of `ids`."""
+    wanted, order = _sorted(ids)
+    about = records(store, wanted)
+    d, lengths = store.n_dims or 0, np.array([one["n_samples"] for one in about])
+    offsets = np.concatenate(([0], np.cumsum(lengths)))
+    _check_total(store, about, 4 * d * int(offsets[-1]))
+    t0, durations = (np.array([one[name] for one in about]) for name in ("t0", "duration"))
+    positions = np.empty((offsets[-1], d))
+    stamps: dict[int, bytes] = {}
+    done = 0
+    for rows in _chunks(store, "raw", "movement", wanted):
+        part = slice(done, done + len(rows))
+        for row, n in zip(rows, lengths[part].tolist(), strict=True):
+            stamped = row[3] is None or len(row[3]) in {4 * n, 8 * n}
+            if len(row[1]) != 8 * d or len(row[2]) != 4 * d * n or not stamped:
+                raise strange("raw", row)
+        starts = np.frombuffer(b"".join(row[1] for row in rows)).reshape(len(rows), d)
+        relative = np.frombuffer(b"".join(row[2] for row in rows), np.float32).reshape(-1, d)
+        block = positions[offsets[done] : offsets[part.stop]]
+        np.add(relative, np.repeat(starts, lengths[part], axis=0), out=block)
+        _check_finite("raw", rows, block, lengths[part])
+        stamps.update((done + k, row[3]) for k, row in enumerate(rows) if row[3] is not None)
+        done = part.stop
+    times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
+    _check_increasing(times, offsets, wanted)
+    found = Movements(positions, offsets, durations, times, None, _names(about))
+    if not np.array_equal(wanted, ids):
+        found = found.take(order)
+    return Demonstrations.of_movements(replace(found, labels=_labels(labels)))
+
+
+def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
+    """Refuse to make room for more samples than the files could hold."""
+    if size > store.size:
+        raise strange("movement", (max(about, key=lambda one: int(one["n_samples"]))["id"],))
+
+
+def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths: Any = 1) -> None:
+    """Refuse numbers that are not finite: as many rows of the block belong to each row as its length says."""
+    if not (good := np.isfinite(block).all(axis=1)).all():
+        first = np.cumsum(np.broadcast_to(lengths, len(rows)))
+        raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
+
+
+def _check_increasing(times: Array | None, offsets: NDArray[np.intp], keys: Ids) -> None:
+    if times is None:
+        return
+    increasing = times[1:] > times[:-1]
+    increasing[offsets[1:-1] - 1] = True  # from one movement to the next
+    if not increasing.all():
+        raise strange("raw", (keys[int(np.searchsorted(offsets, np.argmin(increasing), side="right")) - 1],))
+
+
+def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
+    """Time stamps of all samples: the stored ones, and even ones where none were stored."""
+    lengths = np.diff(offsets)
+    k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
+    times: Array = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * k
+    for i, blob in stamps.items():
+        kind = np.float32 if len(blob) == 4 * lengths[i] else np.float64
+        times[offsets[i] : offsets[i + 1]] = t0[i] + np.frombuffer(blob, kind)
+    return times
+
+
+def features(store: Store, ids: Ids) -> NDArray[np.float32]:
+    """Rows of all representations, one after the other, shape (k, sum of d * S)."""
+    wanted, order = _sorted(ids)
+    width, done = sum(store.specification.widths(store.n_dims or 0)), 0
+    found = np.empty((len(wanted), width), dtype=np.float32)
+    for rows in _chunks(store, "feature", "movement", wanted):
+        block = found[done : done + len(rows)]
+        block[:] = _joined("feature", rows, 1, np.float32, width)
+        _check_finite("feature", rows, block)
+        done += len(rows)
+    return found if np.array_equal(wanted, ids) else found[order]
+
+
+def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitives:
+    """The primitives, in the order of `ids`."""
+    wanted, order = _sorted(ids)
+    dmp, d = store.specification.dmp, store.n_dims or 0
+    about = records(store, ids)
+    rows = [row for chunk in _chunks(store, "primitive", "movement", wanted) for row in chunk]
+    boundary = _joined("primitive", rows, 1, np.float64, 4 * d)
+    weights = _joined("primitive", rows, 2, np.float32, d * dmp.n_basis)
+    for block in (boundary, weights):
+        _check_finite("primitive", rows, block)
+    boundary, weights = boundary.reshape(-1, 4, d)[order], weights.reshape(-1, d, dmp.n_basis)[order]
+    return Primitives(
+        dmp,
+        scaled_weights=weights.astype(np.float64),
+        starts=boundary[:, 0],
+        goals=boundary[:, 1],
+        velocities=boundary[:, 2],
+        durations=np.array([one["duration"] for one in about]),
+        extents=boundary[:, 3],
+        labels=_labels(labels),
+        names=_names(about),
+    )
+
+
+def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
+    """The bytes of a column, (rows, width)."""
+    size = np.dtype(kind).itemsize * width
+    for row in rows:
+        if len(row[column]) != size:
+            raise strange(table, row)
+    return np.frombuffer(b"".join(row[column] for row in rows), kind).reshape(-1, width)
+
+
+def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:
+    return label_array(labels) if all(label is not None for label in labels) else None
+
+
+def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    return tuple(one["name"] or f"movement {one['id']}" for one in about)
+
+
+def names_of(store: Store, ids: Ids) -> list[str | None]:
+    """The name of each movement's symbol; None where it shows none."""
+    keys = {"keys": listed(ids), "v": store.as_of}
+    with store.reading() as connection:
+        names = {state[1]: state[2] for state in select(connection, "symbol_state", ALIVE, {"v": store.as_of})}
+        members = select(connection, "member", f"{among('movement')} AND {ALIVE}", keys)
+    if lost := {row[2] for row in members} - names.keys():
+        raise damaged("symbol", (min(lost),))
+    found = {row[1]: names[row[2]] for row in members}
+    return [found.get(key) for key in ids.tolist()]
+
+
+def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:
+    """Rows of a table with those keys, which ascend, some at a time."""
+    for k in range(0, len(wanted), _ROWS):
+        with store.reading() as connection:
+            rows = select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
+        if len(rows) != len(wanted[k : k + _ROWS]):
+            lost = set(wanted[k : k + _ROWS].tolist()) - {row[0] for row in rows}
+            raise damaged(table, (min(lost),))
+        yield rows
+
+
+def _sorted(ids: Ids) -> tuple[Ids, NDArray[np.intp]]:
+    """The ids ascending, each once, and where each of `ids` stands among them."""
+    if not len(ids):
+        raise SpecificationError("expected at least one movement, got none: the library or the symbol has none yet")
+    wanted, order = np.unique(ids, return_inverse=True)
+    return wanted, order

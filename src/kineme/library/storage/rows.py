@@ -1,0 +1,175 @@
+"""Rows of the tables, each sealed with a checksum, so that a flipped bit is told from a number."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from kineme.errors import DataError, SpecificationError
+from kineme.library.storage.checks import GOOD
+from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT
+
+Row = tuple[Any, ...]
+
+_PARAMETERS = 999  # of one statement, in every build of SQLite
+
+#: A row at version :v.
+ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
+
+
+def seal(table: str, row: Row) -> int:
+    """CRC-32 over all columns of a row, its key first."""
+    if table in BLOBS:
+        return _seal_blobs(row)
+    return zlib.crc32(repr(row).encode())
+
+
+def _seal_blobs(row: Row) -> int:
+    crc: int = row[0] & 0xFFFFFFFF
+    for blob in row[1:]:
+        crc = zlib.crc32(blob or b"", crc)
+    return crc
+
+
+def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> None:
+    """Add rows, in the order of `COLUMNS`, each with its seal.
+
+    Many rows to a statement: between two statements Python's lock changes hands, and a writing thread that asks for it
+    once a row waits for the one that describes the next movements most of the time.
+    """
+    width = len(COLUMNS[table]) + 1
+    step = _PARAMETERS // width
+    mark = f"({', '.join('?' * width)})"
+    for k in range(0, len(rows), step):
+        some = rows[k : k + step]
+        values = [value for row in some for value in (*row, seal(table, row))]
+        connection.execute(f"INSERT INTO {table} VALUES {', '.join([mark] * len(some))}", values)
+
+
+def select(
+    connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
+) -> list[Row]:
+    """Rows of a table ordered by key, seals and values checked, seals left out.
+
+    Raises
+    ------
+    DataError
+        A row is not what was stored, or holds what no library does; the message names it.
+    """
+    columns = COLUMNS[table]
+    query = f"SELECT {', '.join(columns)}, crc, {GOOD[table]} FROM {table} WHERE {where} ORDER BY {columns[0]}"
+    rows = connection.execute(query, parameters or {}).fetchall()
+    for row in rows:
+        if not row[-1] or seal(table, row[:-2]) != row[-2]:
+            raise damaged(table, row) if not sealed(table, row[:-1]) else strange(table, row)
+    return [row[:-2] for row in rows]
+
+
+def sealed(table: str, row: Row) -> bool:
+    """Whether a row fits its seal, which is its last column."""
+    try:
+        return seal(table, row[:-1]) == row[-1]
+    except TypeError:  # a value of another type than was stored
+        return False
+
+
+def damaged(table: str, row: Row) -> DataError:
+    """The error for a row whose seal does not fit."""
+    return damage(f"{row_name(table, row[0])} as stored", "damaged bytes")
+
+
+def strange(table: str, row: Row) -> DataError:
+    """The error for a row that fits its seal, but holds what no library does."""
+    return damage(f"{row_name(table, row[0])} as a library stores it", "values that no library holds")
+
+
+def parsed(text: str) -> Any:
+    """JSON as plain data.
+
+    Raises
+    ------
+    ValueError
+        It is none, or nested so deeply that nobody wrote it.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("expected JSON, got some that is nested too deeply") from error
+
+
+def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
+    """The JSON of a column, which must be a list or an object.
+
+    Raises
+    ------
+    DataError
+        It is something else; the message names the row.
+    """
+    try:
+        value = parsed(row[COLUMNS[table].index(column)])
+    except ValueError:
+        value = None
+    if not isinstance(value, kind):
+        raise strange(table, row)
+    return value
+
+
+def damage(expected: str, got: str) -> DataError:
+    """The error for anything that is not as stored."""
+    return DataError(
+        f"expected {expected}, got {got}; kineme library verify names all that is damaged: "
+        "take the file from a backup or an export"
+    )
+
+
+def row_name(table: str, key: Any) -> str:
+    """How messages refer to a row."""
+    of_movement = {"raw": "the samples", "primitive": "the primitive", "feature": "the features"}
+    return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
+
+
+def among(column: str, name: str = "keys") -> str:
+    """A condition that `column` is in the list that `listed` passes as parameter `name`."""
+    return f"{column} IN (SELECT value FROM json_each(:{name}))"
+
+
+def listed(values: Iterable[Any]) -> str:
+    """Numbers or texts as the parameter that `among` reads."""
+    return json.dumps([value if isinstance(value, str) else int(value) for value in values])
+
+
+def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], version: int) -> None:
+    """Mark rows, whose last column is ``removed``, as removed from `version` on."""
+    gone = [(*row[:-1], version) for row in rows]
+    statement = f"UPDATE {table} SET removed = ?, crc = ? WHERE id = ?"
+    connection.executemany(statement, [(version, seal(table, row), row[0]) for row in gone])
+
+
+def next_key(connection: sqlite3.Connection, table: str) -> int:
+    """The key that the next row of a table gets: keys are never used again."""
+    largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]
+    return (largest or 0) + 1
+
+
+def as_text(value: Any) -> str:
+    """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
+    text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
+    check_text("a name", text, MAX_TEXT)
+    return text
+
+
+def check_text(what: str, text: str, most: int) -> None:
+    """Refuse a text that no library holds: with half of a character in it, or of more bytes than `most`."""
+    try:
+        size = len(text.encode())
+    except UnicodeEncodeError as error:
+        raise SpecificationError(
+            f"expected {what} in Unicode, got {text[:40]!r}, which holds half of a character; decode it again"
+        ) from error
+    if size > most:
+        raise SpecificationError(
+            f"expected {what} of at most {most:,} bytes, got {size:,}: {text[:40]!r}...; shorten it"
+        )

@@ -1,0 +1,229 @@
+"""The open database of a library: reading at one version, writing one version at a time."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from numbers import Integral
+from pathlib import Path
+from threading import Lock, RLock
+from typing import Any
+
+from kineme.errors import DataError, SpecificationError
+from kineme.library.storage import over_forks
+from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
+from kineme.library.storage.guard import size_of
+from kineme.library.storage.readers import Readers
+from kineme.library.storage.rows import insert, select
+from kineme.library.storage.schema import COUNTED, LARGEST_ID, SCHEMA_VERSION
+from kineme.library.storage.specification import Specification, as_n_dims
+from kineme.library.storage.sqlite_errors import in_plain_words
+from kineme.library.storage.versions import Change, Moment, moment_at
+
+NOW = LARGEST_ID  # later than every version: what is there now
+
+
+class Store:
+    """A library's database, opened.
+
+    Parameters
+    ----------
+    path : Path
+        Of the database. Caches that can be built again may lie beside it.
+    specification : Specification, optional
+        Of a library that is to be created if there is none.
+    read_only : bool
+    as_of : int, optional
+        Show the library as it was at this version; implies `read_only`.
+    wait : float
+        Seconds to wait for another writer's turn to end.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        specification: Specification | None = None,
+        *,
+        read_only: bool = False,
+        as_of: int | None = None,
+        wait: float = 10.0,
+    ) -> None:
+        self.path = path
+        self.read_only = read_only or as_of is not None
+        self.wait = wait
+        self._turn = RLock()
+        # Threads share the connection to read from, one at a time: Python may hand a statement that it keeps to two
+        # threads that ask the same at the same moment, and each gets rows of the other.
+        self._look = RLock()
+        self._writer: sqlite3.Connection | None = None
+        self._waking, self._asleep, self._readers = Lock(), False, Readers(path)
+        if not self.path.exists():
+            self._create(specification)
+        with in_plain_words(self.path, wait), over_forks.awake():
+            self._reader = self._connect()
+            try:
+                self._check_kind()
+                meta = checked_meta(self._reader, self.path)
+                self.id = meta["id"]
+                self.specification = Specification.from_json(meta, self.path)
+                self.as_of = self._checked_version(as_of)
+            except BaseException:
+                self._reader.close()
+                raise
+            over_forks.register(self)
+
+    def _connect(self) -> sqlite3.Connection:
+        over_forks.refuse_if_lost(self.path)
+        return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
+
+    def sleep(self) -> None:
+        """Close the connections for a fork; the next one to read or write opens them again."""
+        if not self._readers.closed and not self._asleep:
+            self._asleep = True
+            for connection in (self._writer, self._reader):
+                if connection is not None:
+                    connection.close()
+            self._writer = None
+
+    def carried_over(self) -> list[sqlite3.Connection]:
+        """The connections that a fork found open; see `over_forks`."""
+        if self._readers.closed or self._asleep:
+            return []
+        return [one for one in (self._writer, self._reader) if one is not None]
+
+    def _wake(self) -> None:
+        over_forks.refuse_if_lost(self.path)
+        with self._waking:
+            if self._asleep:
+                self._check_there("read")
+                self._reader = self._connect()
+                self._asleep = False
+
+    def _create(self, specification: Specification | None) -> None:
+        if specification is None or self.read_only:
+            raise DataError(
+                f"expected a library in {self.path.parent}, found no {self.path.name} there; "
+                "make one by learning (in Python, with create=True), or correct the path"
+            )
+        create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
+
+    def _check_kind(self) -> None:
+        """Refuse what is no library; bring an older one up to date."""
+        self._file = self.path.stat().st_ino
+        if check_kind(self._reader, self.path) == SCHEMA_VERSION:
+            return
+        if self.read_only:
+            raise DataError(
+                f"expected {self.path} to have schema version {SCHEMA_VERSION}, got an earlier one; "
+                "open it once without read_only to bring it up to date"
+            )
+        migrate(self._reader, self.path)
+
+    def _checked_version(self, as_of: int | None) -> int:
+        last = int(self._reader.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
+        if as_of is not None and not (isinstance(as_of, Integral) and 0 <= as_of <= last):
+            raise SpecificationError(f"expected a version from 0 to {last}, got {as_of!r}; see history()")
+        return NOW if as_of is None else int(as_of)
+
+    @property
+    def folder(self) -> Path:
+        """Where the library is."""
+        return self.path.parent
+
+    @property
+    def size(self) -> int:
+        """Bytes of the database and of its log."""
+        return size_of(self.path)
+
+    @property
+    def version(self) -> int:
+        """Number of the last committed transaction, or of the one shown."""
+        if self.as_of != NOW:
+            return self.as_of
+        with self.reading() as connection:
+            return int(connection.execute("SELECT coalesce(max(id), 0) FROM version").fetchone()[0])
+
+    @property
+    def n_dims(self) -> int | None:
+        """Dimensions that all movements share; None before the first one."""
+        with self.reading() as connection:
+            found = select(connection, "meta", "key = 'n_dims'")
+        return as_n_dims(found[0][1], self.path) if found else None
+
+    @contextmanager
+    def reading(self) -> Iterator[sqlite3.Connection]:
+        """The connection to read from. It sees committed versions only, also while this process writes."""
+        with over_forks.awake(), self._readers.one_more(), in_plain_words(self.path, self.wait):
+            self._wake()
+            with self._look:
+                yield self._reader
+
+    def moment(self, connection: sqlite3.Connection) -> Moment:
+        """The version that is shown, which stays the same while others are added."""
+        return moment_at(connection, self.as_of)
+
+    @contextmanager
+    def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
+        """One transaction, which becomes one version; put what is worth telling into `detail` before it ends.
+
+        Raises
+        ------
+        DataError
+            Opened for reading only, the file vanished, the disk is full, another process writes for too long.
+        """
+        detail = {} if detail is None else detail
+        with over_forks.awake(), in_plain_words(self.path, self.wait):
+            self._wake()  # first: in a child, the turn may be that of a thread that is not there
+            with self._turn:
+                self._readers.check_open()
+                self.check_writable()
+                if self._writer is None:
+                    self._writer = connect(self.path, "rw", self.wait).rest()
+                with transaction(self._writer):
+                    self.check_writable()  # again: waiting for the turn may have taken long
+                    last = self.moment(self._writer)
+                    counts = {name: getattr(last, name) for name in COUNTED.values()}
+                    change = Change(self._writer, last.version + 1, counts)
+                    yield change
+                    at = datetime.now(UTC).isoformat(timespec="milliseconds")
+                    text = json.dumps(detail, ensure_ascii=False)
+                    insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
+
+    def check_writable(self) -> None:
+        """Refuse to write where it was opened for reading, or where the file is no longer the one that was opened.
+
+        A deleted file can still be written to, and would take the writes with it.
+        """
+        if self.read_only:
+            raise DataError(
+                f"expected to write to {self.path}, but it is open for reading only; open it again to write"
+            )
+        self._check_there("written")
+
+    def _check_there(self, done: str) -> None:
+        try:
+            there = self.path.stat().st_ino == self._file
+        except OSError:
+            there = False
+        if not there:
+            raise DataError(
+                f"expected {self.path} where it was opened, but it was moved, deleted or replaced; nothing was "
+                f"{done}: put it back, or open the library again"
+            )
+
+    def __del__(self) -> None:
+        if hasattr(self, "_reader"):
+            self.close()
+
+    def close(self) -> None:
+        """Close both connections, once no other thread uses them; the last one to close leaves a single file."""
+        with over_forks.awake():
+            self._readers.close()  # before its turn: who reads may want to write
+        with over_forks.awake(), self._turn:
+            for connection in (self._writer, self._reader):
+                if connection is not None:
+                    connection.close()

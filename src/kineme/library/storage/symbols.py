@@ -1,0 +1,205 @@
+"""Symbols: what they are, and the rows that say so."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import secrets
+import sqlite3
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.library.storage.rows import (
+    ALIVE,
+    Row,
+    among,
+    check_text,
+    damage,
+    damaged,
+    listed,
+    next_key,
+    parsed_column,
+    select,
+)
+from kineme.library.storage.schema import COLUMNS, MAX_TEXT
+from kineme.library.storage.store import Store
+from kineme.library.storage.versions import Change, Moment
+
+_ALIKE = 100  # characters by which names are alike: the search takes their square
+
+#: How a movement came to its symbol.
+HOW = ("label", "anchored", "recognized")
+
+
+@dataclass(frozen=True, eq=False)
+class Symbol:
+    """A name for movements of one kind.
+
+    Attributes
+    ----------
+    id : str
+        "sym-..."; stays when the name changes.
+    name, description : str
+    members : ndarray of shape (k,)
+        Ids of its movements, ascending; read-only.
+    prototype : int or None
+        Id of the movement that stands for it.
+    threshold : float or None
+        Largest nonconformity of a member, where it was set.
+    parents : tuple of str
+        Ids of the symbols that it was merged or split from.
+    created, changed : int
+        Versions that made it, and that gave it its name, description, prototype or threshold.
+    """
+
+    id: str
+    name: str
+    description: str
+    members: NDArray[np.int64]
+    prototype: int | None
+    threshold: float | None
+    parents: tuple[str, ...]
+    created: int
+    changed: int
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def __repr__(self) -> str:
+        return f"Symbol({self.name!r}, {self.id}, {len(self)} movements)"
+
+
+def symbols(store: Store) -> tuple[Symbol, ...]:
+    """All symbols, by name."""
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        states = select(connection, "symbol_state", ALIVE, {"v": moment.version})
+        if len(states) != moment.symbols:
+            raise damage(f"{moment.symbols} symbols", f"{len(states)}: damaged bytes")
+        return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
+
+
+def symbol(store: Store, who: str) -> Symbol:
+    """The symbol of that name or id."""
+    with store.reading() as connection:
+        moment = store.moment(connection)
+        return _with_members(connection, moment, [state_of(connection, who, moment.version)])[0]
+
+
+def exists(store: Store, who: object) -> bool:
+    """Whether there is a symbol of that name or id."""
+    try:
+        with store.reading() as connection:
+            return bool(state_of(connection, str(who), store.as_of))
+    except SpecificationError:
+        return False
+
+
+def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
+    """The row of `symbol_state` of a name or, where no symbol has that name, of an id.
+
+    Raises
+    ------
+    SpecificationError
+        No such symbol; the message lists names like it.
+    """
+    conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
+    for condition in conditions if isinstance(who, str) else ():
+        try:
+            found = select(connection, "symbol_state", f"{condition} AND {ALIVE}", {"who": who, "v": version})
+        except UnicodeEncodeError:
+            break
+        if found:
+            return found[0]
+    names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {ALIVE}", {"v": version})]
+    like = difflib.get_close_matches(str(who)[:_ALIKE], [name[:_ALIKE] for name in names], 3) or sorted(names)[:5]
+    known = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
+    raise SpecificationError(f"expected the name or id of a symbol, got {who!r}; {known}")
+
+
+def _with_members(connection: sqlite3.Connection, moment: Moment, states: Sequence[Row]) -> list[Symbol]:
+    records = [dict(zip(COLUMNS["symbol_state"], row, strict=True)) for row in states]
+    keys = [record["symbol"] for record in records]
+    about = {
+        key: (name, made) for key, name, made in select(connection, "symbol", among("key"), {"keys": listed(keys)})
+    }
+    if lost := set(keys) - about.keys():
+        raise damaged("symbol", (min(lost),))
+    members = _members(connection, keys, moment)
+    parents = [tuple(parsed_column("symbol_state", row, "parents", list)) for row in states]
+    return [
+        Symbol(
+            about[record["symbol"]][0],
+            record["name"],
+            record["description"],
+            members[record["symbol"]],
+            record["prototype"],
+            record["threshold"],
+            above,
+            about[record["symbol"]][1],
+            record["added"],
+        )
+        for record, above in zip(records, parents, strict=True)
+    ]
+
+
+def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) -> dict[int, NDArray[np.int64]]:
+    rows = select(connection, "member", f"{among('symbol')} AND {ALIVE}", {"keys": listed(keys), "v": moment.version})
+    n = connection.execute(f"SELECT count(*) FROM member WHERE {ALIVE}", {"v": moment.version}).fetchone()[0]
+    if n != moment.members:
+        raise damage(f"{moment.members} members of symbols", f"{n}: damaged bytes")
+    table = np.array([(row[2], row[1]) for row in rows], dtype=np.int64).reshape(-1, 2)
+    table = table[np.lexsort((table[:, 1], table[:, 0]))]
+    table.setflags(write=False)
+    first = np.searchsorted(table[:, 0], keys)
+    last = np.searchsorted(table[:, 0], keys, side="right")
+    return {key: table[a:b, 1] for key, a, b in zip(keys, first, last, strict=True)}
+
+
+def check_name(name: Any) -> str:
+    """Any text that can be written in Unicode is a name: separators, quotes and commands are letters like others.
+
+    The one exception is U+0000, which NumPy, C and shells cannot tell from the end of a text.
+    """
+    if not isinstance(name, str) or not name:
+        raise SpecificationError(f"expected a name of at least one character, got {name!r}")
+    check_text("a name", name, MAX_TEXT)
+    if "\0" in name:
+        raise SpecificationError(f"expected a name without the character U+0000, got {name!r}; leave it out")
+    return name
+
+
+def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Name or id -> key of its symbol, and the names whose symbols did not exist and were made."""
+    names = list(names)
+    known = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
+    found: dict[str, int] = {}
+    for column in ("symbol.id", "name"):  # a name goes before an id, as in `state_of`
+        query = f"SELECT {column}, symbol.key {known} AND {among(column)}"
+        found |= dict(change.connection.execute(query, {"keys": listed(names)}))
+    made = tuple(name for name in names if name not in found)
+    for name in made:
+        found[name] = make(change, name)
+    return found, made
+
+
+def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
+    """A new symbol; gives its key."""
+    key = next_key(change.connection, "symbol")
+    change.insert("symbol", [(key, f"sym-{secrets.token_hex(6)}", change.version)])
+    state = next_key(change.connection, "symbol_state")
+    text = json.dumps(list(parents))
+    change.insert("symbol_state", [(state, key, name, "", None, None, text, change.version, None)])
+    return key
+
+
+def join(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
+    """Movements, which show no symbol, become members: pairs (movement, key of the symbol)."""
+    first = next_key(change.connection, "member")
+    rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]
+    change.insert("member", rows)

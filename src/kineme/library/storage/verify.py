@@ -1,0 +1,191 @@
+"""Looking for damage: every page, every checksum, every value, every reference, every size."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+from kineme.library.storage.checks import ALL_GOOD, CHECKS
+from kineme.library.storage.connection import connect
+from kineme.library.storage.contents import CONTENTS, samples
+from kineme.library.storage.guard import limited
+from kineme.library.storage.lives import lives
+from kineme.library.storage.rows import Row, row_name, sealed
+from kineme.library.storage.schema import BLOBS, COLUMNS, META
+from kineme.library.storage.store import Store
+
+_SHOWN = 100  # messages of one check
+_BATCH_BYTES = 1 << 24  # of rows whose contents are looked at together
+_ROW_BYTES = 512  # of a row beside its bytes, in memory
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is not as it was stored.
+
+    Attributes
+    ----------
+    table : str
+        Empty where the file as a whole is meant.
+    key : int, str or None
+        Of the row: the movement, in the tables of samples, primitives and features.
+    text : str
+        What is wrong.
+    """
+
+    table: str
+    key: int | str | None
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Check = Callable[[sqlite3.Connection], Iterator[Problem]]
+
+
+def verify(store: Store, *, pages: bool = True) -> list[Problem]:
+    """All that is damaged or that no library holds, as it is at one moment; an empty list if nothing is.
+
+    `pages` is False where the pages of the file have been checked already.
+    """
+    with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
+        connection.execute("BEGIN")
+        checks: list[Check] = [
+            *((_structure,) if pages else ()),
+            *(_rows(table, store) for table in COLUMNS),
+            _references,
+            _completeness,
+            _sizes(store),
+        ]
+        problems = [problem for check in checks for problem in _all_of(check, connection)]
+        return problems or _all_of(_lives, connection)  # rows are looked at together once each is as it should be
+
+
+def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
+    """What a check finds; that it cannot go on is a finding too."""
+    found: list[Problem] = []
+    try:
+        for problem in check(connection):
+            found.append(problem)
+            if len(found) >= _SHOWN:
+                break
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        found.append(Problem("", None, f"the file cannot be read to the end ({error})"))
+    return found
+
+
+def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
+    for (text,) in connection.execute(f"PRAGMA integrity_check({_SHOWN})"):
+        if text != "ok":
+            yield Problem("", None, f"the file: {' '.join(text.split())}")
+
+
+def _rows(table: str, store: Store) -> Check:
+    """The seal of every row, its values, and what they hold; the last is not asked of rows that failed before."""
+
+    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
+        try:
+            good: list[Row] = []
+            size = 0
+            for row in connection.execute(f"SELECT {', '.join(COLUMNS[table])}, crc, {ALL_GOOD[table]} FROM {table}"):
+                if not row[-1] or not sealed(table, row[:-1]):
+                    yield from _broken(table, row[:-1]) or _strange(connection, table, row[0])
+                    continue
+                good.append(row[:-2])
+                size += _ROW_BYTES + sum(len(value) for value in good[-1] if isinstance(value, bytes))
+                if size > _BATCH_BYTES:
+                    yield from _contents(connection, table, good, store)
+                    good, size = [], 0
+            yield from _contents(connection, table, good, store)
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            yield Problem(table, None, f"table {table} cannot be read as a whole ({error})")
+            yield from _one_by_one(connection, table)
+
+    return check
+
+
+def _broken(table: str, row: Row) -> list[Problem]:
+    """A row that does not fit its seal."""
+    return [] if sealed(table, row) else [Problem(table, row[0], f"{row_name(table, row[0])}: damaged bytes")]
+
+
+def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[Problem]:
+    """Which values of a row are none that a library holds."""
+    checks = CHECKS[table]
+    fits = ", ".join(f"({one.condition}) IS TRUE" for one in checks.values())
+    row = connection.execute(f"SELECT {fits} FROM {table} WHERE {COLUMNS[table][0]} IS ?", (key,)).fetchone()
+    for (column, one), good in zip(checks.items(), row or (), strict=False):
+        if not good:
+            yield Problem(table, key, f"{row_name(table, key)}: {column} is not {one.words}")
+
+
+def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
+    if not rows:
+        return
+    found = samples(connection, rows, store.n_dims or 0) if table == "raw" else CONTENTS.get(table, _nothing)(rows)
+    yield from (Problem(table, key, f"{row_name(table, key)}: holds {words}") for key, words in found)
+
+
+def _nothing(rows: Sequence[Row]) -> Iterator[tuple[Any, str]]:
+    yield from ()
+
+
+def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]:
+    """Which movements' rows cannot be read, in a table that cannot be read in one go."""
+    if table not in BLOBS:
+        return
+    for (key,) in connection.execute("SELECT id FROM movement").fetchall():
+        try:
+            row = connection.execute(f"SELECT *, movement FROM {table} WHERE movement = ?", (key,)).fetchone()
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            yield Problem(table, key, f"{row_name(table, key)}: cannot be read ({error})")
+        else:
+            yield from _broken(table, row[:-1]) if row is not None else ()
+
+
+def _references(connection: sqlite3.Connection) -> Iterator[Problem]:
+    for table, key, parent, _ in connection.execute("PRAGMA foreign_key_check"):
+        yield Problem(table, key, f"{row_name(table, key)}: refers to a row of table {parent} that is not there")
+
+
+def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
+    for table in BLOBS:
+        query = f"SELECT id FROM movement WHERE id NOT IN (SELECT movement FROM {table}) LIMIT {_SHOWN}"
+        for (key,) in connection.execute(query):
+            yield Problem(table, key, f"{row_name(table, key)}: not there")
+    for table in ("version", "movement"):
+        last, n = connection.execute(f"SELECT coalesce(max(id), 0), count(*) FROM {table}").fetchone()
+        if last != n:
+            yield Problem(table, None, f"table {table}: expected {last} rows, numbered from 1, got {n}")
+    keys = {key for (key,) in connection.execute("SELECT key FROM meta").fetchall()}
+    if strange := keys - META:
+        yield Problem("meta", min(strange), f"table meta: expected nothing but {sorted(META)}, got {min(strange)!r}")
+    if n and "n_dims" not in keys:
+        yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
+
+
+def _lives(connection: sqlite3.Connection) -> Iterator[Problem]:
+    yield from (Problem(table, key, f"{row_name(table, key)}: {words}") for table, key, words in lives(connection))
+
+
+def _sizes(store: Store) -> Check:
+    specification, d = store.specification, store.n_dims or 0
+    n_features, n_weights = sum(specification.widths(d)), d * specification.dmp.n_basis
+    expected = {
+        "raw": f"length(start) = {8 * d} AND length(positions) = {4 * d} * n_samples "
+        "AND (times IS NULL OR length(times) IN (4 * n_samples, 8 * n_samples))",
+        "primitive": f"length(boundary) = {32 * d} AND length(weights) = {4 * n_weights}",
+        "feature": f"length(rows) = {4 * n_features}",
+    }
+
+    def check(connection: sqlite3.Connection) -> Iterator[Problem]:
+        for table, fits in expected.items():
+            query = f"SELECT id FROM {table} JOIN movement ON id = movement WHERE NOT ({fits}) LIMIT {_SHOWN}"
+            for (key,) in connection.execute(query):
+                yield Problem(table, key, f"{row_name(table, key)}: of the wrong size")
+
+    return check

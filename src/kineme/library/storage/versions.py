@@ -1,0 +1,60 @@
+"""One version of a library: what is alive at it, and the transaction that makes the next one."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kineme.library.storage.rows import Row, damaged, insert, retire, select
+from kineme.library.storage.schema import COUNTED
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A version, and how many rows are alive at it: by that count, rows that damage has hidden are missed."""
+
+    version: int
+    movements: int = 0
+    members: int = 0
+    symbols: int = 0
+
+
+def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
+    """The last version up to the given one.
+
+    Raises
+    ------
+    DataError
+        Its row is damaged.
+    """
+    last = connection.execute("SELECT max(id) FROM version WHERE id <= :v", {"v": version}).fetchone()[0]
+    if last is None:
+        return Moment(0)
+    rows = select(connection, "version", "id = :last", {"last": last})
+    if not rows:
+        raise damaged("version", (last,))
+    return Moment(last, *rows[0][4:])
+
+
+@dataclass(frozen=True)
+class Change:
+    """One transaction under way."""
+
+    connection: sqlite3.Connection
+    version: int
+    counts: dict[str, int]
+
+    def insert(self, table: str, rows: Sequence[Row]) -> None:
+        """Add rows to a table."""
+        insert(self.connection, table, rows)
+        self._count(table, len(rows))
+
+    def retire(self, table: str, rows: Sequence[Row]) -> None:
+        """Remove rows, as they were selected, from this version on."""
+        retire(self.connection, table, rows, self.version)
+        self._count(table, -len(rows))
+
+    def _count(self, table: str, more: int) -> None:
+        if table in COUNTED:
+            self.counts[COUNTED[table]] += more

@@ -1,0 +1,1 @@
+"""Symbols of a library: proposals, grounding, reports."""

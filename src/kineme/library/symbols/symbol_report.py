@@ -1,0 +1,59 @@
+"""One symbol, written out: its movements, where they come from, how they vary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from kineme.library.storage.read import records
+from kineme.library.storage.rows import among, listed, select
+from kineme.library.storage.schema import COLUMNS
+from kineme.library.storage.store import Store
+
+if TYPE_CHECKING:
+    from kineme.library.library import ActionLibrary
+
+
+def sheet(library: ActionLibrary, who: str) -> dict[str, Any]:
+    """A symbol as plain data.
+
+    Returns
+    -------
+    dict
+        ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
+        place in the file, n_samples, duration [s], start and goal.
+    """
+    symbol = library[who]
+    members = []
+    if len(symbol):
+        about = records(library.store, symbol.members)
+        files = _files(library.store, sorted({one["source"] for one in about if one["source"] is not None}))
+        movements = library.movements(ids=symbol.members)
+        for one, movement in zip(about, movements, strict=True):
+            members.append(
+                {
+                    "id": one["id"],
+                    "name": one["name"],
+                    "source": files.get(one["source"]),
+                    "place": one["place"],
+                    "samples": one["n_samples"],
+                    "duration": one["duration"],
+                    "start": movement.positions[0].tolist(),
+                    "goal": movement.positions[-1].tolist(),
+                }
+            )
+    return {
+        "id": symbol.id,
+        "name": symbol.name,
+        "description": symbol.description,
+        "prototype": symbol.prototype,
+        "parents": list(symbol.parents),
+        "members": members,
+    }
+
+
+def _files(store: Store, keys: list[int]) -> dict[int, str]:
+    """Key of a source -> its path, as it was given."""
+    with store.reading() as connection:
+        rows = select(connection, "source", among("id"), {"keys": listed(keys)})
+    path = COLUMNS["source"].index("path")
+    return {row[0]: row[path] for row in rows}

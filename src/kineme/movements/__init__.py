@@ -1,0 +1,1 @@
+"""Movements: what they are, how they are prepared, cut and inspected."""

@@ -1,0 +1,1 @@
+"""Steps that prepare movements: trim, smooth, resample, perturb."""

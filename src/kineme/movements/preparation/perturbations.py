@@ -1,0 +1,134 @@
+"""What may come between two recordings of one movement: place, size, direction, timing, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kineme.errors import SpecificationError
+from kineme.movements.preparation.arc_length import resample_by_phase
+from kineme.movements.preparation.resample import relative_rows
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array, check_number, check_seed
+
+N_POINTS = 200  # samples afterwards
+_FINE = 1000  # samples between which the warp interpolates linearly, so that it leaves no kinks
+_SPEED_KNOTS = 4
+_STRONGEST = 100.0  # already beyond all sense; powers of much stronger ones are no numbers
+_STREAMS = ("shift", "scale", "rotation", "warp", "noise")  # each has random numbers of its own
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Random changes of a movement that do not change what it shows.
+
+    Each movement gets changes of its own; a strength of 0 leaves that kind out. Each kind draws from a stream of its
+    own, so a strength can grow, or another kind be added, while everything else stays as it was.
+
+    Parameters
+    ----------
+    shift : float
+        Translation by up to this many extents in each dimension. The extent is the diagonal of the bounding box.
+    scale : float
+        Isotropic factor ``2^(scale r)``, r uniform in [-1, 1]: at 1, from half to twice the size.
+    rotation : float
+        Rotation by an angle uniform within +-rotation [rad], in space about a random axis.
+    warp : float
+        Uneven speed: the logarithm of the speed is normal with this standard deviation at four even knots, and smooth
+        between them (PCHIP). The duration stays.
+    noise : float
+        Standard deviation of white noise on each sample and dimension, as a share of the extent.
+
+    Raises
+    ------
+    SpecificationError
+        A strength that is negative or not a number.
+    """
+
+    shift: float = 0.0
+    scale: float = 0.0
+    rotation: float = 0.0
+    warp: float = 0.0
+    noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in _STREAMS:
+            check_number(name, getattr(self, name), least=0.0, most=_STRONGEST)
+
+    def in_dimensions(self, n_dims: int) -> Perturbation:
+        """The same, without the rotation that movements of neither two nor three dimensions cannot have."""
+        return self if n_dims in (2, 3) else replace(self, rotation=0.0)
+
+    def apply(self, demonstrations: Demonstrations, seed: int | Sequence[int]) -> Demonstrations:
+        """The movements, perturbed, at 200 even samples; labels, names, durations stay.
+
+        Parameters
+        ----------
+        demonstrations : Demonstrations
+        seed : int or sequence of int
+            The same seed and number of movements give the same random numbers.
+
+        Raises
+        ------
+        SpecificationError
+            A rotation of movements that have neither two nor three dimensions.
+        """
+        n, d = len(demonstrations), demonstrations.n_dims
+        if self.rotation > 0 and d not in (2, 3):
+            raise SpecificationError(f"expected rotation=0 for movements of {d} dimensions, got {self.rotation!r}")
+        check_seed("seed", seed)
+        random = {name: np.random.default_rng([k, *np.atleast_1d(seed)]) for k, name in enumerate(_STREAMS)}
+        paths = self._warped(demonstrations, random["warp"])
+        if self.rotation > 0:
+            paths = _rotations(n, d, self.rotation, random["rotation"]) @ paths
+        paths = paths * 2.0 ** (self.scale * random["scale"].uniform(-1, 1, (n, 1, 1)))
+        extents = np.linalg.norm(np.ptp(paths, axis=2), axis=1)[:, None, None]
+        paths += self.shift * extents * random["shift"].uniform(-1, 1, (n, d, 1))
+        paths += self.noise * extents * random["noise"].normal(size=paths.shape)
+        paths += demonstrations.positions[demonstrations.offsets[:-1]][:, :, None]
+        return _with_paths(demonstrations, paths)
+
+    def _warped(self, demonstrations: Demonstrations, random: np.random.Generator) -> Array:
+        """Paths (n, d, 200) from their start, at even times of the warped clock."""
+        n = len(demonstrations)
+        if self.warp == 0:
+            return relative_rows(demonstrations, 0, n, N_POINTS)
+        phase = warped_phase(self.warp * random.normal(size=(n, _SPEED_KNOTS)), _FINE)
+        return resample_by_phase(relative_rows(demonstrations, 0, n, _FINE), phase, N_POINTS)
+
+
+def warped_phase(log_speeds: Array, n_samples: int) -> Array:
+    """Monotonic phases from 0 to 1, shape (n, n_samples), whose slope is exp(PCHIP through the log speeds (n, k))."""
+    from scipy.interpolate import PchipInterpolator
+
+    knots = np.linspace(0.0, 1.0, log_speeds.shape[1])
+    speed = np.exp(PchipInterpolator(knots, log_speeds, axis=1)(np.linspace(0.0, 1.0, n_samples)))
+    phase = np.zeros_like(speed)
+    np.cumsum(speed[:, 1:] + speed[:, :-1], axis=1, out=phase[:, 1:])  # trapezoids
+    return np.asarray(phase / phase[:, -1:])
+
+
+def _rotations(n: int, d: int, angle: float, random: np.random.Generator) -> Array:
+    """Rotation matrices (n, d, d) by angles uniform in +-angle."""
+    angles = random.uniform(-angle, angle, n)
+    if d == 2:
+        c, s = np.cos(angles), np.sin(angles)
+        return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
+    from scipy.spatial.transform import Rotation
+
+    axes = random.normal(size=(n, 3))
+    axes *= (angles / np.linalg.norm(axes, axis=1))[:, None]
+    return np.asarray(Rotation.from_rotvec(axes).as_matrix())
+
+
+def _with_paths(demonstrations: Demonstrations, paths: Array) -> Demonstrations:
+    """The same movements along other, evenly sampled paths (n, d, T)."""
+    n, d, n_samples = paths.shape
+    old = demonstrations.movements
+    positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
+    offsets = np.arange(n + 1) * n_samples
+    new = Movements(positions, offsets, old.durations, None, old.labels, old.names)
+    return Demonstrations.of_movements(new, demonstrations.steps)

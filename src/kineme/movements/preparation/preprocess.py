@@ -1,0 +1,42 @@
+"""Preprocessing as explicit steps, applied in order and recorded with the result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Protocol
+
+from kineme.errors import SpecificationError
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+
+
+class Step(Protocol):
+    """One frozen, hashable record with its own parameters; see `TrimRest`, `Smooth`, `Resample`."""
+
+    def apply(self, demonstrations: Demonstrations) -> Movements:
+        """The movements after this step."""
+        ...
+
+
+def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
+    """Refuse what is not an iterable of steps; a step's class without parentheses is not a step."""
+    try:
+        found = tuple(steps)
+    except TypeError:
+        raise SpecificationError(
+            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {steps!r}"
+        ) from None
+    wrong = [step for step in found if isinstance(step, type) or not callable(getattr(step, "apply", None))]
+    if wrong:
+        raise SpecificationError(
+            f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {wrong[0]!r}"
+        )
+    return found
+
+
+def preprocess(movements: Any, steps: Iterable[Step]) -> Demonstrations:
+    """Apply steps in order to movements in any form; the result's ``steps`` records them after earlier ones."""
+    demonstrations = Demonstrations.of(movements)
+    for step in check_steps(steps):
+        demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))
+    return demonstrations

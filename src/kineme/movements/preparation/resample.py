@@ -1,0 +1,84 @@
+"""Bring every movement to the same number of samples, evenly spaced in the phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kineme.movements.preparation.spline import spline_matrix, spline_rows
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.validation import MIN_SAMPLES, Array, check_count
+
+_MOST = 1_000_000  # samples of a movement
+
+
+@dataclass(frozen=True)
+class Resample:
+    """Interpolate each movement at even times between its first and last stamp.
+
+    Parameters
+    ----------
+    n_points : int, default 200
+        Samples per movement afterwards, at most a million.
+
+    Notes
+    -----
+    Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
+    tenth of the usual step apart are averaged first: a spline would magnify the noise between them (see
+    `kineme.movements.trajectories.close_stamps`). Resampling far below the recorded rate folds high frequencies into
+    low ones: `Smooth` first.
+    """
+
+    n_points: int = 200
+
+    def __post_init__(self) -> None:
+        check_count("n_points", self.n_points, MIN_SAMPLES, most=_MOST)
+
+    def apply(self, demonstrations: Demonstrations) -> Movements:
+        """The movements, evenly sampled."""
+        n = len(demonstrations)
+        starts = demonstrations.positions[demonstrations.offsets[:-1]]
+        rows = relative_rows(demonstrations, 0, n, self.n_points)
+        return replace(
+            demonstrations.movements,
+            positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, demonstrations.n_dims),
+            offsets=np.arange(n + 1) * self.n_points,
+            times=None,
+        )
+
+
+def relative_rows(demonstrations: Demonstrations, start: int, stop: int, n_points: int) -> Array:
+    """Movements start:stop at `n_points` even times, minus their start, shape (stop - start, d, n_points)."""
+    n_samples = demonstrations.even_length
+    if n_samples is None:
+        movements = demonstrations.movements.separated
+        return spline_rows(movements.stamps, movements.positions, movements.offsets[start : stop + 1], n_points)
+    rows = even_rows(demonstrations, start, stop)
+    return rows if n_points == n_samples else rows @ spline_matrix(n_samples, n_points).T
+
+
+def even_rows(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Evenly sampled movements start:stop as they are, minus their start, shape (stop - start, d, T)."""
+    first, last = demonstrations.offsets[[start, stop]]
+    block = demonstrations.positions[first:last].reshape(stop - start, -1, demonstrations.n_dims)
+    rows = np.empty((len(block), block.shape[2], block.shape[1]))
+    if use_compiled(block.size):
+        compiled_module("kineme.movements.trajectories._compiled").fill_even_rows(block, rows)
+        return rows
+    by_dimension = block.transpose(0, 2, 1)
+    return np.subtract(by_dimension, by_dimension[:, :, :1], out=rows)
+
+
+def extents_of(demonstrations: Demonstrations, start: int, stop: int) -> Array:
+    """Largest minus smallest recorded position of movements start:stop in each dimension, shape (stop - start, d)."""
+    offsets = demonstrations.offsets[start : stop + 1]
+    positions = demonstrations.positions[offsets[0] : offsets[-1]]
+    if not use_compiled(positions.size):
+        first = offsets[:-1] - offsets[0]
+        return np.asarray(np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first))
+    extents = np.empty((stop - start, demonstrations.n_dims))
+    compiled_module("kineme.movements.trajectories._compiled").fill_extents(positions, offsets - offsets[0], extents)
+    return extents

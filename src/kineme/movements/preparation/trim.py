@@ -1,0 +1,70 @@
+"""Cut the rest before and after a movement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kineme.errors import SpecificationError
+from kineme.movements.trajectories.collect import Movements
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import MIN_SAMPLES, Array, check_number
+
+
+@dataclass(frozen=True)
+class TrimRest:
+    """Drop leading and trailing samples that stay near the first and the last position.
+
+    A recording that is cropped badly rests before and after the movement; a tenth of its duration at rest
+    changes the forcing term by a third. Rest is judged by distance, not by speed: that needs no derivative of
+    noisy data, and a slow movement is not taken for rest.
+
+    Parameters
+    ----------
+    tolerance : float, default 0.01
+        Radius within which the movement is at rest, as a share of its extent (the diagonal of its bounding
+        box). Choose it above the noise.
+
+    Notes
+    -----
+    The last resting sample before, and the first one after the movement are kept, and never fewer than four
+    samples remain. A movement that does not move is left as it is.
+    """
+
+    tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        check_number("tolerance", self.tolerance, least=0.0)
+        if self.tolerance >= 0.5:
+            raise SpecificationError(f"expected tolerance to be below 0.5, got {self.tolerance!r}")
+
+    def apply(self, demonstrations: Demonstrations) -> Movements:
+        """The movements without their rest."""
+        x, offsets, lengths = demonstrations.positions, demonstrations.offsets, demonstrations.lengths
+        first, last = offsets[:-1], offsets[1:] - 1
+        extent = np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)
+        radius = self.tolerance * np.linalg.norm(extent, axis=1)
+        row = np.arange(len(x))
+        away_from_start = _distance(x, x[first], lengths) > np.repeat(radius, lengths)
+        away_from_goal = _distance(x, x[last], lengths) > np.repeat(radius, lengths)
+        begin = np.minimum.reduceat(np.where(away_from_start, row, len(x)), first) - 1
+        end = np.maximum.reduceat(np.where(away_from_goal, row, -1), first) + 1
+        begin, end = np.clip(begin, first, last), np.clip(end, first, last)
+        begin = np.maximum(np.minimum(begin, end - (MIN_SAMPLES - 1)), first)
+        end = np.minimum(np.maximum(end, begin + (MIN_SAMPLES - 1)), last)
+        still = extent.max(axis=1) == 0
+        begin, end = np.where(still, first, begin), np.where(still, last, end)
+        keep = (row >= np.repeat(begin, lengths)) & (row <= np.repeat(end, lengths))
+        times = demonstrations.times
+        return replace(
+            demonstrations.movements,
+            positions=x[keep],
+            offsets=np.concatenate(([0], np.cumsum(end - begin + 1))),
+            times=times[keep],
+            durations=times[end] - times[begin],
+        )
+
+
+def _distance(x: Array, points: Array, lengths: np.ndarray) -> Array:
+    return np.asarray(np.linalg.norm(x - np.repeat(points, lengths, axis=0), axis=1))

@@ -1,0 +1,109 @@
+"""One recording as segmenters see it: speed over time, and how much of it is noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.validation import Array
+
+_ROUNDS = 6  # the peak speed depends on the smoothing and the smoothing on the peak speed; five are one too many
+_SLOWEST = 2.0  # cycles per recording: never smooth more than this
+_PEAK_PATH = 0.9  # of the path is covered below the peak speed
+_MIN_SAMPLES = 8  # two movements of the four that a trajectory needs
+_NOISE_EXTENTS = 4.0  # a smoothed recording that moves less than this many standard deviations of noise rests
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A recording, smoothed just as much as its noise requires.
+
+    Attributes
+    ----------
+    times : ndarray of shape (T,)
+    positions : ndarray of shape (T, d)
+        Smoothed.
+    speed : ndarray of shape (T,)
+        Norm of the derivative of the smoothed positions [unit/s].
+    peak : float
+        Robust peak speed: nine tenths of the path are covered more slowly. Weighted by path, not by time, so that a
+        recording that mostly rests has the peak speed of its movements.
+    noise : float
+        Root mean square speed that is left of the noise [unit/s].
+    cutoff : float
+        Of the smoothing [Hz].
+    """
+
+    times: Array
+    positions: Array
+    speed: Array
+    peak: float
+    noise: float
+    cutoff: float
+
+
+def observe(recording: Trajectory, resolution: float) -> Motion:
+    """Smooth a recording until its noise moves at a quarter of ``resolution * peak``, and measure its speed.
+
+    White noise of variance sigma^2 per dimension, sampled at rate r, passes the smoothing spline (see `Smooth`) of
+    cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
+    ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the aim is taken, so a
+    clean recording loses nothing and no cutoff in hertz presumes how fast people or robots move.
+
+    Parameters
+    ----------
+    recording : Trajectory
+    resolution : float
+        Speed that is to be told from rest, as a share of the peak speed.
+
+    Raises
+    ------
+    TrajectoryError
+        Fewer than eight samples, or a recording that rests all along.
+    """
+    who = f"recording {recording.name!r}" if recording.name else "recording"
+    if len(recording) < _MIN_SAMPLES:
+        raise TrajectoryError(f"{who}: expected at least {_MIN_SAMPLES} samples to cut, got {len(recording)}")
+    t = recording.times - recording.times[0]
+    variance = noise_variance(recording.positions)
+    passed = np.pi**3 / np.sqrt(2) * variance * recording.duration / (len(t) - 1)
+    slowest, cutoff = _SLOWEST / recording.duration, (len(t) - 1) / recording.duration / 4.0
+    demos = Demonstrations([recording])
+    for _ in range(_ROUNDS):
+        smooth = Smooth(cutoff * recording.duration).apply(demos).positions
+        speed = np.linalg.norm(np.gradient(smooth, t, axis=0), axis=1)
+        peak = peak_speed(speed, t)
+        noise = float(np.sqrt(passed * cutoff**3))
+        aim = resolution * peak / 4.0
+        if noise <= 1.05 * aim or cutoff <= slowest:
+            break
+        cutoff = max((aim**2 / passed) ** (1.0 / 3.0), slowest)
+    extent, sigma = float(np.linalg.norm(np.ptp(smooth, axis=0))), float(np.sqrt(variance))
+    if extent <= max(_NOISE_EXTENTS * sigma, 1e-12 * np.abs(recording.positions).max()):
+        raise TrajectoryError(
+            f"{who}: expected some movement, got {recording.duration:.3g} s at rest: the smoothed positions stay "
+            f"within {extent:.3g}, the noise is {sigma:.3g}; check the dimensions and the unit of the recording"
+        )
+    return Motion(recording.times, smooth, speed, peak, noise, cutoff)
+
+
+def noise_variance(positions: Array) -> float:
+    """Variance of white noise on (T, d) positions, summed over dimensions.
+
+    From the median size of third differences, which a smooth path hardly has: for Gaussian noise it is
+    ``0.6745 sqrt(20) sigma``. A median, so that jumps do not count.
+    """
+    sizes = np.median(np.abs(np.diff(positions, n=3, axis=0)), axis=0)
+    return float(((sizes / (0.6745 * np.sqrt(20.0))) ** 2).sum())
+
+
+def peak_speed(speed: Array, times: Array) -> float:
+    """The speed (T,) below which nine tenths of the path are covered."""
+    order = np.argsort(speed)
+    path = np.cumsum((speed * np.gradient(times))[order])
+    return float(speed[order[np.searchsorted(path, _PEAK_PATH * path[-1])]])

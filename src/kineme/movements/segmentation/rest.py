@@ -1,0 +1,93 @@
+"""Cut where the recording rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.movements.segmentation.bouts import (
+    Rows,
+    consecutive,
+    durations_of,
+    join_across,
+    moving_bouts,
+    typical_duration,
+)
+from kineme.movements.segmentation.motion import Motion
+from kineme.movements.segmentation.onset import onset_rows
+from kineme.validation import check_number
+
+_MIN_REST, _MIN_MOVEMENT = 0.02, 0.1  # of the typical duration of a movement
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Cut in the middle of every rest.
+
+    The recording rests where its speed stays below a share of the robust peak speed; a movement is a run above that
+    share which reaches twice the share somewhere (hysteresis, so that noise at the threshold does not flicker).
+
+    Parameters
+    ----------
+    speed : float, default 0.05
+        Share of the recording's peak speed below which it rests. A movement that never exceeds twice this share is
+        not seen: lower it where slow and fast movements share a recording.
+    min_rest : float, optional
+        A shorter rest is a pause within a movement [s]; by default a fiftieth of the typical movement. Measured
+        between extrapolated ends, so that to stop and turn back smoothly is not a rest, however slow.
+    min_movement : float, optional
+        A shorter movement is a twitch within a rest [s]; by default a tenth of the typical movement.
+
+    Notes
+    -----
+    Half of the moving time is spent in movements at least as long as the typical one. Defaults that are shares of it
+    make the cuts independent of tempo; fix them in seconds when you know the task.
+    """
+
+    speed: float = 0.05
+    min_rest: float | None = None
+    min_movement: float | None = None
+
+    def __post_init__(self) -> None:
+        check_number("speed", self.speed, above=0.0)
+        if self.speed >= 0.5:
+            raise SpecificationError(f"expected speed to be a share of the peak speed below 0.5, got {self.speed!r}")
+        for name in ("min_rest", "min_movement"):
+            if getattr(self, name) is not None:
+                check_number(name, getattr(self, name), least=0.0)
+
+    @property
+    def resolution(self) -> float:
+        """Share of the peak speed that has to be told from rest."""
+        return self.speed
+
+    def inner_cuts(self, motion: Motion) -> Rows:
+        """Rows at which one movement ends and the next begins, increasing, none at the ends."""
+        bouts, last_enough = self._bouts(motion)
+        bouts = bouts[last_enough]
+        return (bouts[:-1, 1] + bouts[1:, 0]) // 2
+
+    def pieces(self, motion: Motion) -> Rows:
+        """Where each movement lies: to the middle of the rests beside it, or of those between it and a twitch."""
+        bouts, last_enough = self._bouts(motion)
+        middles = (bouts[:-1, 1] + bouts[1:, 0]) // 2
+        edges = np.concatenate(([0], middles, [len(motion.times)]))
+        return np.column_stack((edges[:-1], edges[1:]))[last_enough]
+
+    def _bouts(self, motion: Motion) -> tuple[Rows, NDArray[np.bool_]]:
+        """Runs of motion, rows (n, 2), and which of them are movements."""
+        low = max(self.speed * motion.peak, 2.0 * motion.noise)
+        bouts = moving_bouts(motion.speed, low, 2.0 * low)
+        if not len(bouts):  # motion so even and slow that nothing stands out
+            return np.array([[0, len(motion.times)]]), np.array([True])
+        # How long it rests is judged between extrapolated ends: to stop and turn back smoothly is no rest at all,
+        # however long it is slow.
+        bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
+        typical = typical_duration(durations_of(bouts, motion.times))
+        bouts = join_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
+        lasting = durations_of(bouts, motion.times)
+        least = _MIN_MOVEMENT * typical_duration(lasting) if self.min_movement is None else self.min_movement
+        return bouts, lasting >= least

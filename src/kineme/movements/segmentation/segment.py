@@ -1,0 +1,113 @@
+"""One long recording in, movements out."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.segmentation.bouts import Rows, consecutive
+from kineme.movements.segmentation.motion import Motion, observe
+from kineme.movements.segmentation.onset import onset_rows
+from kineme.movements.segmentation.segmentation import Segmentation
+from kineme.movements.segmentation.table import SEGMENTERS, Segmenter
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.validation import MIN_SAMPLES, check_choice, check_switch
+
+
+def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any) -> Segmentation:
+    """Cut a continuous recording into movements.
+
+    Parameters
+    ----------
+    recording : Trajectory or array_like of shape (T, d)
+        An array is taken as evenly sampled over one second; pass a `Trajectory` with its time stamps, so that
+        parameters in seconds mean something.
+    by : {"rest", "speed", "change-points"} or Segmenter, default "rest"
+        Where to cut: where it rests, where it slows down, where its velocity changes regime (needs
+        ``pip install kineme[segmentation]``). See `Rest`, `SpeedMinima` and `ChangePoints`.
+    cover : bool, default False
+        Whether every sample belongs to exactly one movement. By default rests belong to none.
+    **parameters
+        Of the method, as in ``segment(recording, min_rest=0.2)``.
+
+    Returns
+    -------
+    Segmentation
+        ``cuts`` (n, 2) in seconds, ``trajectories``, the method and the rows.
+
+    Raises
+    ------
+    TrajectoryError
+        A recording that rests all along, of fewer than eight samples, or with values that are not finite.
+    SpecificationError
+        An unknown method or parameter, a parameter out of range, or the library of "change-points" is missing.
+
+    Examples
+    --------
+    >>> import numpy as np, kineme
+    >>> t = np.linspace(0.0, 5.0, 501)
+    >>> there, back = np.clip(t - 1.0, 0.0, 1.0), np.clip(t - 3.0, 0.0, 1.0)
+    >>> x = 0.5 * (np.cos(np.pi * back) - np.cos(np.pi * there))
+    >>> kineme.segment(kineme.Trajectory(t, x)).cuts.round(1)
+    array([[1., 2.],
+           [3., 4.]])
+    """
+    check_switch("cover", cover)
+    method = as_segmenter(by, parameters)
+    whole = as_recording(recording)
+    motion = observe(whole, method.resolution)
+    if cover:
+        return Segmentation(whole, method, enough_samples(consecutive(method.inner_cuts(motion), len(whole))))
+    return Segmentation(whole, method, moving(motion, method.pieces(motion), method.resolution))
+
+
+def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
+    """The method of that name with these parameters; a method itself takes none."""
+    if not isinstance(by, str):
+        if isinstance(by, type) or not callable(getattr(by, "inner_cuts", None)) or parameters:
+            raise SpecificationError(
+                f"expected by to be one of {list(SEGMENTERS)} with its parameters, or a method that has them, "
+                f"got {by!r}" + (f" and {parameters}" if parameters else "")
+            )
+        return by
+    check_choice("by", by, list(SEGMENTERS))
+    known = [field.name for field in fields(SEGMENTERS[by])]
+    unknown = [name for name in parameters if name not in known]
+    if unknown:
+        raise SpecificationError(f"expected parameters of by={by!r} among {known}, got {unknown[0]!r}")
+    chosen: Segmenter = SEGMENTERS[by](**parameters)
+    return chosen
+
+
+def as_recording(recording: Any) -> Trajectory:
+    """One recording, whatever way it is held."""
+    if isinstance(recording, Trajectory):
+        return recording
+    if isinstance(recording, np.ndarray) and recording.ndim <= 2 and recording.dtype != object:
+        return Demonstrations.from_arrays([recording])[0]
+    several = Demonstrations.of(recording)
+    if len(several) != 1:
+        raise TrajectoryError(f"expected one recording, got {len(several)} movements; pass them one by one")
+    return several[0]
+
+
+def enough_samples(pieces: Rows) -> Rows:
+    """Pieces of fewer samples than a trajectory needs join the one before, the first one the one after."""
+    starts = [0]
+    for start in pieces[1:, 0].tolist():
+        if start - starts[-1] >= MIN_SAMPLES and pieces[-1, 1] - start >= MIN_SAMPLES:
+            starts.append(start)
+    return np.column_stack((starts, [*starts[1:], pieces[-1, 1]])).astype(np.intp)
+
+
+def moving(motion: Motion, pieces: Rows, resolution: float) -> Rows:
+    """Those pieces that move, narrowed to their motion."""
+    padded = np.append(motion.speed, 0.0)
+    fastest = np.maximum.reduceat(padded, pieces.ravel())[::2]
+    pieces = pieces[fastest > 2.0 * max(resolution * motion.peak, 2.0 * motion.noise)]
+    narrow = onset_rows(motion, pieces)
+    return narrow[narrow[:, 1] - narrow[:, 0] >= MIN_SAMPLES]

@@ -1,0 +1,100 @@
+"""Compiled twins of the loops over evenly sampled movements."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.movements.trajectories._locate import locate
+from kineme.runtime.compiled import jit
+
+
+@jit
+def fill_even_rows(block, rows):  # type: ignore[no-untyped-def]
+    """Movements (n, T, d) as rows (n, d, T) minus their start; see `resample.even_rows`."""
+    n, n_samples, n_dims = block.shape
+    for i in range(n):
+        for k in range(n_dims):
+            row, start = rows[i, k], block[i, 0, k]
+            for t in range(n_samples):
+                row[t] = block[i, t, k] - start
+
+
+@jit
+def fill_extents(positions, offsets, extents):  # type: ignore[no-untyped-def]
+    """Largest minus smallest of each movement and dimension, in one pass; see `resample.extents_of`."""
+    n, n_dims = extents.shape
+    for i in range(n):
+        for k in range(n_dims):
+            low = high = positions[offsets[i], k]
+            for t in range(offsets[i] + 1, offsets[i + 1]):
+                low, high = min(low, positions[t, k]), max(high, positions[t, k])
+            extents[i, k] = high - low
+
+
+@jit
+def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no-untyped-def]
+    """Quantile of the gaps of each movement, 0 where no gap is close; see `close_stamps.merge_close`."""
+    longest = 0
+    for i in range(len(steps)):
+        longest = max(longest, offsets[i + 1] - offsets[i])
+    gaps, range_bits = np.empty(longest), np.empty(2, np.int64)
+    gap_bits, ends = gaps.view(np.int64), range_bits.view(np.float64)  # bits order positive numbers, and are quicker
+    for i in range(len(steps)):
+        own = times[offsets[i] : offsets[i + 1]]
+        n_gaps = len(own) - 1
+        for j in range(n_gaps):
+            gaps[j] = own[j + 1] - own[j]
+        low, high = gap_bits[0], gap_bits[0]
+        for j in range(n_gaps):
+            low = min(low, gap_bits[j])
+        for j in range(n_gaps):
+            high = max(high, gap_bits[j])
+        range_bits[0], range_bits[1] = low, high
+        at = int(quantile * n_gaps)
+        steps[i] = np.partition(gaps[:n_gaps], at)[at] if ends[0] < share * ends[1] else 0.0
+
+
+@jit
+def any_closer(times, offsets, share):  # type: ignore[no-untyped-def]
+    """Whether two stamps of any movement are closer than a share of its mean step; see `spread_close`."""
+    n_close = 0
+    for i in range(len(offsets) - 1):
+        first, last = offsets[i], offsets[i + 1] - 1
+        least = share * (times[last] - times[first]) / (last - first)
+        for j in range(first, last):
+            n_close += times[j + 1] - times[j] < least  # a sum has no branch and becomes vector instructions
+    return n_close > 0
+
+
+@jit
+def fill_arc_rows(paths, a, rows):  # type: ignore[no-untyped-def]
+    """Paths (n, d, T) at even values of their phase, (n, d, S); see `arc_length.resample_by_arc_length`."""
+    n, n_dims, n_samples = paths.shape
+    n_points = rows.shape[2]
+    phase, interval, local = np.zeros(n_samples), np.empty(n_points, np.int64), np.empty(n_points)
+    for i in range(n):
+        phase[:] = 0.0
+        for k in range(n_dims):
+            path = paths[i, k]
+            for t in range(n_samples - 1):
+                step = path[t + 1] - path[t]
+                phase[t + 1] += step * step
+        for t in range(n_samples):
+            phase[t] = np.sqrt(phase[t])
+        for t in range(1, n_samples):
+            phase[t] += phase[t - 1]
+        total = phase[n_samples - 1]
+        share = a if total > 0.0 else 0.0
+        per_length = share / total if total > 0.0 else 0.0
+        per_sample = (1.0 - share) / (n_samples - 1)
+        for t in range(n_samples):
+            phase[t] = per_length * phase[t] + per_sample * t
+        locate(phase, interval, local)
+        for p in range(n_points):
+            j = interval[p]
+            local[p] = min(1.0, local[p] / (phase[j + 1] - phase[j]))
+        for k in range(n_dims):
+            path, row = paths[i, k], rows[i, k]
+            for p in range(n_points):
+                j = interval[p]
+                row[p] = path[j] + local[p] * (path[j + 1] - path[j])

@@ -1,0 +1,123 @@
+"""Samples that were taken at nearly the same time, made one before a spline goes through them.
+
+An interpolating spline turns the noise between two samples into a slope, by dividing it by the time between
+them: the closer they are, the wilder the path between their neighbors. With 0.2 % of noise and one gap in twenty
+200 times shorter than the others, the learned path is off by 0.20 % of the extent (median of 60 movements; 0.96 % at
+worst). With such samples made one it is off by 0.077 % (0.098 %), as on even stamps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.validation import MIN_SAMPLES, Array
+
+#: Samples are close when less than this share of the movement's usual step lies between them. Of 0.05, 0.1, 0.2 and 0.5
+#: the largest that leaves stamps with a jitter of up to 80 % of a step as they are, however few. At random stamps, with
+#: 10 % of noise, it is enough for rhythms: none of 100 is refused, against 76 (300 samples, 3.3 periods).
+SHARE = 0.1
+_QUANTILE = 0.75  # of a movement's gaps: its usual step, even where every stamp comes twice or gaps are missing samples
+
+#: Share of a movement's mean step below which a smoothing spline, whose equations divide by squares of the gaps, loses
+#: more digits than a gap of that length costs: the path is off by 4e-6 of its extent, and by all of it at 1e-7.
+CLOSEST = 1e-5
+
+_OPERATIONS_PER_SAMPLE = 3
+
+
+def merge_close(
+    times: Array, positions: Array, offsets: NDArray[np.intp]
+) -> tuple[Array, Array, NDArray[np.intp]] | None:
+    """Replace each group of close samples by its mean time and mean position.
+
+    A group is shorter than `SHARE` of the usual step, the upper quartile of the movement's gaps. First and last
+    samples stay where they are, and no movement keeps fewer than four. Where close samples follow each other for
+    longer than a usual step, the recording is denser there on purpose, and is left as it is.
+
+    Parameters
+    ----------
+    times, positions : ndarray of shape (total,) and (total, d)
+        Samples of all movements.
+    offsets : ndarray of shape (n + 1,)
+        Where each movement begins.
+
+    Returns
+    -------
+    times, positions, offsets
+        Of the samples that are left; None where no samples are close, the usual case.
+    """
+    steps = _usual_steps(times, offsets)
+    if not steps.any():
+        return None
+    joined = _joined(times, offsets, steps)
+    if not joined.any():
+        return None
+    heads = np.flatnonzero(~joined)
+    counts = np.diff(np.append(heads, len(times)))
+    # Means of differences: they lie within their group after rounding too.
+    merged_times = times[heads] + np.add.reduceat(times - np.repeat(times[heads], counts), heads) / counts
+    away = np.add.reduceat(positions - np.repeat(positions[heads], counts, axis=0), heads)
+    merged_positions = positions[heads] + away / counts[:, None]
+    merged_offsets = np.searchsorted(heads, offsets)
+    for kept, of in ((merged_offsets[:-1], offsets[:-1]), (merged_offsets[1:] - 1, offsets[1:] - 1)):
+        merged_times[kept], merged_positions[kept] = times[of], positions[of]
+    return merged_times, merged_positions, merged_offsets
+
+
+def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
+    """Stamps (total,) of which no two follow each other by less than `CLOSEST`; later ones give way.
+
+    Movement by movement, so that none depends on the others; the usual case is that none has such stamps.
+    """
+    if use_compiled(len(times)):
+        any_closer = compiled_module("kineme.movements.trajectories._compiled").any_closer
+        if not any_closer(times, offsets, CLOSEST):
+            return times
+    lengths, durations = np.diff(offsets), times[offsets[1:] - 1] - times[offsets[:-1]]
+    least = CLOSEST * durations / (lengths - 1)
+    short = np.diff(times) < np.repeat(least, lengths)[1:]
+    short[offsets[1:-1] - 1] = False
+    if not short.any():
+        return times
+    spread = times.copy()
+    for i in np.unique(np.searchsorted(offsets, np.flatnonzero(short), side="right") - 1):
+        own = slice(offsets[i], offsets[i + 1])
+        missing = least[i] - np.diff(times[own])
+        spread[own][1:] += np.cumsum(np.maximum(missing, 0.0))
+    return spread
+
+
+def _joined(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
+    """Whether each sample belongs to the group of the one before; `steps` are 0 where nothing is to be joined."""
+    lengths, total = np.diff(offsets), len(times)
+    step = np.repeat(steps, lengths)
+    joined = np.zeros(total, dtype=bool)
+    joined[1:] = np.diff(times) < SHARE * step[1:]
+    joined[offsets[:-1]] = False
+    heads = np.flatnonzero(~joined)
+    counts = np.diff(np.append(heads, total))
+    spans = times[heads + counts - 1] - times[heads]
+    joined &= np.repeat(spans <= step[heads], counts)  # longer: a dense stretch
+    since = times - np.repeat(times[heads], counts)
+    part = np.floor(np.divide(since, SHARE * step, out=np.zeros(total), where=joined))
+    joined[1:] &= part[1:] == part[:-1]
+    too_few = lengths - np.add.reduceat(joined, offsets[:-1], dtype=np.intp) < MIN_SAMPLES
+    return joined & ~np.repeat(too_few, lengths)
+
+
+def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:
+    """Upper quartile of the gaps of each movement, shape (n,); 0 where none can be close, the usual case."""
+    steps = np.zeros(len(offsets) - 1)
+    if use_compiled(_OPERATIONS_PER_SAMPLE * len(times)):
+        fill = compiled_module("kineme.movements.trajectories._compiled").fill_usual_steps
+        fill(times, offsets, SHARE, _QUANTILE, steps)
+        return steps
+    bounds = np.column_stack((offsets[:-1], offsets[1:] - 1)).ravel()[:-1]  # of the gaps within each movement
+    gaps = np.diff(times)
+    shortest, longest = np.minimum.reduceat(gaps, bounds)[::2], np.maximum.reduceat(gaps, bounds)[::2]
+    for i in np.flatnonzero(shortest < SHARE * longest):
+        own = gaps[offsets[i] : offsets[i + 1] - 1]
+        steps[i] = np.partition(own, k := int(_QUANTILE * len(own)))[k]
+    return steps

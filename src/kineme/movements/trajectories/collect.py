@@ -1,0 +1,235 @@
+"""From what users hold, lists of arrays or trajectories, to one contiguous block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.movements.trajectories.close_stamps import merge_close, spread_close
+from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.validation import (
+    Array,
+    as_positions,
+    as_times,
+    check_extents,
+    check_finite,
+    check_times,
+    describe,
+    refuse_lossy,
+)
+
+Names = tuple[str | None, ...] | None
+
+_EVEN = 1e-9  # stamps off an even grid by less than this share of a step count as even
+_SAMPLES_AT_ONCE = 65_536  # stamps looked at together: uneven ones are found soon, and temporaries stay in the cache
+
+
+@dataclass(frozen=True, eq=False)
+class Movements:
+    """The block behind `Demonstrations`: validated, contiguous, read-only.
+
+    `times` is None for movements evenly sampled over their `durations`; `stamps` writes them out.
+    """
+
+    positions: Array  # (total, d)
+    offsets: NDArray[np.intp]  # (n + 1,)
+    durations: Array  # (n,)
+    times: Array | None = None  # (total,)
+    labels: NDArray[Any] | None = None  # (n,)
+    names: Names = None
+
+    def __post_init__(self) -> None:
+        for field in ("positions", "offsets", "durations", "times", "labels"):
+            if (value := getattr(self, field)) is not None:
+                view = value.view()
+                view.setflags(write=False)
+                object.__setattr__(self, field, view)
+
+    @cached_property
+    def stamps(self) -> Array:
+        """Time stamps of all samples, (total,)."""
+        if self.times is not None:
+            return self.times
+        lengths = np.diff(self.offsets)
+        step = np.repeat(self.durations / (lengths - 1), lengths)
+        stamps: Array = step * (np.arange(len(self.positions)) - np.repeat(self.offsets[:-1], lengths))
+        stamps.setflags(write=False)
+        return stamps
+
+    @cached_property
+    def even_length(self) -> int | None:
+        """Samples per movement when all have equally many, evenly spaced; else None."""
+        lengths = np.diff(self.offsets)
+        if (lengths != lengths[0]).any():
+            return None
+        n_samples = int(lengths[0])
+        if self.times is None:
+            return n_samples
+        n_rows = max(1, _SAMPLES_AT_ONCE // n_samples)
+        tiles = (slice(start, start + n_rows) for start in range(0, len(lengths), n_rows))
+        return n_samples if all(map(self._is_even, tiles)) else None
+
+    def _is_even(self, some: slice) -> bool:
+        """Whether the stamps of some movements, all of one length, are evenly spaced."""
+        assert self.times is not None
+        t = self.times.reshape(len(self.durations), -1)[some]
+        step = self.durations[some, None] / (t.shape[1] - 1)
+        deviation = np.abs(t - t[:, :1] - step * np.arange(t.shape[1]))
+        return bool((deviation <= _EVEN * step + 2 * np.spacing(np.abs(t[:, -1:]))).all())
+
+    @cached_property
+    def separated(self) -> Movements:
+        """The same movements, samples at nearly the same time made one, for interpolation; usually themselves."""
+        merged = None if self.times is None else merge_close(self.times, self.positions, self.offsets)
+        if merged is None:
+            return self
+        return replace(self, times=merged[0], positions=merged[1], offsets=merged[2])
+
+    @cached_property
+    def spread(self) -> Array:
+        """Time stamps (total,), none so close to the next that a smoothing spline loses its digits."""
+        return self.stamps if self.times is None else spread_close(self.times, self.offsets)
+
+    def take(self, chosen: NDArray[np.intp]) -> Movements:
+        """The chosen movements, in that order, copied into a block of their own."""
+        if len(chosen) == 0:
+            raise TrajectoryError("expected at least one movement, got an empty selection")
+        lengths = np.diff(self.offsets)[chosen]
+        offsets = np.concatenate(([0], np.cumsum(lengths)))
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[:-1][chosen] - offsets[:-1], lengths)
+        return Movements(
+            self.positions[rows],
+            offsets,
+            self.durations[chosen],
+            None if self.times is None else self.times[rows],
+            None if self.labels is None else self.labels[chosen],
+            None if self.names is None else tuple(self.names[i] for i in chosen),
+        )
+
+
+def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
+    """Join trajectories, which have been checked one by one already."""
+    trajectories = list(trajectories)
+    for i, one in enumerate(trajectories):
+        if not isinstance(one, Trajectory):
+            raise TrajectoryError(
+                f"expected a sequence of Trajectory, got {type(one).__name__} at index {i}; "
+                "use Demonstrations.from_arrays for arrays"
+            )
+    names = tuple(one.name for one in trajectories)
+    positions, offsets = _join([one.positions for one in trajectories], names)
+    times = np.concatenate([one.times for one in trajectories])
+    labels = [one.label for one in trajectories]
+    labeled = any(label is not None for label in labels)
+    return Movements(
+        positions,
+        offsets,
+        times[offsets[1:] - 1] - times[offsets[:-1]],
+        times,
+        label_array(labels, len(labels), names) if labeled else None,
+        names if any(names) else None,
+    )
+
+
+def collect_arrays(
+    arrays: Any,
+    labels: ArrayLike | None,
+    times: Sequence[ArrayLike] | Array | None,
+    names: Sequence[str | None] | None,
+    copy: bool,
+) -> Movements:
+    """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
+    is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
+    if names is not None:
+        _check_sized(names, "names as a list, one for each movement")
+    if not is_block:
+        _check_sized(arrays, "movements as a list of (T, d) arrays or one (n, T, d) array")
+    positions, offsets = _from_block(arrays, copy) if is_block else _from_list(arrays, names)
+    n = len(offsets) - 1
+    if names is not None and len(names) != n:
+        raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
+    check_finite(positions, offsets, names, "positions")
+    check_extents(positions, offsets, names)
+    stamps = None if times is None else _join_times(times, offsets, names)
+    durations = np.ones(n) if stamps is None else stamps[offsets[1:] - 1] - stamps[offsets[:-1]]
+    return Movements(
+        positions,
+        offsets,
+        durations,
+        stamps,
+        None if labels is None else label_array(labels, n, names),
+        None if names is None else tuple(names),
+    )
+
+
+def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp]]:
+    if block.ndim != 3:
+        raise TrajectoryError(
+            f"expected an array of shape (n, T, d), movements by samples by dimensions, got shape {block.shape}; "
+            "pass one movement as [array]"
+        )
+    if len(block) == 0:
+        raise TrajectoryError("expected at least one movement, got none")
+    if block.dtype.kind not in "biuf":
+        raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
+    refuse_lossy(block, "the block")
+    as_positions(block[0], "every movement of the block")
+    n, n_samples, n_dims = block.shape
+    flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
+    return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
+
+
+def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
+    known = tuple(names) if names is not None and len(names) == len(arrays) else None
+    return _join(_check_each(as_positions, (arrays,), known), known)
+
+
+def _check_sized(value: Any, expected: str) -> None:
+    if not hasattr(value, "__len__") or isinstance(value, (str, bytes, dict)) or getattr(value, "ndim", 1) == 0:
+        raise TrajectoryError(f"expected {expected}, got {type(value).__name__}")
+
+
+def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...], names: Names) -> list[Array]:
+    """Check movement by movement; only an error costs the time to say which one it was."""
+    try:
+        return list(map(check, *columns))
+    except TrajectoryError:
+        for i, one in enumerate(zip(*columns, strict=True)):
+            check(*one, who=describe(i, names))
+        raise
+
+
+def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
+    if not checked:
+        raise TrajectoryError("expected at least one movement, got none")
+    lengths = np.fromiter(map(len, checked), np.intp, len(checked))
+    try:
+        return np.concatenate(checked), np.concatenate(([0], np.cumsum(lengths)))
+    except ValueError:
+        n_dims = checked[0].shape[1]
+        odd = next(i for i, x in enumerate(checked) if x.shape[1] != n_dims)
+        raise TrajectoryError(
+            f"{describe(odd, names)}: expected {n_dims} dimensions as in trajectory 0, "
+            f"got {checked[odd].shape[1]}; movements of one batch share their dimensions"
+        ) from None
+
+
+def _join_times(
+    times: Sequence[ArrayLike] | Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None
+) -> Array:
+    n, lengths = len(offsets) - 1, np.diff(offsets)
+    if isinstance(times, np.ndarray) and times.dtype != object and times.ndim == 1:
+        times = [times] * n
+    _check_sized(times, "times as a list of (T,) arrays or one (T,) array")
+    if len(times) != n:
+        raise TrajectoryError(f"expected times for each of the {n} movements, got {len(times)}")
+    stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
+    check_times(stamps, offsets, names)
+    return stamps

@@ -1,0 +1,182 @@
+"""Many movements of unequal length and sampling, held contiguously."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.movements.trajectories.collect import Movements, collect_arrays, collect_trajectories
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.validation import Array
+
+
+class Demonstrations(Sequence[Trajectory]):
+    """An immutable sequence of `Trajectory`, stored as one block so that batch work never loops in Python.
+
+    Parameters
+    ----------
+    trajectories : sequence of Trajectory
+        All of the same number of dimensions. For plain arrays use `from_arrays`.
+
+    Attributes
+    ----------
+    positions : ndarray of shape (total, d)
+        All samples of all movements, one movement after the other; read-only.
+    offsets : ndarray of shape (n + 1,)
+        Movement i holds the samples ``offsets[i]:offsets[i + 1]``.
+    labels : ndarray of shape (n,) or None
+        The action that each movement shows.
+    names : tuple of str or None
+        Where each movement comes from.
+    steps : tuple
+        The preprocessing steps applied so far, in order.
+
+    Raises
+    ------
+    TrajectoryError
+        No movement at all, or movements of different dimensions; the message names the first culprit.
+    """
+
+    def __init__(self, trajectories: Sequence[Trajectory]) -> None:
+        self._hold(collect_trajectories(trajectories))
+
+    def _hold(self, movements: Movements, steps: tuple[Any, ...] = ()) -> None:
+        self.movements = movements
+        self.steps = steps
+
+    @classmethod
+    def from_arrays(
+        cls,
+        arrays: Sequence[ArrayLike] | Array,
+        labels: ArrayLike | None = None,
+        times: Sequence[ArrayLike] | Array | None = None,
+        names: Sequence[str | None] | None = None,
+        copy: bool = True,
+    ) -> Demonstrations:
+        """Collect plain arrays.
+
+        Parameters
+        ----------
+        arrays : sequence of n arrays (T_i, d), or one array (n, T, d)
+            Positions.
+        labels : array_like of shape (n,), optional
+            The action that each movement shows.
+        times : sequence of n arrays (T_i,), or one array (T,) shared by all, optional
+            Time stamps [s]. Without them, each movement is taken as evenly sampled over one second.
+        names : sequence of n str, optional
+            Where each movement comes from.
+        copy : bool, default True
+            Whether to copy an (n, T, d) array that could be used in place. Lists are always copied.
+        """
+        return cls.of_movements(collect_arrays(arrays, labels, times, names, copy))
+
+    @classmethod
+    def of(cls, movements: Any) -> Demonstrations:
+        """Whatever public functions accept as movements, as `Demonstrations`.
+
+        `Demonstrations` themselves, one `Trajectory`, a sequence of them, a sequence of (T_i, d) arrays
+        or one (n, T, d) array; the last is used without a copy.
+        """
+        if isinstance(movements, Demonstrations):
+            return movements
+        if isinstance(movements, Trajectory):
+            return cls([movements])
+        if isinstance(movements, Sequence) and len(movements) and isinstance(movements[0], Trajectory):
+            return cls(movements)
+        return cls.from_arrays(movements, copy=False)
+
+    @classmethod
+    def of_movements(cls, movements: Movements, steps: tuple[Any, ...] = ()) -> Demonstrations:
+        """Hold a block that has been checked already."""
+        new = cls.__new__(cls)
+        new._hold(movements, steps)
+        return new
+
+    @property
+    def positions(self) -> Array:  # noqa: D102 - documented by the class
+        return self.movements.positions
+
+    @property
+    def offsets(self) -> NDArray[np.intp]:  # noqa: D102
+        return self.movements.offsets
+
+    @property
+    def labels(self) -> NDArray[Any] | None:  # noqa: D102
+        return self.movements.labels
+
+    @property
+    def names(self) -> tuple[str | None, ...] | None:  # noqa: D102
+        return self.movements.names
+
+    @property
+    def times(self) -> Array:
+        """Time stamps of all samples, shape (total,) [s]."""
+        return self.movements.stamps
+
+    @property
+    def durations(self) -> Array:
+        """Time from first to last sample of each movement, shape (n,) [s]."""
+        return self.movements.durations
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return int(self.positions.shape[1])
+
+    @property
+    def lengths(self) -> NDArray[np.intp]:
+        """Number of samples of each movement, shape (n,)."""
+        return np.diff(self.offsets)
+
+    @property
+    def even_length(self) -> int | None:
+        """The common number of samples when all movements have it and are evenly sampled, else None."""
+        return self.movements.even_length
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
+    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
+        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
+        if isinstance(index, (int, np.integer)):
+            if not -len(self) <= index < len(self):
+                raise IndexError(f"expected an index below {len(self)}, got {index}")
+            return self._trajectory(int(index) % len(self))
+        return self.of_movements(self.movements.take(np.arange(len(self))[index]), self.steps)
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return (self._trajectory(i) for i in range(len(self)))
+
+    def _trajectory(self, i: int) -> Trajectory:
+        """Movement i; built without checking again, and sharing this block's memory."""
+        rows = slice(self.offsets[i], self.offsets[i + 1])
+        one = object.__new__(Trajectory)
+        object.__setattr__(one, "times", self.times[rows])
+        object.__setattr__(one, "positions", self.positions[rows])
+        object.__setattr__(one, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
+        object.__setattr__(one, "name", None if self.names is None else self.names[i])
+        return one
+
+    def __repr__(self) -> str:
+        n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
+        low, high = int(self.lengths.min()), int(self.lengths.max())
+        samples = f"{low}" if low == high else f"{low} to {high}"
+        return f"Demonstrations({len(self)} movements, {self.n_dims} dims, {samples} samples each{n_labels})"
+
+
+def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
+    """The labels, or an error that says how to give them."""
+    if demonstrations.labels is None:
+        raise TrajectoryError(
+            "expected labeled demonstrations, got none with a label; "
+            "pass labels= to Demonstrations.from_arrays or label= to each Trajectory"
+        )
+    return demonstrations.labels

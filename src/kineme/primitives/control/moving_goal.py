@@ -1,0 +1,57 @@
+"""The goal of a movement under control: it may change at any time, at once or gradually."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kineme.primitives.control.plan import Plan
+from kineme.validation import Array
+
+_ARRIVED = 1e-14  # of the goal's distance from the start: rounding
+
+
+class MovingGoal:
+    """A goal relative to x0, approached with a time constant: ``filter dg/dt = target - g``.
+
+    Attributes
+    ----------
+    target : ndarray of shape (d,)
+        The goal that was set last.
+    lag : ndarray of shape (d,) or None
+        Goal in force minus target; None where it has arrived.
+    """
+
+    def __init__(self, plan: Plan, target: Array, time_constant: float | None) -> None:
+        self._plan, self._time_constant = plan, time_constant
+        self.target, self._ratio = target, plan.ratio(target)
+        self.lag: Array | None = None
+
+    @property
+    def now(self) -> Array:
+        """The goal in force."""
+        return self.target if self.lag is None else self.target + self.lag
+
+    def aim(self, target: Array) -> bool:
+        """Set a target; False, and nothing changes, where the formulation cannot go."""
+        if (target == self.target).all():
+            return True
+        ratio = self._plan.ratio(target)
+        if not np.isfinite(ratio).all():
+            return False
+        if self._time_constant is not None:
+            self.lag = self.now - target
+        self.target, self._ratio = target, ratio
+        return True
+
+    def follow(self, dt: float) -> tuple[Array, Array]:
+        """Go on by dt; returns the mean of the goal in force meanwhile and the ratio that belongs to it."""
+        if self.lag is None or self._time_constant is None:
+            return self.target, self._ratio
+        passed = dt / self._time_constant
+        mean = self.target + self.lag * (-math.expm1(-passed) / passed if passed > 0 else 1.0)
+        self.lag = self.lag * math.exp(-passed)
+        if np.abs(self.lag).max() <= _ARRIVED * np.abs(self.target).max():
+            self.lag = None
+        return mean, self._plan.ratio(mean)

@@ -1,0 +1,82 @@
+"""One step in plain NumPy: the definition, for every formulation, phase and basis there is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kineme.primitives.control.obstacles import steering
+from kineme.primitives.control.plan import Influences, Plan
+from kineme.primitives.control.spring import NODES, step_matrices
+from kineme.validation import Array
+
+
+def advance(plan: Plan, state: Array, u: float, du: float, influences: Influences) -> Array:
+    """Carry position and dx/du from u to u + du, and add x'' there.
+
+    Spring, damper, forcing term and all that is held over the step are exact, for any du. Obstacles enter by
+    the midpoint rule: their term, held over a first half step, gives the state in the middle, whose term is held over
+    the whole; so the error falls as du^2.
+
+    Parameters
+    ----------
+    state : ndarray of shape (2, d)
+        Relative to x0.
+
+    Returns
+    -------
+    ndarray of shape (3, d)
+    """
+    with np.errstate(all="ignore"):  # the caller looks at the result
+        return _advance(plan, state, u, du, influences)
+
+
+def _advance(plan: Plan, state: Array, u: float, du: float, influences: Influences) -> Array:
+    push, obstacles = influences.push, influences.obstacles
+    if not len(obstacles):
+        return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)
+    turn = steering(plan.avoidance, state, obstacles, influences.obstacle_velocities)
+    middle = _carry(plan, state, u, 0.5 * du, influences, push + turn)
+    turn = _steering_later(plan, middle, 0.5 * du, influences)
+    end = _carry(plan, state, u, du, influences, push + turn)
+    return _with_acceleration(plan, end, u + du, influences, push + _steering_later(plan, end, du, influences))
+
+
+def _steering_later(plan: Plan, state: Array, passed: float, influences: Influences) -> Array:
+    velocities = influences.obstacle_velocities
+    return steering(plan.avoidance, state, influences.obstacles + passed * velocities, velocities)
+
+
+def _carry(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
+    """Position and dx/du (2, d) at u + du, under a constant push."""
+    to_end = min(max(1.0 - u, 0.0), du)  # an ungated forcing term has a kink at u = 1
+    for begin, length in ((u, to_end), (u + to_end, du - to_end)):
+        if length > 0:
+            state = _carry_smoothly(plan, state, begin, length, influences, push)
+    return state
+
+
+def _carry_smoothly(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
+    n = math.ceil(plan.intervals * du)
+    h = du / n
+    carry, impulse = step_matrices(plan.K, plan.D, h)
+    nodes = u + h * (np.arange(n)[:, None] + NODES)
+    forcing = _forcing(plan, nodes.ravel(), influences, push).reshape(n, len(NODES), -1)
+    state = state.copy()
+    state[0] -= influences.goal
+    for driven in np.einsum("qz,kqd->kzd", impulse, forcing):
+        state = carry @ state + driven
+    state[0] += influences.goal
+    return state
+
+
+def _forcing(plan: Plan, u: Array, influences: Influences, push: Array) -> Array:
+    """What acts besides spring and damper at u (T,), shape (T, d)."""
+    shape = plan.shape(u)
+    return shape[:, :-1] * influences.ratio + shape[:, -1:] * influences.goal + push
+
+
+def _with_acceleration(plan: Plan, state: Array, u: float, influences: Influences, push: Array) -> Array:
+    forcing = _forcing(plan, np.array([u]), influences, push)
+    return np.vstack((state, plan.K * (influences.goal - state[0]) - plan.D * state[1] + forcing))

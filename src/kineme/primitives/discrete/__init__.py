@@ -1,0 +1,1 @@
+"""Discrete DMPs: phase, basis, formulation, fit; encode and decode as matrix products."""

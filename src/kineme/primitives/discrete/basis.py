@@ -1,0 +1,85 @@
+"""The Gaussian basis functions of the forcing term."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kineme.errors import SpecificationError
+from kineme.primitives.discrete.phase import ExponentialPhase
+from kineme.validation import Array, check_choice, check_count, check_number
+
+GATINGS = ("none", "phase")
+MOST_BASIS = 2_000  # the response to N functions is made of 32 N^2 numbers
+
+
+@dataclass(frozen=True)
+class GaussianBasis:
+    """Basis functions ``psi_i(s) = exp(-h_i (s - c_i)^2)``, Eq. (3), with centers equally spaced in time.
+
+    Parameters
+    ----------
+    n_basis : int
+        Number N of basis functions.
+    overlap : float
+        Value of each function at the next center, between 0 and 1. It sets the widths:
+        ``h_i = -ln(overlap) / (c_{i+1} - c_i)^2``.
+    gating : {"none", "phase"}
+        Whether f carries the factor s: ``f = sum psi w / sum psi`` (Eq. 2) or that times s. Papers mix
+        the two and call both f.
+    phase : ExponentialPhase
+        Maps time to s.
+    """
+
+    n_basis: int
+    overlap: float
+    gating: str
+    phase: ExponentialPhase
+
+    def __post_init__(self) -> None:
+        check_count("n_basis", self.n_basis, 2, most=MOST_BASIS)
+        check_number("overlap", self.overlap, above=0.0)
+        if self.overlap >= 1:
+            raise SpecificationError(f"expected overlap to be below 1, got {self.overlap!r}")
+        check_choice("gating", self.gating, GATINGS)
+
+    @property
+    def centers(self) -> Array:
+        """Centers c_i, shape (N,), from 1 down to the phase's end."""
+        return self.phase(np.linspace(0.0, 1.0, self.n_basis))
+
+    @property
+    def widths(self) -> Array:
+        """Factors h_i, shape (N,)."""
+        gaps = -np.diff(self.centers)
+        return -math.log(self.overlap) / np.append(gaps, gaps[-1]) ** 2
+
+    def activations(self, u: Array) -> Array:
+        """Eq. (3) at normalized times u (T,), shape (T, N), up to a common factor per row.
+
+        The factor makes the largest activation of a row 1, so that far beyond the last center, where
+        every Gaussian underflows, Eq. (2) does not become 0/0.
+        """
+        exponents = self.exponents(u)
+        return np.exp(exponents - exponents.max(axis=1, keepdims=True))
+
+    def exponents(self, u: Array) -> Array:
+        """Logarithms of Eq. (3) at normalized times u (T,), shape (T, N)."""
+        return -self.widths * (self.phase(u)[:, None] - self.centers) ** 2
+
+    def design(self, u: Array) -> Array:
+        """Matrix (T, N) that maps weights w to f, Eq. (2), times s if gated."""
+        psi = self.activations(u)
+        normalized = psi / psi.sum(axis=1, keepdims=True)
+        return normalized * self.gate(u)[:, None]
+
+    def gate(self, u: Array) -> Array:
+        """The factor that f carries besides the basis, shape (T,): s if gated, else 1.
+
+        Eq. (2) says nothing of u > 1, phases that no demonstration has seen; there the last weight would hold the
+        movement off its goal for ever. So past the end an ungated f fades with the phase, as ``s / s(tau)``.
+        """
+        s = self.phase(u)
+        return s if self.gating == "phase" else np.minimum(1.0, s / self.phase.end)

@@ -1,0 +1,68 @@
+"""Two ways to fit the weights, each one matrix from a resampled movement to its weights."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kineme.primitives.discrete.basis import GaussianBasis
+from kineme.primitives.discrete.differentiation import differentiation_matrices
+from kineme.primitives.discrete.formulations import Formulation
+from kineme.primitives.discrete.response import Response
+from kineme.validation import Array
+
+FITS = ("forcing", "trajectory")
+REGRESSIONS = ("local", "ridge")
+
+
+def forcing_target(basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array) -> Array:
+    """The matrix (T, T) from y = x - x0 to scale * f, the equation of the formulation solved for it.
+
+    ``scale f = (D2 + D D1 + K) y - (K + coupling(s)) (g - x0)``; the last sample of y is g - x0.
+    """
+    D1, D2 = differentiation_matrices(len(u))
+    target = D2 + damping * D1 + stiffness * np.eye(len(u))
+    target[:, -1] -= stiffness + formulation.coupling(stiffness, basis.phase(u))
+    return target
+
+
+def local_regression(basis: GaussianBasis, u: Array) -> Array:
+    """Locally weighted regression (N, T): each weight fits the target around its own center.
+
+    ``w_i = sum_t psi_i(s_t) q_t y_t / sum_t psi_i(s_t) q_t^2`` with the gate q = 1 or s.
+    """
+    exponents, gate = basis.exponents(u), basis.gate(u)[:, None]
+    psi = np.exp(exponents - exponents.max(axis=0))  # a factor per function cancels, and none underflows everywhere
+    return np.asarray((psi * gate / (psi * gate**2).sum(axis=0)).T)
+
+
+def ridge_regression(design: Array, ridge: float) -> Array:
+    """Least squares with a penalty on ``||w||^2`` (N, T), relative to the mean square of a design column."""
+    n_points, n_basis = design.shape
+    penalty = math.sqrt(ridge * np.sum(design**2) / n_basis)
+    rows = np.vstack((design, penalty * np.eye(n_basis)))  # not the normal equations: they square the condition
+    return np.asarray(np.linalg.lstsq(rows, np.eye(n_points + n_basis, n_points), rcond=None)[0])
+
+
+def trajectory_regression(response: Response, stiffness: float, ridge: float) -> tuple[Array, Array]:
+    """Least squares of the path itself on the decode matrix, with a penalty on the weights' curvature.
+
+    Minimizes ``mean (y - Phi W - goal (g - x0) - velocity v0)^2 + ridge mean (diff^2 W / K)^2`` over W and v0:
+    no numerical derivative of the data occurs.
+
+    Returns
+    -------
+    weights : ndarray of shape (N, T)
+        From y = x - x0 to W.
+    velocity : ndarray of shape (T,)
+        From y to v0.
+    """
+    n_points, n_basis = response.Phi[0].shape
+    columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0]))  # unit: W / K, comparable to y
+    curvature = np.diff(np.eye(n_basis, n_basis + 1), n=2, axis=0)
+    rows = np.vstack((columns / np.sqrt(n_points), np.sqrt(ridge / (n_basis - 2)) * curvature))
+    data = np.vstack((np.eye(n_points), np.zeros((n_basis - 2, n_points)))) / np.sqrt(n_points)
+    data[:n_points, -1] -= response.goal[0] / np.sqrt(n_points)  # the last sample of y is g - x0
+    solution = np.linalg.lstsq(rows, data, rcond=None)[0]
+    return solution[:-1] * stiffness, solution[-1]

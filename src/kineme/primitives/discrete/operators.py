@@ -1,0 +1,53 @@
+"""The matrices of a specification, built once and cached."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.movements.preparation.spline import spline_matrix
+from kineme.primitives.discrete.differentiation import differentiation_matrices
+from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.fits import forcing_target, local_regression, ridge_regression, trajectory_regression
+from kineme.primitives.discrete.response import Response, spring_damper_response
+from kineme.validation import Array
+
+
+class Encoder(NamedTuple):
+    """From positions relative to the start, at T even times, to a primitive's numbers."""
+
+    weights: Array  # (T, N), to W: the weights times the formulation's scale
+    velocity: Array  # (T,), to dx/du at the start
+
+
+@lru_cache(maxsize=32)
+def encoder(dmp: DMP, n_samples: int) -> Encoder:
+    """The encode matrix of `dmp` for movements of `n_samples` even samples."""
+    u = np.linspace(0.0, 1.0, dmp.n_points)
+    if dmp.fit == "trajectory":
+        weights, velocity = trajectory_regression(decoder(dmp, dmp.n_points), dmp.K, dmp.ridge_strength)
+    else:
+        local = dmp.regression == "local"
+        regression = (
+            local_regression(dmp.basis, u) if local else ridge_regression(dmp.basis.design(u), dmp.ridge_strength)
+        )
+        weights = regression @ forcing_target(dmp.basis, dmp.system, dmp.K, dmp.D, u)
+        velocity = differentiation_matrices(dmp.n_points)[0][0]
+    if n_samples != dmp.n_points:
+        resample = spline_matrix(n_samples, dmp.n_points)
+        weights, velocity = weights @ resample, velocity @ resample
+    return Encoder(np.ascontiguousarray(weights.T), velocity)
+
+
+@lru_cache(maxsize=32)
+def decoder(dmp: DMP, n_samples: int, end: float = 1.0) -> Response:
+    """The decode matrices of `dmp` at `n_samples` even times from 0 to `end` durations."""
+    return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, end, n_samples))
+
+
+@lru_cache(maxsize=32)
+def forcing_matrix(dmp: DMP, n_samples: int) -> Array:
+    """Psi_S (S, N): from weights to f at `n_samples` even times, Eq. (2)."""
+    return dmp.basis.design(np.linspace(0.0, 1.0, n_samples))

@@ -1,0 +1,202 @@
+"""A batch of learned primitives: what they hold, what they look like as features, how they replay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import SpecificationError
+from kineme.primitives.batch import Batch
+from kineme.primitives.discrete.amplitudes import safe_amplitudes
+from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.operators import forcing_matrix
+from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
+from kineme.validation import Array, check_count, check_samples
+
+if TYPE_CHECKING:
+    from kineme.primitives.control.controller import Controller
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Primitives(Batch):
+    """n primitives of d dimensions that share one specification; made by `DMP.learn`.
+
+    Attributes
+    ----------
+    dmp : DMP
+        The specification.
+    scaled_weights : ndarray of shape (n, d, N)
+        Weights times the formulation's scale: ``(g - x0) w`` (original) or ``K w`` (bio-inspired). They
+        exist for every movement, closed ones too.
+    starts, goals : ndarray of shape (n, d)
+        x0 and g, in the user's unit.
+    velocities : ndarray of shape (n, d)
+        Initial velocities, in the user's unit per second.
+    durations : ndarray of shape (n,)
+        tau [s].
+    extents : ndarray of shape (n, d)
+        Largest minus smallest position of each demonstration, the yardstick for "g is close to x0".
+    labels : ndarray of shape (n,) or None
+    names : tuple of str or None
+    """
+
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "starts": "nd",
+        "goals": "nd",
+        "velocities": "nd",
+        "durations": "n",
+        "extents": "nd",
+    }
+    SPECIFICATION = DMP
+    KIND = "primitives"
+
+    dmp: DMP
+    scaled_weights: Array
+    starts: Array
+    goals: Array
+    velocities: Array
+    durations: Array
+    extents: Array
+    labels: NDArray[Any] | None = None
+    names: tuple[str | None, ...] | None = None
+
+    @property
+    def weights(self) -> Array:
+        """Weights w of Eq. (2), shape (n, N, d).
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
+
+    def forcing(self, n_samples: int = 100) -> Array:
+        """The forcing term f, Eq. (2), at `n_samples` (S) even times, shape (n, S, d).
+
+        Contains s if the specification's gating is "phase"; never contains K or g - x0.
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
+
+    def shape_attractor(self, n_samples: int = 100) -> Array:
+        """The shape-attractor term as it acts in the equation, at `n_samples` (S) even times, shape (n, S, d).
+
+        ``(g - x0) f(s)`` in Eq. (1), ``s K (f(s)/s + x0 - x) = K f(s) + K s (x0 - x)`` in Eq. (4), with x the
+        primitive's own path. It needs no division, neither by g - x0 nor by s, so it exists for every
+        movement. Section 2.2 gives the name to the bracket without the leading s; that one grows without bound
+        as s vanishes.
+        """
+        term = self._scaled_forcing(n_samples)
+        s = self.dmp.basis.phase(np.linspace(0.0, 1.0, term.shape[2]))
+        coupling = self.dmp.system.coupling(self.dmp.K, s)
+        if coupling.any():
+            term += coupling * self._relative_path(n_samples)
+        return term.transpose(0, 2, 1)
+
+    def rollout(  # noqa: PLR0913 - a wish per parameter
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> Rollout:
+        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+
+        One primitive goes with many goals, many primitives with one goal, or as many with as many.
+
+        Parameters
+        ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            x0 and g; by default the demonstrated ones.
+        duration : float or array_like of shape (n,), optional
+            tau [s]; by default the demonstrated one. The path does not depend on it.
+        velocity : array_like of shape (d,) or (n, d), optional
+            Initial velocity, per second; by default the demonstrated one, in proportion to the tempo.
+        rate : float, optional
+            Samples per second, at least; all movements of a batch get the same number of samples, at most 50 million
+            over the number of basis functions.
+        n_samples : int, optional
+            Samples per movement; by default the specification's `n_points`. Give this or `rate`.
+        settle : float, optional
+            Go on past the duration until every dimension stays within this distance of the goal.
+
+        Returns
+        -------
+        Rollout
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal or velocity of the wrong shape; numbers of movements that do not go together.
+        SpecificationError
+            A duration of 0 or less, a rate too low to follow the dynamics.
+        DegenerateMovementError
+            The original formulation asked to move a closed or flat demonstration to another goal.
+        """
+        movement = rollout(self, start, goal, duration, velocity)
+        end = 1.0 if settle is None else settled_end(movement, settle)
+        if rate is not None and n_samples is not None:
+            raise SpecificationError("expected either rate or n_samples, got both")
+        if rate is not None:
+            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp)
+        elif n_samples is None:
+            n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return replace(movement, n_samples=n_samples, end=end)
+
+    def controller(self, dt: float, **options: Any) -> Controller:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt, **options
+            See `kineme.primitives.control.controller.Controller`: start, goal, duration, velocity, feedback, limits and
+            more.
+
+        Raises
+        ------
+        SpecificationError
+            More than one primitive; an option out of its range.
+
+        Examples
+        --------
+        >>> import kineme
+        >>> primitives = kineme.DMP().learn(kineme.load_lasa(["CShape"]))
+        >>> controller = primitives[0].controller(dt=0.002)
+        >>> controller.step(goal=[10.0, 5.0]).time
+        0.002
+        """
+        from kineme.primitives.control.controller import Controller
+
+        return Controller(self, dt, **options)
+
+    def _scale(self, feature: str) -> Array:
+        """The formulation's scale (n, d, 1), refused where it is zero."""
+        amplitude = self.goals - self.starts
+        if self.dmp.system.divides_by_amplitude:
+            amplitude = safe_amplitudes(amplitude, self.extents, self.names, feature)
+        return self.dmp.system.scale(self.dmp.K, amplitude)[:, :, None]
+
+    def _scaled_forcing(self, n_samples: int) -> Array:
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T
+
+    def _relative_path(self, n_samples: int) -> Array:
+        """Positions minus the start, shape (n, d, S)."""
+        path = self.rollout(n_samples=n_samples).positions.transpose(0, 2, 1)
+        return path - self.starts[:, :, None]

@@ -1,0 +1,99 @@
+"""The spring-damper's exact response to each part of the forcing term: the decode matrix."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.primitives.discrete.basis import GaussianBasis
+from kineme.primitives.discrete.formulations import Formulation
+from kineme.validation import Array
+
+_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_NUMBERS_AT_ONCE = 500_000  # of the forcing term: eight nodes of each stay far from filling the memory
+_STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at least
+
+
+class Response(NamedTuple):
+    """Positions, velocities and accelerations at T normalized times as linear maps of (W, g - x0, v0).
+
+    ``x - x0 = Phi[0] W + goal[0] (g - x0) + velocity[0] v0``; index 1 gives dx/du and index 2 its derivative
+    in the same way. W are the weights times the formulation's scale, v0 is dx/du at the start.
+    """
+
+    Phi: Array  # (3, T, N)
+    goal: Array  # (3, T)
+    velocity: Array  # (3, T)
+
+
+def spring_damper_response(
+    basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array
+) -> Response:
+    """Solve ``x'' = K (g - x) - D x' + F(u)`` for every basis function, the goal and the initial velocity.
+
+    The state is carried from one time to the next by the matrix exponential, which is exact for any step; the
+    forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval,
+    that is with order 16.
+
+    Parameters
+    ----------
+    u : ndarray of shape (T,)
+        Even normalized times from 0.
+    """
+    n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (basis.n_basis - 1) * (u[1] - u[0])))
+    h = (u[1] - u[0]) / n_steps
+    nodes = 0.5 * h * (_NODES + 1.0)
+    carry = transition(stiffness, damping, np.array([h]))[0]
+    # An acceleration at a node reaches the end of the step through the second column.
+    impulse = transition(stiffness, damping, h - nodes)[:, :, 1] * (0.5 * h * _NODE_WEIGHTS)[:, None]  # (8, 2)
+    starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
+    driven = np.empty((len(starts), 2, basis.n_basis + 1))  # what each step adds to (x, x')
+    for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * basis.n_basis // _NUMBERS_AT_ONCE)):
+        forcing = _forcing(basis, formulation, stiffness, (starts[some, None] + nodes).ravel())
+        driven[some] = np.einsum("qz,kqf->kzf", impulse, forcing.reshape(len(some), len(nodes), -1))
+    at_end = np.flatnonzero((starts < 1.0) & (starts + h > 1.0))
+    for k in at_end:  # one step at most: an ungated f has a kink at u = 1, which quadrature must not straddle
+        driven[k] = 0.0
+        for left, right in ((starts[k], 1.0), (1.0, starts[k] + h)):
+            inside = left + 0.5 * (right - left) * (_NODES + 1.0)
+            weighted = transition(stiffness, damping, starts[k] + h - inside)[:, :, 1] * _NODE_WEIGHTS[:, None]
+            driven[k] += 0.5 * (right - left) * weighted.T @ _forcing(basis, formulation, stiffness, inside)
+    states = np.zeros((len(u), 3, basis.n_basis + 2))
+    states[0, 1, -1] = 1.0
+    state = states[0, :2]
+    for done, added in enumerate(driven, start=1):
+        state = carry @ state
+        state[:, :-1] += added
+        if done % n_steps == 0:
+            states[done // n_steps, :2] = state
+    states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
+    states[:, 2, :-1] += _forcing(basis, formulation, stiffness, u)
+    by_part = states.transpose(1, 0, 2)
+    return Response(np.ascontiguousarray(by_part[:, :, :-2]), by_part[:, :, -2].copy(), by_part[:, :, -1].copy())
+
+
+def _forcing(basis: GaussianBasis, formulation: Formulation, stiffness: float, u: Array) -> Array:
+    """What acts besides spring and damper, per unit of each W and of g - x0, shape (T, N + 1)."""
+    return np.column_stack((basis.design(u), stiffness + formulation.coupling(stiffness, basis.phase(u))))
+
+
+def transition(stiffness: float, damping: float, h: Array) -> Array:
+    """Exponentials ``exp(A h)`` of ``A = [[0, 1], [-K, -D]]`` for steps h (m,), shape (m, 2, 2).
+
+    With a = D / 2 and ``b = sqrt(|K - a^2|)``, ``exp(A h) = [[C + a S, S], [-K S, C - a S]]``, where C and S are
+    ``e^(-a h)`` times cos(b h) and sin(b h) / b below critical damping, 1 and h at it, cosh(b h) and sinh(b h) / b
+    above. The last two are multiplied out, for they overflow, and the slow pole is ``K / (a + b)``, for a - b cancels.
+    """
+    a = 0.5 * damping
+    b = math.sqrt(abs(stiffness - a * a))
+    if b == 0.0:
+        C = np.exp(-a * h)
+        S = C * h
+    elif stiffness > a * a:
+        C, S = np.exp(-a * h) * (np.cos(b * h), np.sin(b * h) / b)
+    else:
+        slow = 0.5 * np.exp(-stiffness / (a + b) * h)
+        C, S = slow * (1.0 + np.exp(-2.0 * b * h)), -slow * np.expm1(-2.0 * b * h) / b
+    return np.stack((C + a * S, S, -stiffness * S, C - a * S), axis=1).reshape(-1, 2, 2)

@@ -1,0 +1,255 @@
+"""Moving again, in batch: any start, goal, duration and rate, as one matrix product."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.batch import Batch
+from kineme.primitives.discrete.operators import decoder
+from kineme.runtime.parallel import for_tiles
+from kineme.validation import (
+    LARGEST,
+    LARGEST_STAMP,
+    SHORTEST_STEP,
+    Array,
+    as_numbers,
+    check_number,
+    check_samples,
+    describe,
+)
+
+if TYPE_CHECKING:
+    from kineme.primitives.discrete.dmp import DMP
+    from kineme.primitives.discrete.primitives import Primitives
+
+_TILE_SAMPLES = 100_000  # numbers in one tile of the result
+_LONGEST = 10.0  # durations after which a movement that has not settled will not
+_SETTLING_SAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rollout:
+    """n generated movements of T samples each; positions and derivatives are computed when asked for.
+
+    Each of `positions`, `velocities` and `accelerations` is one product of the movements' numbers,
+    ``[W, g - x0, v0, x0]``, with the decode matrix of the specification.
+
+    Attributes
+    ----------
+    times : ndarray of shape (n, T)
+        From 0 [s].
+    """
+
+    primitives: Primitives
+    ratio: Array  # (n, d), what scale f is multiplied by
+    starts: Array  # (n, d)
+    goals: Array  # (n, d)
+    velocities_at_start: Array  # (n, d), per second
+    durations: Array  # (n,), tau
+    n_samples: int
+    end: float = 1.0  # of the last sample, in durations
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __repr__(self) -> str:
+        return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples (n, T) [s]."""
+        return self.durations[:, None] * np.linspace(0.0, self.end, self.n_samples)
+
+    @cached_property
+    def positions(self) -> Array:
+        """Positions (n, T, d), in the unit of the demonstrations."""
+        return self._derivative(0)
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Velocities (n, T, d), per second."""
+        return self._derivative(1)
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """Accelerations (n, T, d), per second squared."""
+        return self._derivative(2)
+
+    @property
+    def trajectories(self) -> Demonstrations:
+        """The movements as `Demonstrations`, with the labels and names of their primitives."""
+        return as_demonstrations(self.primitives, self.times, self.positions)
+
+    def _derivative(self, order: int) -> Array:
+        response = decoder(self.primitives.dmp, self.n_samples, self.end)
+        constant = np.full(self.n_samples, 1.0 if order == 0 else 0.0)
+        rows = [response.Phi[order].T, response.goal[order], response.velocity[order], constant]
+        matrix, n_basis = np.vstack(rows), self.primitives.dmp.n_basis
+        per_tau = (1.0 / self.durations**order)[:, None, None]
+        shared = len(self.primitives) == 1
+        weights, d = self.primitives.scaled_weights, self.starts.shape[1]
+        result = np.empty((len(self), d, self.n_samples))
+
+        def tile(start: int, stop: int) -> None:
+            chosen = slice(start, stop)
+            numbers = np.empty((stop - start, d, n_basis + 3))
+            np.multiply(
+                weights if shared else weights[chosen], self.ratio[chosen, :, None], out=numbers[:, :, :n_basis]
+            )
+            numbers[:, :, n_basis] = self.goals[chosen] - self.starts[chosen]
+            numbers[:, :, n_basis + 1] = self.velocities_at_start[chosen] * self.durations[chosen, None]
+            numbers[:, :, n_basis + 2] = self.starts[chosen]
+            # Two-dimensional on purpose: a stack of matrices would become as many small products.
+            rows = numbers.reshape(-1, n_basis + 3)
+            np.matmul(rows, matrix, out=result[chosen].reshape(len(rows), -1))
+            if order:
+                result[chosen] *= per_tau[chosen]
+
+        for_tiles(tile, len(self), max(1, _TILE_SAMPLES // (d * self.n_samples)))
+        return result.transpose(0, 2, 1)
+
+
+def as_demonstrations(primitives: Batch, times: Array, positions: Array) -> Demonstrations:
+    """Generated movements (n, T), (n, T, d) with labels and names of their primitives, one for each or one for all."""
+    labels, names = primitives.labels, primitives.names
+    if len(primitives) < len(positions):
+        labels = None if labels is None else np.repeat(labels, len(positions))
+        names = None if names is None else names * len(positions)
+    return Demonstrations.from_arrays(positions, labels, list(times), names, copy=False)
+
+
+def rollout(
+    primitives: Primitives,
+    start: ArrayLike | None,
+    goal: ArrayLike | None,
+    duration: ArrayLike | None,
+    velocity: ArrayLike | None,
+) -> Rollout:
+    """Broadcast the wishes over the primitives and check them; see `Primitives.rollout`."""
+    d = primitives.n_dims
+    wishes = {
+        "start": per_movement(start, "start", d),
+        "goal": per_movement(goal, "goal", d),
+        "velocity": per_movement(velocity, "velocity", d),
+        "duration": per_movement(duration, "duration", None),
+    }
+    n = broadcast_length(len(primitives), wishes)
+
+    def fill(name: str, default: Array) -> Array:
+        wish = wishes[name]
+        value = default if wish is None else wish
+        return np.broadcast_to(value, (n, *value.shape[1:]))
+
+    durations = fill("duration", primitives.durations)
+    check_durations("duration", durations)
+    starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
+    # A faster movement starts faster, unless the user says how it starts.
+    tempo = primitives.durations / durations
+    velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if wishes["velocity"] is None else 1.0)
+    return Rollout(
+        primitives, _ratio(primitives, goals - starts), starts, goals, velocities, durations, primitives.dmp.n_points
+    )
+
+
+def check_durations(name: str, durations: Array) -> None:
+    """Refuse durations of 0 seconds or less, and those whose squares leave the range of numbers."""
+    usable = (durations >= SHORTEST_STEP) & (durations <= LARGEST_STAMP)
+    if usable.all():
+        return
+    i = int(np.argmin(usable))
+    between = "" if durations[i] <= 0 else f" and from {SHORTEST_STEP:g} to {LARGEST_STAMP:g}"
+    raise SpecificationError(f"expected {name} above 0 seconds{between}, got {durations[i]:g} for movement {i}")
+
+
+def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
+    """A wish as (1, d) or (n, d), durations as (1,) or (n,); a number serves a movement of one dimension."""
+    if wish is None:
+        return None
+    try:
+        value = as_numbers(wish, name)
+    except TrajectoryError as error:
+        raise TrajectoryError(f"expected numbers for {name}, got {wish!r}") from error
+    if n_dims == 1 and value.ndim == 0:
+        value = value[None]
+    if n_dims is None:
+        value = value[None] if value.ndim == 0 else value
+        fits = value.ndim == 1
+    else:
+        value = value[None] if value.ndim == 1 else value
+        fits = value.ndim == 2 and value.shape[1] == n_dims
+    if not fits:
+        shape = "a number or (n,)" if n_dims is None else f"({n_dims},) or (n, {n_dims})"
+        raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(wish)}")
+    if (bad := ~np.isfinite(value)).any():
+        raise TrajectoryError(f"expected finite numbers for {name}, got {_first(value, bad)}")
+    if (bad := np.abs(value) > LARGEST).any():
+        raise TrajectoryError(
+            f"expected numbers up to {LARGEST:g} for {name}, got {_first(value, bad)}; choose another unit"
+        )
+    return value
+
+
+def _first(value: Array, bad: NDArray[np.bool_]) -> str:
+    """The first bad wish, and whose it is where there are many."""
+    k = int(bad.reshape(len(value), -1).any(axis=1).argmax())
+    return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
+
+
+def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
+    """How many movements the wishes make, one or equally many of each."""
+    lengths = {"primitives": n_primitives} | {name: len(value) for name, value in wishes.items() if value is not None}
+    n = max(lengths.values())
+    if any(length not in (1, n) for length in lengths.values()):
+        listed = ", ".join(f"{length} {name}" for name, length in lengths.items())
+        raise TrajectoryError(f"expected one or equally many of primitives, starts, goals and so on, got {listed}")
+    return n
+
+
+def _ratio(primitives: Primitives, amplitudes: Array) -> Array:
+    learned = primitives.goals - primitives.starts
+    ratio = primitives.dmp.system.ratio(amplitudes, learned, primitives.extents)
+    if not np.isfinite(ratio).all():
+        i, k = (int(index) for index in np.argwhere(~np.isfinite(ratio))[0])
+        i = min(i, len(primitives) - 1)
+        raise DegenerateMovementError(
+            f"{describe(i, primitives.names)}: expected a demonstration with g != x0 in dimension {k} to move to "
+            "another goal, got a closed or flat one; the original formulation scales by g - x0: use "
+            '"bio-inspired" or "amplitude-scaled"'
+        )
+    return ratio
+
+
+def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
+    """Samples per movement so that none is sampled more coarsely than `rate` [Hz]."""
+    check_number("rate", rate, above=0.0)
+    wanted = float(durations.max()) * rate * (1 - 1e-12) + 1
+    n_samples = check_samples(wanted, dmp.n_basis, "rate times duration")
+    least = math.ceil(2 * math.sqrt(dmp.K)) + 1
+    if n_samples < least:
+        raise SpecificationError(
+            f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that "
+            f"is two samples in each time constant duration / sqrt(K) of the spring, got {rate:g} Hz"
+        )
+    return n_samples
+
+
+def settled_end(movement: Rollout, tolerance: float) -> float:
+    """How far to go, in durations from 1 on, until every movement stays within `tolerance` of its goal."""
+    check_number("settle", tolerance, above=0.0)
+    far = Rollout(**{**movement.__dict__, "n_samples": _SETTLING_SAMPLES, "end": _LONGEST})
+    outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))
+    last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
+    if last == _SETTLING_SAMPLES - 1:
+        raise SpecificationError(
+            f"expected the movement to come within {tolerance:g} of its goal in {_LONGEST:g} durations, it does "
+            "not; raise the tolerance, the stiffness or the damping"
+        )
+    return max(1.0, (last + 1) * _LONGEST / (_SETTLING_SAMPLES - 1))

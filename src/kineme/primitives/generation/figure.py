@@ -1,0 +1,44 @@
+"""A generated movement beside the demonstrated one."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure, SubFigure
+
+from kineme.files.movements import Columns
+from kineme.movements.trajectories.axes import axis_names
+from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.validation import Array
+
+
+def draw_movement(primitive: Primitives, made: Columns, obstacles: Array | None) -> Figure:
+    """The path in the plane, if it has one, and each dimension and the speed over time."""
+    replay = primitive.rollout()
+    d = primitive.n_dims
+    axes_names = axis_names(d)
+    figure = new_figure(7.2, 1.2 + 1.1 * d if d > 2 else 3.4)
+    over_time: Figure | SubFigure = figure
+    if d == 2:
+        flat, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
+        _draw_path(flat, replay.positions[0], made["positions"], obstacles)
+    rows = over_time.subplots(d, 1, sharex=True, squeeze=False)[:, 0]
+    for k, axes in enumerate(rows):
+        axes.plot(replay.times[0], replay.positions[0, :, k], color=GRAY, linewidth=4, alpha=0.5)
+        axes.plot(made["times"], made["positions"][:, k], color=BLUE)
+        axes.set_ylabel(axes_names[k])
+    rows[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _draw_path(figure: SubFigure, demonstrated: Array, generated: Array, obstacles: Array | None) -> None:
+    axes = figure.subplots()
+    axes.plot(*demonstrated.T, color=GRAY, linewidth=4, alpha=0.5, label="as demonstrated")
+    axes.plot(*generated.T, color=BLUE, label="generated")
+    axes.plot(*generated[0], "o", color=BLUE, markersize=5, label="start")
+    axes.plot(*generated[-1], "*", color=BLUE, markersize=9, label="end")
+    if obstacles is not None:
+        axes.plot(*obstacles.T, "X", color=ORANGE, markersize=8, linestyle="none", label="obstacle")
+    axes.set(xlabel="x", ylabel="y")
+    axes.set_aspect("equal", adjustable="datalim")  # a flat movement leaves no hole between the legend and itself
+    axes.margins(0.1)
+    figure.legend(loc="outside upper center", ncols=2)

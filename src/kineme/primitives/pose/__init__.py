@@ -1,0 +1,1 @@
+"""Orientations as unit quaternions (w, x, y, z), and poses."""

@@ -1,0 +1,228 @@
+"""A batch of learned orientations or poses, and how it moves again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.files.container import write_container
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.rollout import broadcast_length, per_movement
+from kineme.primitives.persistence import Arrays, check_array, load_as, pack, unpack
+from kineme.primitives.pose.pose_rollout import PoseRollout
+from kineme.primitives.pose.quaternions import conjugate, normalized, product
+from kineme.primitives.pose.rates import rotation_vector_rate
+from kineme.primitives.pose.rotation_vectors import exp, log, nearest
+from kineme.validation import Array
+
+if TYPE_CHECKING:
+    from kineme.primitives.pose.pose_controller import PoseController
+
+_KIND = "pose primitives"  # in the file
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PosePrimitives:
+    """n primitives of orientations or poses; made by `PoseDMP.learn`.
+
+    Attributes
+    ----------
+    tangent : Primitives
+        Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
+        weights, forcing terms and shape-attractors describe the movements.
+    references : ndarray of shape (n, 4)
+        The demonstrated goal orientations, where the rotation vector is 0.
+    """
+
+    tangent: Primitives
+    references: Array
+
+    def __post_init__(self) -> None:
+        view = self.references.view()
+        view.setflags(write=False)
+        object.__setattr__(self, "references", view)
+
+    def __len__(self) -> int:
+        return len(self.tangent)
+
+    def __repr__(self) -> str:
+        what = "orientations" if self.n_columns == 4 else "poses"
+        return f"PosePrimitives({len(self)} movements of {what}, {self.tangent.dmp})"
+
+    def __getitem__(self, index: Any) -> PosePrimitives:
+        """The chosen primitives as a batch; an integer gives a batch of one."""
+        chosen = np.atleast_1d(np.arange(len(self))[index])
+        return PosePrimitives(self.tangent[chosen], self.references[chosen])
+
+    @classmethod
+    def join(cls, batches: Iterable[PosePrimitives]) -> PosePrimitives:
+        """Several batches as one, in the order given; errors as in `Primitives.join`."""
+        batches = list(batches)
+        wrong = [type(batch).__name__ for batch in batches if not isinstance(batch, cls)]
+        if wrong:
+            raise TrajectoryError(f"expected batches of PosePrimitives, got {wrong[0]}")
+        tangent = Primitives.join([batch.tangent for batch in batches])
+        return cls(tangent, np.concatenate([batch.references for batch in batches]))
+
+    def save(self, path: str | Path) -> Path:
+        """Write to one file of plain data; see `Primitives.save`."""
+        header, arrays = pack(self.tangent)
+        return write_container(Path(path), _KIND, header, {**arrays, "references": self.references})
+
+    @classmethod
+    def load(cls, path: str | Path) -> PosePrimitives:
+        """Read a file of `save`; see `Primitives.load`."""
+        return load_as(_KIND, path, cls._unpacked)
+
+    @classmethod
+    def _unpacked(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
+        tangent, references = unpack(Primitives, header, arrays), arrays["references"]
+        if tangent.n_dims not in {3, 6}:
+            raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {tangent.n_dims}")
+        check_array("references", references, (len(tangent), 4))
+        normalized(references)  # refuses what is no rotation; the numbers stay as they were saved
+        return cls(tangent, references)
+
+    @property
+    def labels(self) -> NDArray[Any] | None:
+        """Labels of the demonstrations, shape (n,), or None."""
+        return self.tangent.labels
+
+    @property
+    def names(self) -> tuple[str | None, ...] | None:
+        """Where each demonstration came from, or None."""
+        return self.tangent.names
+
+    @property
+    def durations(self) -> Array:
+        """Duration tau of each demonstration, shape (n,) [s]."""
+        return self.tangent.durations
+
+    @property
+    def n_columns(self) -> int:
+        """4 for orientations, 7 for poses."""
+        return self.tangent.n_dims + 1
+
+    @property
+    def starts(self) -> Array:
+        """Demonstrated starts, shape (n, 4) or (n, 7)."""
+        return self._poses(self.tangent.starts)
+
+    @property
+    def goals(self) -> Array:
+        """Demonstrated goals, shape (n, 4) or (n, 7)."""
+        return self._poses(self.tangent.goals)
+
+    def rollout(  # noqa: PLR0913 - a wish per parameter
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> PoseRollout:
+        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+
+        Parameters
+        ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            Orientations (d = 4) or poses (d = 7), as demonstrated; quaternions of either sign. The way from a new
+            start to a new goal is the one nearest to the demonstrated way, the long way round if that was shown.
+        duration, rate, n_samples : optional
+            See `Primitives.rollout`.
+        velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
+            the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
+        settle : float, optional
+            Go on past the duration until every position and every component of the rotation vector [rad] stays within
+            this distance of the goal.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal or velocity of the wrong shape, a quaternion not of norm 1, numbers that do not go together.
+        DegenerateMovementError
+            The original formulation asked to turn about an axis that the demonstration does not turn about.
+        """
+        tangent_start, tangent_goal, references, tangent_velocity = self.in_tangent(start, goal, velocity)
+        movement = self.tangent.rollout(
+            tangent_start,
+            tangent_goal,
+            duration,
+            velocity=tangent_velocity,
+            rate=rate,
+            n_samples=n_samples,
+            settle=settle,
+        )
+        return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
+
+    def controller(self, dt: float, **options: Any) -> PoseController:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt, **options
+            See `kineme.control.Controller`; start, goal and velocity as in `rollout`. Limits and `settle` hold for
+            positions and for the components of the rotation vector [rad].
+
+        Raises
+        ------
+        SpecificationError, TrajectoryError
+            More than one primitive; an option out of its range; a start or goal that is no pose.
+        """
+        from kineme.primitives.pose.pose_controller import PoseController
+
+        return PoseController(self, dt, **options)
+
+    def in_tangent(
+        self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
+    ) -> tuple[Array, Array, Array, Array | None]:
+        """Start, goal, reference orientations and initial velocity of the movements that these wishes make."""
+        starts, goals, references = self._endpoints(start, goal)
+        return starts, goals, references, self._tangent_velocity(velocity, starts)
+
+    def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
+        """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
+        starts, goals = self._as_poses(start, "start"), self._as_poses(goal, "goal")
+        starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
+        n = broadcast_length(len(self), {"start": starts, "goal": goals})
+        learned = self.tangent.starts[:, -3:]
+        p = learned
+        if start is not None or goal is not None:
+            p = nearest(log(product(starts[:, -4:], conjugate(goals[:, -4:]))), learned)
+
+        def joined(positions: Array, vectors: Array) -> Array:
+            return np.concatenate((np.broadcast_to(positions, (n, positions.shape[1])), vectors), axis=1)
+
+        vectors = np.broadcast_to(p, (n, 3))
+        return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
+
+    def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
+        wish = per_movement(velocity, "velocity", self.tangent.n_dims)
+        if wish is None:
+            return None
+        n = broadcast_length(len(starts), {"velocity": wish})
+        rates = rotation_vector_rate(starts[:, -3:], wish[:, -3:])
+        return np.concatenate((np.broadcast_to(wish[:, :-3], (n, wish.shape[1] - 3)), rates), axis=1)
+
+    def _as_poses(self, wish: ArrayLike | None, name: str) -> Array | None:
+        poses = per_movement(wish, name, self.n_columns)
+        if poses is None:
+            return None
+        try:
+            return np.concatenate((poses[:, :-4], normalized(poses[:, -4:])), axis=1)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{name}: {error}") from error
+
+    def _poses(self, tangent: Array) -> Array:
+        q = product(exp(tangent[:, -3:]), self.references)
+        return np.concatenate((tangent[:, :-3], q), axis=1)

@@ -1,0 +1,142 @@
+"""A batch of learned limit cycles: what they hold, what they look like as features, how they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.primitives.batch import Batch
+from kineme.primitives.rhythmic.operators import forcing_matrix
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
+from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
+from kineme.validation import Array, check_count, check_samples
+
+if TYPE_CHECKING:
+    from kineme.primitives.rhythmic.controller import RhythmicController
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RhythmicPrimitives(Batch):
+    """n limit cycles of d dimensions that share one specification; made by `RhythmicDMP.learn`.
+
+    Attributes
+    ----------
+    dmp : RhythmicDMP
+        The specification.
+    scaled_weights : ndarray of shape (n, d, N)
+        Weights times amplitude, ``r w``.
+    baselines : ndarray of shape (n, d)
+        b, the mean over whole periods, in the user's unit.
+    amplitudes : ndarray of shape (n,)
+        r, half of the largest minus the smallest position of the widest dimension, in the user's unit. One for all
+        dimensions: their proportions belong to the shape, and a dimension that does not move needs no division.
+    periods : ndarray of shape (n,)
+        Seconds.
+    phases : ndarray of shape (n,)
+        Where in the cycle the recording started, in [0, 2 pi). Phase 0 is where the first harmonic of the aligned
+        dimension is largest, so that recordings of one movement that start anywhere in it get the same weights.
+    aligned_on : ndarray of shape (n,)
+        That dimension.
+    explained : ndarray of shape (n,)
+        Share of the recording's variance that the folded cycle explains.
+    labels : ndarray of shape (n,) or None
+    names : tuple of str or None
+    """
+
+    ROWS = {  # noqa: RUF012 - declared as a class variable by Batch
+        "scaled_weights": "ndN",
+        "baselines": "nd",
+        "amplitudes": "n",
+        "periods": "n",
+        "phases": "n",
+        "aligned_on": "n",
+        "explained": "n",
+    }
+    SPECIFICATION = RhythmicDMP
+    KIND = "rhythmic primitives"
+
+    dmp: RhythmicDMP
+    scaled_weights: Array
+    baselines: Array
+    amplitudes: Array
+    periods: Array
+    phases: Array
+    aligned_on: NDArray[np.intp]
+    explained: Array
+    labels: NDArray[Any] | None = None
+    names: tuple[str | None, ...] | None = None
+
+    @property
+    def weights(self) -> Array:
+        """Weights w, shape (n, N, d); they do not depend on place, amplitude and tempo."""
+        return (self.scaled_weights / self.amplitudes[:, None, None]).transpose(0, 2, 1)
+
+    def forcing(self, n_samples: int = 100) -> Array:
+        """The forcing term f at `n_samples` (S) even phases from 0, shape (n, S, d); without r, as the weights."""
+        return self.shape_attractor(n_samples) / self.amplitudes[:, None, None]
+
+    def shape_attractor(self, n_samples: int = 100) -> Array:
+        """The term as it acts in the equation, ``r f(phi)``, at `n_samples` (S) even phases, shape (n, S, d)."""
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return (self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T).transpose(0, 2, 1)
+
+    def rollout(  # noqa: PLR0913 - a wish per parameter
+        self,
+        n_periods: float = 1.0,
+        *,
+        period: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        baseline: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        phase: ArrayLike = 0.0,
+        rate: float | None = None,
+        n_samples: int | None = None,
+    ) -> RhythmicRollout:
+        """Move, on the limit cycle or towards it, for any number of periods; all movements in one product.
+
+        Parameters
+        ----------
+        n_periods : float, default 1.0
+            How far to go; need not be whole.
+        period, amplitude : float or array_like of shape (n,), optional
+            Seconds, and the user's unit; by default the demonstrated ones.
+        baseline : array_like of shape (d,) or (n, d), optional
+            By default the demonstrated one.
+        start, velocity : array_like of shape (d,) or (n, d), optional
+            State at the beginning, by default that of the limit cycle: no transient.
+        phase : float or array_like of shape (n,), default 0.0
+            Phase at the beginning [rad]; ``phase=primitives.phases`` starts where the recordings did.
+        rate : float, optional
+            Samples per second, at least.
+        n_samples : int, optional
+            Samples per movement, the last at `n_periods`; by default the specification's `n_points` per period. Give
+            this or `rate`.
+
+        Returns
+        -------
+        RhythmicRollout
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+
+        Raises
+        ------
+        TrajectoryError
+            A wish of the wrong shape; numbers of movements that do not go together.
+        SpecificationError
+            A period or n_periods of 0 or less, a rate too low to show a period.
+        """
+        wishes = {"period": period, "amplitude": amplitude, "phase": phase}
+        wishes |= {"baseline": baseline, "start": start, "velocity": velocity}
+        return rollout(self, wishes, n_periods, rate, n_samples)
+
+    def controller(self, dt: float, phase: ArrayLike = 0.0) -> RhythmicController:
+        """Live running, `dt` seconds per step, from the limit cycle at `phase` (a number or (n,)) on.
+
+        Amplitude, baseline and period may change, and the state may be pushed, between steps; see `RhythmicController`.
+        """
+        from kineme.primitives.rhythmic.controller import RhythmicController
+
+        return RhythmicController(self, dt, phase)

@@ -1,0 +1,157 @@
+"""One primitive from several demonstrations, with their spread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.errors import TrajectoryError
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.styles.parameters import (
+    check_primitives,
+    from_numbers,
+    map_rows,
+    path_matrix,
+    shared_label,
+    to_numbers,
+)
+from kineme.validation import Array, as_numbers, check_choice, check_count
+
+_DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class AveragePrimitive:
+    """The mean of several primitives and, as a low-rank factor, their covariance; made by `average`.
+
+    With theta = [W, x0, g, tau v0], the d (N + 3) numbers that a path depends on linearly, the covariance is
+    ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
+
+    Attributes
+    ----------
+    primitive : Primitives
+        The mean, a batch of one: roll it out, describe it, control with it as with any other.
+    factor : ndarray of shape (r, d, N + 3)
+        Centered, weighted deviations of theta from the mean; r is at most n and at most d (N + 3).
+    tempo_factor : ndarray of shape (r,)
+        The same for ln tau.
+    """
+
+    primitive: Primitives
+    factor: Array
+    tempo_factor: Array
+
+    @property
+    def weight_factor(self) -> Array:
+        """F of shape (r, d N), ``F.T @ F`` being the covariance of the scaled weights (dimension-major)."""
+        return self.factor[:, :, :-3].reshape(len(self.factor), -1)
+
+    def deviation(self, n_samples: int = 100, of: str = "position") -> Array:
+        """Standard deviation at `n_samples` (S) even phases from start to goal, shape (S, d): the half-width of a band.
+
+        Movements are compared at equal phase t / tau, so `of` a velocity (per second) or an acceleration it is the
+        deviation at the mean duration; differences in tempo are in `tempo_factor`.
+
+        Parameters
+        ----------
+        n_samples : int, default 100
+        of : {"position", "velocity", "acceleration"}, default "position"
+        """
+        check_count("n_samples", n_samples, 2)
+        check_choice("of", of, list(_DERIVATIVES))
+        order = _DERIVATIVES[of]
+        deviations = map_rows(self.factor, path_matrix(self.primitive.dmp, n_samples, order))  # (r, d, S)
+        variance = np.einsum("rds,rds->sd", deviations, deviations)
+        return np.sqrt(variance) / self.primitive.durations[0] ** order
+
+    def sample(self, n: int, seed: int | np.random.Generator) -> Primitives:
+        """Draw `n` new variants from the Gaussian with this mean and covariance, durations (log-normal) included.
+
+        Parameters
+        ----------
+        n : int
+        seed : int or numpy.random.Generator
+        """
+        check_count("n", n, 1)
+        normal = np.random.default_rng(seed).standard_normal((n, len(self.factor)))
+        theta = to_numbers(self.primitive) + np.tensordot(normal, self.factor, axes=1)
+        durations = self.primitive.durations * np.exp(normal @ self.tempo_factor)
+        return from_numbers(self.primitive.dmp, theta, durations, shared_label(self.primitive))
+
+
+def average(primitives: Primitives, weights: ArrayLike | None = None) -> AveragePrimitive:
+    """Mean and covariance of a batch of primitives, as if they were several demonstrations of one movement.
+
+    The mean of theta = [W, x0, g, tau v0] is the movement whose path is the mean of the demonstrations' paths at
+    equal phase, in every formulation; see `kineme.primitives.styles.parameters` for why the mean of the *scaled*
+    weights W, and not of w, is the right one when g - x0 differs. Durations are averaged geometrically, as tempi are
+    ratios.
+
+    Parameters
+    ----------
+    primitives : Primitives
+        One movement shown n times. One demonstration gives itself, with no spread.
+    weights : array_like of shape (n,), optional
+        How much each demonstration counts, 0 or more; only their ratios matter. By default all count alike.
+
+    Returns
+    -------
+    AveragePrimitive
+        With the covariance free of bias: divided by ``1 - sum p_i^2``, that is by n - 1 where all count alike.
+
+    Raises
+    ------
+    TrajectoryError
+        No primitive, or weights of the wrong number, negative, not finite, or all zero.
+    """
+    check_primitives(primitives)
+    p = _shares(weights, len(primitives))
+    tempo = np.log(primitives.durations / primitives.durations[0])
+    theta = np.column_stack((to_numbers(primitives).reshape(len(p), -1), tempo))
+    mean = theta[0] + p @ (theta - theta[0])  # equal demonstrations give themselves to the last bit
+    rest = 1.0 - p @ p
+    factor = np.sqrt(p / rest)[:, None] * (theta - mean) if rest > np.finfo(float).eps else np.zeros((0, len(mean)))
+    if len(factor) > len(mean):
+        factor = np.linalg.qr(factor, mode="r")  # the same covariance from as few rows as it has columns
+    shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
+    duration = primitives.durations[:1] * np.exp(mean[-1:])
+    one = from_numbers(primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives))
+    return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1])
+
+
+def average_by_label(primitives: Primitives) -> dict[Any, AveragePrimitive]:
+    """One `average` for each label, in sorted order.
+
+    Raises
+    ------
+    TrajectoryError
+        Primitives without labels.
+    """
+    check_primitives(primitives)
+    if primitives.labels is None:
+        raise TrajectoryError(
+            "expected labeled primitives, got none with a label; learn them from demonstrations with labels, "
+            "or use average for a single movement"
+        )
+    return {label: average(primitives[primitives.labels == label]) for label in np.unique(primitives.labels).tolist()}
+
+
+def _shares(weights: ArrayLike | None, n: int) -> Array:
+    """Weights (n,) that sum to 1."""
+    if n == 0:
+        raise TrajectoryError("expected at least one primitive to average, got none")
+    if weights is None:
+        return np.full(n, 1.0 / n)
+    w = as_numbers(weights, "weights")
+    if w.shape != (n,):
+        raise TrajectoryError(f"expected one weight for each of the {n} primitives, got weights of shape {w.shape}")
+    bad = ~np.isfinite(w) | (w < 0)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise TrajectoryError(f"expected weights of 0 or more, got {w[i]:g} for primitive {i}")
+    if not w.any():
+        raise TrajectoryError(f"expected at least one weight above 0, got {n} zeros")
+    return w / w.sum()

@@ -1,0 +1,78 @@
+"""The numbers that a movement depends on linearly, and the way back to primitives.
+
+Over the phase u = t / tau a movement is linear in ``theta = [W, x0, g, tau v0]`` (N + 3 numbers for each dimension):
+
+    x(u) = Phi W + (1 - goal) x0 + goal g + velocity tau v0,
+
+with the decode matrices of `kineme.primitives.discrete.response`. So the mean of many theta makes the mean of the
+paths, and a covariance of theta the covariance of the path. This holds for the weights times the formulation's scale,
+W, and not for the weights w themselves: in the original formulation the mean of ``w = W / (g - x0)`` belongs to no mean
+path, and one demonstration with g close to x0 would drown all others. Where the demonstrations are one shape in several
+sizes the two agree.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import TrajectoryError
+from kineme.movements.trajectories.labels import label_array
+from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.operators import decoder
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.validation import Array
+
+
+def to_numbers(primitives: Primitives) -> Array:
+    """The numbers theta of each primitive, shape (n, d, N + 3)."""
+    check_primitives(primitives)
+    tangents = primitives.velocities * primitives.durations[:, None]  # dx/du at the start
+    rest = np.stack((primitives.starts, primitives.goals, tangents), axis=2)
+    return np.concatenate((primitives.scaled_weights, rest), axis=2)
+
+
+def check_primitives(primitives: Any) -> None:
+    """Refuse movements that are not learned yet, and rhythms and poses, which are no such numbers."""
+    if not isinstance(primitives, Primitives):
+        raise TrajectoryError(
+            f"expected kineme.Primitives, got {type(primitives).__name__}; learn movements first, "
+            "kineme.DMP().learn(movements), and take the tangent of pose primitives"
+        )
+
+
+def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) -> Primitives:
+    """Primitives from theta (n, d, N + 3) and tau (n,) [s]; all of them get `label`, unless it is None."""
+    path = map_rows(theta, path_matrix(dmp, dmp.n_points))
+    labels: NDArray[Any] | None = None if label is None else label_array([label] * len(theta))
+    return Primitives(
+        dmp,
+        scaled_weights=np.ascontiguousarray(theta[:, :, :-3]),
+        starts=theta[:, :, -3].copy(),
+        goals=theta[:, :, -2].copy(),
+        velocities=theta[:, :, -1] / durations[:, None],
+        durations=durations,
+        extents=np.ptp(path, axis=2),
+        labels=labels,
+    )
+
+
+def path_matrix(dmp: DMP, n_samples: int, derivative: int = 0) -> Array:
+    """From theta to the path at `n_samples` even phases, or to its derivative in u; shape (N + 3, n_samples)."""
+    response = decoder(dmp, n_samples)
+    goal = response.goal[derivative]
+    start = -goal if derivative else 1.0 - goal
+    return np.vstack((response.Phi[derivative].T, start, goal, response.velocity[derivative]))
+
+
+def map_rows(theta: Array, matrix: Array) -> Array:
+    """``theta @ matrix``, shape (n, d, n_samples), as one product: a stack would become as many small ones."""
+    return (theta.reshape(-1, theta.shape[2]) @ matrix).reshape(*theta.shape[:2], matrix.shape[1])
+
+
+def shared_label(primitives: Primitives) -> Any:
+    """The label that all primitives have, or None."""
+    labels = primitives.labels
+    return labels[0] if labels is not None and (labels == labels[0]).all() else None

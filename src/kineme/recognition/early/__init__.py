@@ -1,0 +1,1 @@
+"""Recognizing a movement of which only the beginning has been seen."""

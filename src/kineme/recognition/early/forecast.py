@@ -1,0 +1,61 @@
+"""The rest of a movement, from the stored movement that explains its beginning best."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.recognition.early.hypotheses import Hypotheses
+from kineme.recognition.early.prefixes import Prefixes
+from kineme.validation import Array
+
+N_REST = 20  # samples of the predicted rest
+
+
+class Forecast(NamedTuple):
+    """Progress, seconds left, and the rest of the path relative to the present position, (20, d)."""
+
+    progress: float
+    seconds: float
+    rest: Array
+
+
+def forecast(stored: Hypotheses, evidence: Array, label: int, seen: Prefixes, duration: float) -> Forecast:
+    """Progress and time left on average over a class's hypotheses, the path from its best one.
+
+    Parameters
+    ----------
+    evidence : ndarray of shape (m * G,)
+        Logarithms, see `Hypotheses.log_evidence`.
+    label : int
+        Index of the class.
+    duration : float
+        Time since the start [s].
+
+    Notes
+    -----
+    If `duration` is the share e of the demonstrated time, ``duration (1 - e) / e`` is left. The stored rest is turned
+    and sized as the beginning was, and put to where the movement is now.
+    """
+    G = len(stored.progress)
+    end = int(stored.first[label + 1]) if label + 1 < len(stored.first) else len(stored.durations)
+    own = np.arange(int(stored.first[label]) * G, end * G)
+    logs = evidence[own]
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    elapsed = np.maximum(stored.stored.elapsed[own], 1e-3)
+    best = int(own[logs.argmax()])
+    movement = best // G
+    path = stored.paths[movement]
+    times = np.linspace(0.0, 1.0, path.shape[1])
+    rest_times = np.linspace(stored.stored.elapsed[best], 1.0, N_REST)
+    rest = np.stack([np.interp(rest_times, times, row) for row in path])
+    rest = rest - rest[:, :1]
+    R = stored.procrustes.rotations(seen.positions, stored.stored.positions[best : best + 1])[0]
+    size = seen.sizes[0] / stored.stored.sizes[best] if stored.stored.sizes[best] > 0 else 1.0
+    return Forecast(
+        float(weights @ np.tile(stored.progress, len(own) // G)),
+        float(weights @ ((1.0 - elapsed) / elapsed)) * duration,
+        size * (R @ rest).T,
+    )

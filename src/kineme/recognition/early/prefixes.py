@@ -1,0 +1,88 @@
+"""The beginnings of movements, described so that place and size need not be known."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.comparison.describe import N_POINTS, even_paths
+from kineme.movements.preparation.arc_length import arc_length_phase
+from kineme.movements.preparation.smooth import Smooth
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+N_PREFIX = 32  # samples along the arc length of a beginning
+
+
+class Prefixes(NamedTuple):
+    """G beginnings of each of n movements; S samples each, evenly spaced along their own arc length.
+
+    Attributes
+    ----------
+    positions : ndarray of shape (n * G, d * S)
+        Minus their mean, at root mean square distance 1 from it; rows have norm 1.
+    directions : ndarray of shape (n * G, d * (S - 1))
+        Unit tangents; rows have norm 1. They weigh a corner just passed as much as everything before it.
+    timing : ndarray of shape (n * G, S)
+        Time at each sample as a share of the beginning's, divided by sqrt(S): squared distances are mean squares.
+    sizes, lengths : ndarray of shape (n * G,)
+        Root mean square distance from the mean, and length of the path, in the unit of the data.
+    elapsed : ndarray of shape (n * G,)
+        Time that the beginning takes, as a share of the movement's.
+    """
+
+    positions: Array
+    directions: Array
+    timing: Array
+    sizes: Array
+    lengths: Array
+    elapsed: Array
+
+
+def smooth_paths(movements: Demonstrations, cutoff: float | None) -> Array:
+    """Movements as the recognizer smooths them, minus their start, at even times, shape (n, d, T)."""
+    paths = even_paths(movements, 0, len(movements), cutoff)
+    return paths - paths[:, :, :1]
+
+
+@lru_cache(maxsize=8)
+def smoother(cutoff: float) -> Array:
+    """The smoothing spline on T even samples as a matrix (T, T): it is linear, so it acts on unit vectors."""
+    units = Demonstrations.from_arrays([np.eye(N_POINTS)])
+    matrix = Smooth(cutoff).apply(units).positions
+    matrix.setflags(write=False)
+    return matrix
+
+
+def beginnings(paths: Array, progress: Array) -> Prefixes:
+    """Describe the beginnings of smooth, evenly timed paths (n, d, T) until each share (G,) of their arc length.
+
+    The path is compared along its arc length, so that hesitation does not deform it; when the samples were
+    reached is kept apart, as `timing`.
+    """
+    n, d, n_samples = paths.shape
+    phase = arc_length_phase(paths)
+    shift = 2.0 * np.arange(n)[:, None, None]  # one increasing parameter for all movements
+    targets = (progress[:, None] * np.linspace(0.0, 1.0, N_PREFIX) + shift).ravel()
+    knots = (phase + shift[:, 0]).ravel()
+    shape = (n * len(progress), N_PREFIX)
+    along = np.stack([np.interp(targets, knots, paths[:, k].ravel()).reshape(shape) for k in range(d)], axis=1)
+    elapsed = np.interp(targets, knots, np.tile(np.linspace(0.0, 1.0, n_samples), n)).reshape(shape)
+    steps = np.diff(along, axis=2)
+    chords = np.sqrt((steps**2).sum(axis=1))
+    centered = along - along.mean(axis=2, keepdims=True)
+    sizes = np.sqrt((centered**2).sum(axis=1).mean(axis=1))
+    return Prefixes(
+        (centered / (_nonzero(sizes) * np.sqrt(N_PREFIX))[:, None, None]).reshape(len(along), -1),
+        (steps / (_nonzero(chords) * np.sqrt(N_PREFIX - 1))[:, None, :]).reshape(len(along), -1),
+        elapsed / (_nonzero(elapsed[:, -1:]) * np.sqrt(N_PREFIX)),
+        sizes,
+        chords.sum(axis=1),
+        elapsed[:, -1],
+    )
+
+
+def _nonzero(values: Array) -> Array:
+    return np.where(values > 0, values, 1.0)

@@ -1,0 +1,148 @@
+"""Recognition while a movement is still under way."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kineme.comparison.describe import N_POINTS
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.early.bounded_path import BoundedPath
+from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.forecast import forecast
+from kineme.recognition.early.hypotheses import Early, known_hypotheses
+from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
+from kineme.recognition.early.prefixes import beginnings, smoother
+from kineme.runtime.compiled import load_compiled
+from kineme.validation import MIN_SAMPLES, Array
+
+if TYPE_CHECKING:
+    from kineme.recognition.recognizer import Recognizer
+
+CAPACITY = 4096  # samples kept as they come
+_WHOLE = np.ones(1)
+
+
+class Live:
+    """Follow one movement, sample by sample; `Recognizer.stream` makes it.
+
+    Each update compares all that has been seen with the beginnings of every stored movement, at a cost that does not
+    depend on how long the stream has been running. Nothing that arrives raises; what cannot be used is skipped,
+    counted and flagged. Up to 4096 samples are kept as they came, more as averages, so memory is bounded.
+    """
+
+    def __init__(self, recognizer: Recognizer, decision: Decision, early: Early) -> None:
+        self._recognizer = recognizer
+        self._hypotheses = known_hypotheses(recognizer, early)
+        self._decision = decision
+        self._path = BoundedPath(CAPACITY, recognizer.n_dims_)
+        self._classes = recognizer.classes_.tolist()
+        self.reset()
+        self._rehearse()
+
+    def _rehearse(self) -> None:
+        """Go through a stored movement once: what is loaded on first use would stall the stream for 0.3 s."""
+        load_compiled()
+        known = self._recognizer.demonstrations_[0]
+        self.update(known.times, known.positions)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the movement; the next sample begins a new one."""
+        self._path.clear()
+        self._decision.clear()
+        self.skipped = 0
+        self._leader, self._progress = -1, 0.0
+
+    def update(self, t: Any, x: Any) -> LiveState:
+        """Take in one sample, or a block of them.
+
+        Parameters
+        ----------
+        t : float or array_like of shape (k,)
+            Time stamps [s], increasing.
+        x : array_like of shape (d,) or (k, d)
+            Positions.
+        """
+        status = self._take_in(t, x)
+        if self._path.per_row > 1:
+            status |= LiveStatus.AVERAGED
+        kept = self._path.kept()
+        if len(kept) < MIN_SAMPLES or not np.ptp(kept[:, 1:], axis=0).any():
+            return self._nothing(status | LiveStatus.TOO_SHORT)
+        return self._judge(kept, status)
+
+    def finish(self) -> Any:
+        """The answer of the recognizer on the whole movement: of `recognize`, where it has that, else the label.
+
+        Raises
+        ------
+        TrajectoryError
+            Fewer than four samples could be used.
+        """
+        kept = self._path.kept()
+        movement = Trajectory(kept[:, 0].copy(), kept[:, 1:].copy())
+        recognize = getattr(self._recognizer, "recognize", None)
+        return recognize(movement) if callable(recognize) else self._recognizer.predict(movement)[0]
+
+    def _take_in(self, t: Any, x: Any) -> LiveStatus:
+        status = LiveStatus(0)
+        try:
+            times, positions = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)
+            positions = positions.reshape(len(times), -1) if np.ndim(t) == 0 else positions
+        except (TypeError, ValueError, OverflowError):
+            times, positions = np.empty(0), np.empty((0, 0))
+        if times.ndim != 1 or positions.shape != (len(times), self._recognizer.n_dims_):
+            self.skipped += 1
+            return LiveStatus.WRONG_SHAPE
+        finite = np.isfinite(times) & np.isfinite(positions).all(axis=1)
+        for time, position, usable in zip(times.tolist(), positions, finite.tolist(), strict=True):
+            if not usable:
+                status |= LiveStatus.NOT_FINITE
+            elif self._path.last is not None and time <= self._path.last[0]:
+                status |= LiveStatus.TIME_NOT_INCREASING
+            else:
+                self._path.append(time, position)
+                continue
+            self.skipped += 1
+        return status
+
+    def _judge(self, kept: Array, status: LiveStatus) -> LiveState:
+        elapsed = float(kept[-1, 0] - kept[0, 0])
+        seen = beginnings(self._smooth(kept), _WHOLE)
+        evidence = self._hypotheses.log_evidence(seen, np.array([elapsed]))
+        logs = self._hypotheses.log_classes(evidence)[0]
+        shares = np.exp(logs - logs.max())
+        shares /= shares.sum()
+        order = np.argsort(-shares[:-1], kind="stable")
+        leader = int(order[0])
+        decided = self._decision.update(elapsed, leader, float(shares[leader]))
+        shown = leader if decided is None else decided
+        ahead = forecast(self._hypotheses, evidence[0], shown, seen, elapsed)
+        self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
+        self._leader = shown
+        path = kept[-1, 1:] + ahead.rest
+        return LiveState(
+            tuple(Guess(self._classes[c], float(shares[c])) for c in order.tolist()),
+            float(shares[-1]),
+            None if decided is None else self._classes[decided],
+            min(self._progress, 1.0),
+            path,
+            path[-1],
+            float(kept[-1, 0]) + ahead.seconds,
+            self.skipped,
+            status | (LiveStatus.UNDECIDED if decided is None else LiveStatus.DECIDED),
+        )
+
+    def _smooth(self, kept: Array) -> Array:
+        """What has been seen so far, at even times and smoothed as the stored movements were: (1, d, T)."""
+        times = np.linspace(kept[0, 0], kept[-1, 0], N_POINTS)
+        even = np.stack([np.interp(times, kept[:, 0], column - column[0]) for column in kept[:, 1:].T])
+        cutoff = self._recognizer.cutoff
+        return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
+
+    def _nothing(self, status: LiveStatus) -> LiveState:
+        status |= LiveStatus.UNDECIDED
+        return LiveState((), 1.0, None, 0.0, None, None, math.nan, self.skipped, status)

@@ -1,0 +1,1 @@
+"""How work is done: compiled loops or their NumPy twins, threads over tiles, forks."""

@@ -1,0 +1,144 @@
+"""Work over row tiles in a few threads.
+
+Compiled kernels are single-threaded and release the GIL; parallelism is a short-lived thread pool,
+which survives forks and concurrent callers, unlike Numba's own parallel layers. While the pool
+works, the BLAS library is held to one thread per caller: two tiles side by side beat one tile
+split in two, because a tile stays in one core's cache.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from threading import Lock, active_count
+from typing import Any
+
+from kineme.errors import SpecificationError
+from kineme.runtime.forks import at_fork
+
+_blas_lock = Lock()
+_blas_holds: list[Any] = []  # one entry per active caller; the first entry is the limiter
+_limited = False  # whether the last fork held BLAS to one thread
+
+
+def n_threads() -> int:
+    """Threads to use: ``KINEME_NUM_THREADS`` if set, else the processors this process may use."""
+    wanted = os.environ.get("KINEME_NUM_THREADS")
+    if wanted is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not wanted.isdecimal() or int(wanted) < 1:
+        raise SpecificationError(f"expected KINEME_NUM_THREADS to be a whole number from 1, got {wanted!r}")
+    return int(wanted)
+
+
+def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -> None:
+    """Call ``work(start, stop)`` for consecutive row ranges that cover ``range(n_rows)``.
+
+    Parameters
+    ----------
+    work : callable
+        Writes its own rows of a shared result; its return value is ignored.
+    n_rows, tile_rows : int
+        Number of rows in all, and at most this many in one call.
+    """
+    tiles = [(start, min(start + tile_rows, n_rows)) for start in range(0, n_rows, tile_rows)]
+    threads = min(n_threads(), len(tiles))
+    # One tile too: split between threads that wait for each other, its small products take longer, and a fork
+    # meanwhile, which ends the threads of OpenBLAS, would wait for them for ever.
+    with single_threaded_blas():
+        if threads <= 1:
+            for start, stop in tiles:
+                work(start, stop)
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            for result in [pool.submit(work, *tile) for tile in tiles]:
+                result.result()
+
+
+@contextmanager
+def single_threaded_blas() -> Iterator[None]:
+    """Hold BLAS to one thread per caller; the last caller to leave restores what was there.
+
+    The limit is a property of the process, so concurrent callers are counted: without the count,
+    the second one in would save, and later restore, the first one's limit.
+    """
+    with _blas_lock:
+        _blas_holds.append(None if _blas_holds else _limit())
+    try:
+        yield
+    finally:
+        with _blas_lock:
+            first = _blas_holds[0]
+            _blas_holds.pop()
+            if not _blas_holds:
+                _restore(first)
+
+
+def _limit() -> Any:
+    """Set BLAS to one thread; what restores it."""
+    controller = _blas_controller()
+    with _control(controller):
+        return controller.limit(limits=1, user_api="blas")
+
+
+def _restore(limiter: Any) -> None:
+    with _control(_blas_controller()):
+        limiter.restore_original_limits()
+
+
+@contextmanager
+def _control(controller: Any) -> Iterator[None]:
+    """Let the calling thread set limits: from release 3.7 of threadpoolctl on, all but the first do nothing."""
+    libraries = [one for one in controller.lib_controllers if hasattr(one, "clear_controlling_thread")]
+    for library in libraries:
+        library.clear_controlling_thread(force=True)
+    try:
+        yield
+    finally:
+        for library in libraries:
+            library.clear_controlling_thread(force=True)
+
+
+def _blas_controller() -> Any:
+    return _controller("scipy.linalg" in sys.modules)
+
+
+@cache
+def _controller(scipy_is_loaded: bool) -> Any:
+    """Of the BLAS libraries that are loaded; SciPy brings one of its own, which comes later than NumPy's."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Over a fork, hold BLAS to one thread if another thread may be within it.
+
+    OpenBLAS takes locks for work in several threads, and to change their number; those of a thread that is not there
+    in the child are never given back. With one thread it takes none, so the child stays with one. The limit is set
+    here and now, whoever holds one already: other libraries restore theirs without asking.
+    """
+    global _limited  # noqa: PLW0603 - told to the child
+    parent = os.getpid()
+    with _blas_lock:
+        _limited = active_count() > 1
+        limiter = _limit() if _limited else None
+        yield
+        if limiter is not None and os.getpid() == parent:
+            _restore(limiter)
+
+
+def _in_child() -> None:
+    """One more hold, which is never left: no call changes the number of threads in the child."""
+    global _blas_lock  # noqa: PLW0603 - of another thread, perhaps
+    _blas_lock = Lock()
+    if _limited or _blas_holds:
+        _blas_holds.append(None)
+
+
+at_fork(_quiet, _in_child)

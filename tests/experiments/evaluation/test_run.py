@@ -1,0 +1,152 @@
+"""Whole evaluations: the same seed gives the same bytes, in one process or in two."""
+
+import json
+import re
+
+import pytest
+
+import kineme
+from kineme.experiments.evaluation import methods
+from kineme.experiments.evaluation.conditions import UNTOUCHED
+from kineme.experiments.evaluation.data import DataSet
+from kineme.experiments.evaluation.methods import METHODS
+from kineme.experiments.evaluation.optional import optional_module, why_missing
+from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings
+from kineme.experiments.evaluation.report import rivals_ahead
+from kineme.experiments.evaluation.results import Results
+from kineme.experiments.evaluation.run import Runner, evaluate
+
+PLAN = ([name for name in PROTOCOLS if name != "earliness"], ["kineme", "euclidean", "paper"])
+
+
+def run(data, out, plan=PLAN, seed=0, processes=1):
+    def progress(items, total):
+        done = list(items)
+        assert len(done) == total
+        return done
+
+    return evaluate(data, plan, Settings(2, seed, (1, 2)), out, Runner(processes, progress))
+
+
+def without_times(path):
+    content = json.loads(path.read_text())
+    del content["seconds"]
+    return json.dumps(content)
+
+
+@pytest.fixture(scope="module")
+def data(small):
+    return DataSet("small & <simple>", small, {"wave/broken.csv": "expected <numbers>"})
+
+
+@pytest.fixture(scope="module")
+def done(data, tmp_path_factory):
+    return run(data, tmp_path_factory.mktemp("evaluation"))
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_does_not(data, done, tmp_path):
+    html, numbers = done.files
+    again = run(data, tmp_path / "again")
+    assert again.files[0].read_bytes() == html.read_bytes()
+    assert without_times(again.files[1]) == without_times(numbers)
+    other = run(data, tmp_path / "other", seed=1)
+    assert without_times(other.files[1]) != without_times(numbers)
+
+
+def test_two_processes_give_what_one_gives(data, tmp_path):
+    plan = (["few-shot", "robustness"], ["kineme", "euclidean"])
+    files = [run(data, tmp_path / str(k), plan, processes=k).files for k in (1, 2)]
+    assert without_times(files[0][1]) == without_times(files[1][1])
+
+
+def test_the_page_needs_no_other_file_and_escapes_names(done):
+    html = done.files[0].read_text()
+    assert re.findall(r'(?:src|href)="(?!data:)', html) == []
+    assert "<script" not in html
+    assert "small &amp; &lt;simple&gt;" in html
+    assert "<simple>" not in html
+    assert "<numbers>" not in html
+    assert "expected &lt;numbers&gt;" in html
+    assert html.count("<img") == 2  # few shots and robustness
+    for name in PLAN[0]:
+        assert PROTOCOLS[name].title in html
+    for name in PLAN[1]:
+        assert METHODS[name].title in html
+
+
+def test_the_numbers_are_complete(done):
+    content = json.loads(done.files[1].read_text())
+    assert content["seed"] == 0
+    assert content["shots"] == [1, 2]
+    assert set(content["protocols"]) == set(PLAN[0])
+    assert set(content["seconds"]) == {"whole", *PLAN[0]}
+    assert content["versions"]["kineme"] == kineme.__version__
+    assert content["left_out"] == {"wave/broken.csv": "expected <numbers>"}
+    for protocol, by_method in content["protocols"].items():
+        assert list(by_method) == ["kineme", "paper", "euclidean"]  # in the order of the table of methods
+        for measures in (one for outcome in by_method.values() for one in outcome.values()):
+            for values in measures.values():
+                n = 16 if protocol == "leave-one-out" else 2
+                assert len(values["by_split"]) == n
+                assert values["min"] <= values["mean"] <= values["max"]
+
+
+def test_a_method_that_is_not_installed_is_reported(data, tmp_path, monkeypatch):
+    monkeypatch.setitem(methods.METHODS, "dtw", methods.Method("DTW 1-NN", lambda _: None, needs="no_such_package"))
+    result = run(data, tmp_path, (["few-shot"], ["kineme", "dtw"]))
+    assert result.results.absent == {"dtw": "not installed: no_such_package"}
+    assert json.loads(result.files[1].read_text())["absent_methods"] == result.results.absent
+    assert "not installed: no_such_package" in result.files[0].read_text()
+
+
+def test_a_method_that_breaks_on_import_is_reported(tmp_path, monkeypatch):
+    (tmp_path / "brittle.py").write_text("import numpy\nnumpy.trapz_of_old")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "cannot be imported: AttributeError" in why_missing("brittle")
+    assert why_missing("json.decoder") == ""
+
+
+def test_the_group_to_install_is_named():
+    with pytest.raises(kineme.SpecificationError, match=r"'no_such_package', .* pip install 'kineme\[rivals\]'"):
+        optional_module("no_such_package.part")
+
+
+def test_the_point_cloud_is_for_the_plane(make_small, tmp_path):
+    result = run(DataSet("space", make_small(n_dims=3), {}), tmp_path, (["few-shot"], ["kineme", "point-cloud"]))
+    assert result.results.absent == {"point-cloud": "works in 2 dimensions only"}
+
+
+def test_a_protocol_that_nobody_can_answer_is_reported(data, tmp_path):
+    result = run(data, tmp_path, (["few-shot", "earliness"], ["euclidean"]))
+    assert result.results.skipped == {"earliness": "none of the methods answers before the end"}
+
+
+def outcome(absent=None, **accuracies):
+    measured = {name: {UNTOUCHED: {"accuracy": [value]}} for name, value in accuracies.items()}
+    return Results({"few-shot": measured}, {}, absent or {}, {})
+
+
+def test_a_rival_that_is_ahead_is_named():
+    said = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.95, euclidean=0.9))
+    assert said == "Ahead of kineme: DTW 1-NN, as recorded (0.950 over 0.900)."
+    equal = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.9))
+    assert equal == "No rival is ahead of kineme anywhere in this table. Rivals here: DTW 1-NN."
+    assert rivals_ahead("few-shot", outcome(dtw=0.9)) == ""
+
+
+@pytest.mark.parametrize("theirs", [0.95, 0.8])
+def test_a_rival_that_did_not_take_part_is_named_beside_what_is_concluded(theirs):
+    absent = {"dtw": "not installed: dtaidistance", "hmm": "not installed: hmmlearn"}
+    said = rivals_ahead("few-shot", outcome(absent, kineme=0.9, euclidean=theirs))
+    assert ("Ahead of kineme" in said) is (theirs > 0.9)
+    assert ("No rival is ahead" in said) is (theirs < 0.9)
+    assert said.endswith(". Not compared: DTW 1-NN (not installed: dtaidistance); HMM (not installed: hmmlearn).")
+    alone = rivals_ahead("few-shot", outcome(absent, kineme=0.9))
+    assert alone.startswith("No rival took part. Not compared: DTW 1-NN")
+    assert rivals_ahead("few-shot", outcome(kineme=0.9)) == "No rival took part."
+
+
+def test_a_folder_that_cannot_be_written_is_found_out_first(data, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="file"):
+        run(data, tmp_path / "file" / "out")

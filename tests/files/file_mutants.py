@@ -1,0 +1,284 @@
+"""Small files of every format, ways to spoil them, and what must hold of whatever is still read from them."""
+
+from __future__ import annotations
+
+import functools
+import io
+import json
+import math
+import tempfile
+import warnings
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+import kineme
+from kineme.orientation import PosePrimitives
+from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+
+N_SAMPLES = 12
+WORDS = (
+    "nan", "inf", "-inf", "1e308", "-1e400", "1e-320", "null", "", " ", "-0", "wave", "é", "\0", "#", "//", '"', "'",
+    ",", ";", "\n", "\r", "\t", "[", "]", "{", "}", "True", "0x1", "1_0", "²", "2024-01-01T00:00:00Z", "9" * 400,
+)  # fmt: skip
+NUMBERS = (0, 1, 2, 7, 127, 128, 255, 256, 65535, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
+
+
+def _movement(k=0):
+    t = np.linspace(0.0, 1.0, N_SAMPLES + k)
+    return t, np.column_stack((np.sin(3 * t + k), t**2))
+
+
+def _wide(separator, head=True, comma=False):
+    t, x = _movement()
+    lines = [separator.join(("time", "x", "y"))] if head else []
+    lines += [separator.join(map(repr, row)) for row in np.column_stack((t, x)).tolist()]
+    text = "\n".join(lines) + "\n"
+    return (text.replace(".", ",") if comma else text).encode()
+
+
+def _long():
+    lines = ["movement,label,t,x,y"]
+    for k, label in enumerate(("wave", '"nod, twice"', "bow")):
+        t, x = _movement(k)
+        lines += [f"m{k},{label},{a!r},{b!r},{c!r}" for a, (b, c) in zip(t.tolist(), x.tolist(), strict=True)]
+    return "\n".join(lines).encode()
+
+
+def _dates():
+    return ("stamp;x\n" + "".join(f"2024-05-06T07:08:{k:02d}.25Z;{k * k}\n" for k in range(9))).encode()
+
+
+def _npz(save=np.savez, **arrays):
+    buffer = io.BytesIO()
+    save(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _json(**entries):
+    return json.dumps({name: np.asarray(value).tolist() for name, value in entries.items()}).encode()
+
+
+def _parquet(**columns):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    buffer = io.BytesIO()
+    parquet.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+def _demos():
+    """A list of structures as LASA's."""
+    demos = np.empty((1, 3), dtype=object)
+    for k in range(3):
+        t, x = _movement(k)
+        demos[0, k] = {"pos": x.T, "t": t[None], "dt": 0.01}
+    return demos
+
+
+def _mat(compressed, **content):
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    savemat(buffer, content, do_compression=compressed)
+    return buffer.getvalue()
+
+
+def _saved(cls):
+    t, x = np.linspace(0, 3, 120), None
+    if cls is RhythmicPrimitives:
+        x = np.column_stack((np.sin(7 * t), np.cos(7 * t) ** 3))
+        learned = kineme.RhythmicDMP(n_basis=7).learn(kineme.Demonstrations.from_arrays([x, 2 * x], ["a", "b"], [t, t]))
+    else:
+        learned = kineme.DMP(n_basis=7).learn(kineme.Demonstrations.from_arrays([_movement()[1]] * 2, ["a", "b"]))
+    if cls is PosePrimitives:
+        from kineme.orientation import PoseDMP, exp
+
+        q = exp(t[:, None] * [0.3, 0.2, 0.1])
+        learned = PoseDMP(kineme.DMP(n_basis=7)).learn([np.hstack((np.sin(t[:, None] * [1, 2, 3]), q))])
+    with tempfile.TemporaryDirectory() as folder:
+        return learned.save(Path(folder) / "saved").read_bytes()
+
+
+_SAVED = {"primitives.kineme": kineme.Primitives, "rhythm.kineme": RhythmicPrimitives, "poses.kineme": PosePrimitives}
+
+
+@functools.cache
+def samples():
+    """File name -> bytes: at least one of every format and every kind of saved primitives."""
+    (t, x), (t2, x2) = _movement(), _movement(1)
+    both = {"positions": np.vstack((x, x2)), "times": np.concatenate((t, t2)), "offsets": [0, len(x), len(x) + len(x2)]}
+    labels = np.array(["wave", "nod"])
+    long_columns = {"id": ["a"] * 12 + ["b"] * 13, "label": ["wave"] * 12 + ["nod"] * 13, "t": both["times"]}
+    axes = {"x": both["positions"][:, 0], "y": both["positions"][:, 1]}
+    return {
+        "wide.csv": _wide(","),
+        "decimal.csv": _wide(";", comma=True),
+        "wide.tsv": _wide("\t"),
+        "bare.txt": _wide(" ", head=False),
+        "long.csv": _long(),
+        "dates.csv": _dates(),
+        "utf16.csv": _wide(",").decode().encode("utf-16"),
+        "one.npz": _npz(times=t, positions=x),
+        "small.npz": _npz(np.savez_compressed, times=t, positions=x),
+        "joined.npz": _npz(**both, labels=labels),
+        "block.npz": _npz(positions=np.stack((x, x)), times=t, labels=[1, 2]),
+        "numbered.npz": _npz(positions_0=x, positions_1=x2, times_0=t, times_1=t2),
+        "joined.json": _json(**both, labels=labels),
+        "numbered.json": _json(x_0=x, x_1=x2),
+        "wide.parquet": _parquet(time=t, x=x[:, 0], y=x[:, 1]),
+        "long.parquet": _parquet(**long_columns, **axes),
+        "demos.mat": _mat(False, demos=_demos(), name="wave"),
+        "demos_compressed.mat": _mat(True, demos=_demos(), name="wave"),
+        "struct.mat": _mat(False, demos={"pos": x.T, "t": t}),
+        "others.mat": _mat(
+            False, demos=_demos(), cells=[[1, "a"], [np.eye(2) * 1j, {"b": [True]}]], dt=np.int8([1, 2])
+        ),
+        "others_compressed.mat": _mat(True, demos=_demos(), s={"a": {"b": {"c": "deep"}}}, text=["ab", "cd"]),
+        **{name: _saved(cls) for name, cls in _SAVED.items()},
+    }
+
+
+def mutant(rng, data, name):
+    """The bytes with one to four kinds of damage; inside what is compressed too."""
+    if name.endswith((".npz", ".kineme")) and rng.random() < 0.6:
+        data = _zip_mutant(rng, data)
+        return data if rng.random() < 0.8 else _damaged(rng, data)
+    if "compressed.mat" in name and rng.random() < 0.7:
+        return _mat_mutant(rng, data)
+    for _ in range(int(rng.integers(1, 5))):
+        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json")))
+    return data
+
+
+def _damaged(rng, data, is_text=False):
+    ways = (_flip, _cut, _insert, _remove, _repeat, _overwrite, _number)
+    way = _word if is_text and rng.random() < 0.6 else ways[int(rng.integers(len(ways)))]
+    return way(rng, data, int(rng.integers(len(data)))) if data else data
+
+
+def _flip(rng, data, at):
+    return data[:at] + bytes((data[at] ^ (1 << int(rng.integers(8))),)) + data[at + 1 :]
+
+
+def _cut(rng, data, at):
+    return data[:at]
+
+
+def _insert(rng, data, at):
+    return data[:at] + rng.bytes(int(rng.integers(1, 17))) + data[at:]
+
+
+def _remove(rng, data, at):
+    return data[:at] + data[at + int(rng.integers(1, 65)) :]
+
+
+def _repeat(rng, data, at):
+    return data[:at] + data[at : at + int(rng.integers(1, 257))] * int(rng.integers(2, 5)) + data[at:]
+
+
+def _overwrite(rng, data, at):
+    return data[:at] + rng.bytes(n := int(rng.integers(1, 9))) + data[at + n :]
+
+
+def _number(rng, data, at):
+    size = int(rng.choice([1, 2, 4, 8]))
+    if rng.random() < 0.7:
+        at -= at % size
+    number = NUMBERS[int(rng.integers(len(NUMBERS)))] % 256**size
+    return data[:at] + number.to_bytes(size, "little") + data[at + size :]
+
+
+def _word(rng, data, at):
+    return data[:at] + WORDS[int(rng.integers(len(WORDS)))].encode() + data[at + int(rng.integers(4)) :]
+
+
+def _zip_mutant(rng, data):
+    """One member damaged under a right checksum, or renamed, doubled, dropped."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = [(one.filename, archive.read(one)) for one in archive.infolist()]
+    k = int(rng.integers(len(members)))
+    name, content = members[k]
+    what = rng.random()
+    if what < 0.7:
+        members[k] = (
+            name,
+            _damaged(rng, content[:128], rng.random() < 0.3) + content[128:] if what < 0.4 else _damaged(rng, content),
+        )
+    elif what < 0.8:
+        members.append((name, content))
+    elif what < 0.9:
+        members[k] = f"{WORDS[int(rng.integers(len(WORDS)))][:50]}{name}".replace("\0", "?"), content
+    else:
+        del members[k]
+    buffer = io.BytesIO()
+    packing = zipfile.ZIP_DEFLATED if rng.random() < 0.3 else zipfile.ZIP_STORED
+    with warnings.catch_warnings(), zipfile.ZipFile(buffer, "w", packing) as archive:
+        warnings.simplefilter("ignore")  # of doubled names
+        for name, content in members:
+            archive.writestr(zipfile.ZipInfo(name), content)
+    return buffer.getvalue()
+
+
+def _mat_mutant(rng, data):
+    """One variable of a compressed MATLAB file damaged before it is compressed."""
+    parts, at = [], 128
+    while at + 8 <= len(data):
+        size = int.from_bytes(data[at + 4 : at + 8], "little")
+        parts.append(zlib.decompress(data[at + 8 : at + 8 + size]))
+        at += 8 + size
+    k = int(rng.integers(len(parts)))
+    for _ in range(int(rng.integers(1, 4))):
+        parts[k] = _damaged(rng, parts[k])
+    packed = [zlib.compress(part) for part in parts]
+    return data[:128] + b"".join(b"\x0f\0\0\0" + len(one).to_bytes(4, "little") + one for one in packed)
+
+
+def read_mutant(name, data):
+    """Read a file of that name through the public door, and check what comes; called in a child process."""
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = Path(folder) / name
+        path.write_bytes(data)
+        if name in _SAVED:
+            _check_saved(_SAVED[name].load(path))
+            return 0
+        return check_recordings(kineme.read_recordings(path))
+
+
+def check_recordings(read):
+    """Whatever is read is finite, in order and consistent; how many movements that is."""
+    demos = read.demonstrations
+    assert len(demos) == len(read.sources) == len(read.labels) == len(demos.names)
+    assert demos.offsets[0] == 0
+    assert demos.offsets[-1] == len(demos.positions) == len(demos.times)
+    assert (demos.lengths >= 4).all()
+    assert demos.positions.dtype == demos.times.dtype == np.float64
+    assert np.isfinite(demos.positions).all()
+    assert np.isfinite(demos.times).all()
+    inner = np.delete(np.diff(demos.times), demos.offsets[1:-1] - 1)
+    assert (inner > 0).all()
+    assert (demos.durations > 0).all()
+    assert np.isfinite(demos.durations).all()
+    assert all(label is None or (type(label) is str and label) for label in read.labels)
+    assert all(isinstance(problem.reason, str) and "\n" not in problem.reason for problem in read.problems)
+    assert all(math.isfinite(source.mtime) and len(source.sha256) == 64 for source in read.sources)
+    repr(read)
+    return len(demos)
+
+
+def _check_saved(batch):
+    n = len(batch)
+    if isinstance(batch, PosePrimitives):
+        assert np.isfinite(batch.references).all()
+        batch = batch.tangent
+    for name in batch.ROWS:
+        values = getattr(batch, name)
+        assert len(values) == n
+        assert np.isfinite(values).all()
+    assert batch.labels is None or len(batch.labels) == n
+    assert batch.names is None or len(batch.names) == n
+    repr(batch)

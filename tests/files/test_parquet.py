@@ -1,0 +1,152 @@
+"""Parquet: the same columns as in text, whatever their types."""
+
+import io
+import sys
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+import kineme
+from kineme.files.recordings import read_recordings_from_bytes
+from kineme.files.tables.layout import Layout
+from kineme.files.tables.parquet import _texts
+
+T = np.arange(6) / 100
+X = T**2
+
+
+def read(table, **options):
+    sink = io.BytesIO()
+    parquet.write_table(pa.table(table), sink)
+    return read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout(**options))
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        pa.array(T),
+        pa.array(T.astype(np.float64)),
+        pa.chunked_array([T[:2], T[2:]]),
+    ],
+)
+def test_numbers_are_kept_to_the_last_bit(column):
+    found = read({"time": column, "x": pa.array(X)}).demonstrations
+    np.testing.assert_array_equal(found.times, T)
+    np.testing.assert_array_equal(found.positions[:, 0], X)
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_dates_and_durations_count_in_their_own_unit(unit):
+    since = (T * 1e9).round().astype(np.int64)
+    dates = (np.datetime64("2024-05-06T07:08:09", "ns") + since.astype("m8[ns]")).astype(f"M8[{unit}]")
+    found = read({"stamp": pa.array(dates), "x": X})
+    assert found.detected[0][0][4:6] == ("ns", "dates")
+    np.testing.assert_allclose(found.demonstrations.times - 1714979289, T, atol=3e-7)
+    spans = read({"time": pa.array(since.astype("m8[ns]").astype(f"m8[{unit}]")), "x": X})
+    np.testing.assert_allclose(spans.demonstrations.times, T, rtol=1e-12)
+
+
+def test_names_may_be_numbers_or_a_dictionary_and_what_is_not_needed_is_not_read():
+    names = pa.array(["wave"] * 4 + ["nod"] * 4).dictionary_encode()
+    found = read(
+        {"id": [1] * 4 + [2] * 4, "label": names, "time": np.tile(T[:4], 2), "x": np.arange(8), "list": [[1.0]] * 8}
+    )
+    assert [(one.place, one.label) for one in found.sources] == [("1", "wave"), ("2", "nod")]
+    assert found.detected[0][0].ignored == ("list",)
+    assert found.detected[0][0].columns == ("x",)
+
+
+def test_missing_values_cost_their_movement_or_themselves():
+    columns = {"demo": ["a"] * 6 + ["b"] * 6, "time": np.tile(T, 2), "x": pa.array([1.0, None, *range(10)])}
+    found = read(columns)
+    assert [one.place for one in found.sources] == ["b"]
+    assert found.problems[0].reason == "movement a: expected finite positions, got [nan] at sample 1"
+    assert read(columns, skip="sample").demonstrations.lengths.tolist() == [5, 6]
+    whole = read({**columns, "x": pa.array([1, None, *range(10)], pa.int64())})
+    assert [one.place for one in whole.sources] == ["b"]
+
+
+def test_columns_of_something_else_are_refused_by_name():
+    with pytest.raises(kineme.DataError, match=r"expected numbers in the column 'x', got .*list"):
+        read({"time": T, "x": [[1.0]] * 6}, columns="x")
+
+
+def test_without_the_package_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(kineme.DataError, match=r"pip install 'kineme\[parquet\]'"):
+        read_recordings_from_bytes(b"PAR1", "a.parquet", Layout())
+
+
+@pytest.mark.parametrize("columns", [("time", "x"), ("label", "time", "x"), ("demo", "time", "x")])
+def test_a_table_without_rows_is_refused(columns):
+    with pytest.raises(kineme.DataError, match="expected samples, got a table without rows"):
+        read({name: pa.array([], pa.float64()) for name in columns})
+
+
+def test_names_of_bytes_are_decoded():
+    names = pa.array([b"wave"] * 4 + ["n\u00f6d".encode()] * 4)
+    assert read({"label": names, "time": np.tile(T[:4], 2), "x": np.arange(8)}).labels == ("wave", "n\u00f6d")
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_names_may_be_missing_and_dictionaries_differ(chunked):
+    names = pa.array(["wave"] * 4 + [None] * 4 + ["nod"] * 4)
+    if chunked:
+        names = pa.chunked_array([names[:6].dictionary_encode(), names[6:].dictionary_encode()])
+    table = {"id": [1] * 4 + [2] * 4 + [3] * 4, "label": names, "time": np.tile(T[:4], 3), "x": np.arange(12)}
+    found = read(table)
+    assert {one.place: one.label for one in found.sources} == {"1": "wave", "2": None, "3": "nod"}
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        (pa.array([[1]] * 6), "expected names in 'label', got (list|struct)"),
+        (pa.array([{"a": 1}] * 6), "expected names in 'label', got (list|struct)"),
+        (pa.array([float("nan")] * 6), "expected names in 'label', got nan"),
+    ],
+)
+def test_labels_that_are_no_names(column, words):
+    with pytest.raises(kineme.DataError, match=words):
+        read({"label": column, "time": T, "x": X})
+
+
+def test_columns_of_one_name_are_refused():
+    sink = io.BytesIO()
+    parquet.write_table(pa.Table.from_arrays([pa.array(T), pa.array(X), pa.array(-X)], ["time", "x", "x"]), sink)
+    with pytest.raises(kineme.DataError, match="expected columns of different names, got 'x' 2 times"):
+        read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout())
+
+
+def test_names_with_dots_are_names():
+    found = read({"observation.time": T, "observation.state": X, "observation": X}, time="observation.time")
+    assert found.demonstrations.n_dims == 2
+
+
+def test_a_bomb_is_not_expanded(monkeypatch):
+    n = 2**18
+    columns = {"time": np.arange(n), "x": np.zeros(n), "beside": ["a" * 100] * n}
+    sink = io.BytesIO()
+    parquet.write_table(pa.table(columns), sink, compression="zstd")
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(len(sink.getvalue()) + 2**18))
+    with pytest.raises(kineme.DataError, match="KINEME_MAX_FILE_BYTES"):
+        read_recordings_from_bytes(sink.getvalue(), "a.parquet", Layout(units="ms"))
+
+
+def test_one_long_name_costs_its_own_length(monkeypatch):
+    name, n = "x" * 2**16, 2000
+    monkeypatch.setenv("KINEME_MAX_FILE_BYTES", str(2**20))
+    found = read({"label": [name] * n, "time": np.arange(n) / 100, "x": np.zeros(n)}, units="s")
+    assert found.labels == (name,)
+
+
+@pytest.mark.parametrize("which", [[0, 5], [-1, 0]])
+def test_numbers_of_names_that_are_not_there_are_damage(which):
+    """pyarrow reads such pages and does not look."""
+    names = pa.DictionaryArray.from_arrays(pa.array(which), pa.array(["wave"]), safe=False)
+    with pytest.raises(
+        kineme.DataError, match=r"expected names in 'label', got numbers of names that are not there: damaged"
+    ):
+        _texts(pa.chunked_array([names]), "label")

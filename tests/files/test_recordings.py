@@ -1,0 +1,96 @@
+"""Reading recorded movements, and writing generated ones so that nothing is lost."""
+
+import json
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.files.movements import WRITERS, write_movement
+from kineme.files.recordings import read_recording
+
+TIMES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
+PATH = np.array([[0.0, 1.0], [0.5, 1.5], [1.0, 2.5], [1.5, 2.0], [2.0, 3.0]])
+
+
+def table(separator=",", header="time,x,y", comment=""):
+    rows = [[repr(float(cell)) for cell in row] for row in np.column_stack((TIMES, PATH))]
+    lines = [header.replace(",", separator)] if header else []
+    return comment + "\n".join(lines + [separator.join(row) for row in rows]) + "\n"
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("header", ["time,x,y", "", "t,x,y", "Timestamp,x,y", '"time_s",x,y'])
+@pytest.mark.parametrize("ending", [".csv", ".tsv", ".txt"])
+def test_tables_of_many_kinds(tmp_path, separator, header, ending):
+    path = tmp_path / f"wave{ending}"
+    path.write_text(table(separator, header, comment="# recorded by hand\n"), encoding="utf-8")
+    one = read_recording(path)
+    np.testing.assert_array_equal(one.times, TIMES)
+    np.testing.assert_array_equal(one.positions, PATH)
+    assert one.name == path.name
+
+
+def test_time_may_stand_in_any_column_and_carry_a_unit(tmp_path):
+    (tmp_path / "a.csv").write_text("x [m],time [s],y [m]\n" + "\n".join(f"{k},{k / 10},{k * k}" for k in range(5)))
+    one = read_recording(tmp_path / "a.csv")
+    np.testing.assert_allclose(one.times, np.arange(5) / 10)
+    np.testing.assert_array_equal(one.positions[:, 1], np.arange(5) ** 2)
+
+
+def test_a_byte_order_mark_and_windows_lines_are_read(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"\xef\xbb\xbf" + table().replace("\n", "\r\n").encode())
+    np.testing.assert_array_equal(read_recording(tmp_path / "a.csv").positions, PATH)
+
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_what_is_written_is_read_back_bit_for_bit(tmp_path, ending):
+    columns = {"times": TIMES, "positions": PATH / 3}
+    one = read_recording(write_movement(tmp_path / f"x{ending}", columns))
+    np.testing.assert_array_equal(one.times, TIMES)
+    np.testing.assert_array_equal(one.positions, PATH / 3)
+
+
+def test_columns_are_named(tmp_path):
+    columns = {"times": TIMES, "positions": PATH, "velocities": PATH, "accelerations": PATH}
+    text = write_movement(tmp_path / "x.csv", columns).read_text()
+    assert text.splitlines()[0] == "time,x,y,v_x,v_y,a_x,a_y"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.csv", "", "a.csv: expected samples, got an empty file"),
+        ("a.csv", "time,x\n0,1\n1,oops\n", "a.csv, line 3: expected a number in 'x', got 'oops'"),
+        ("a.csv", "time,x\n0,1\n1\n", "a.csv, line 3: expected 2 columns, got 1"),
+        ("a.csv", "a,b\n0,1\n1,2\n", r"a.csv: expected one column of times, .* got the columns \['a', 'b'\]"),
+        ("a.csv", "time,t,x\n0,1,2\n", "one column of times"),
+        ("a.csv", "1\n2\n3\n4\n", "at least one of positions, got one column"),
+        ("a.mp4", "", "a file ending in one of .csv, .tsv, .txt, .npz, .json, .*, got '.mp4'"),
+        ("a.json", "[1, 2]", "an object with times and positions, got a list"),
+        ("a.json", '{"times": [0, 1]}', "got no entry 'positions'"),
+        ("a.json", '{"times": ', "a.json: expected JSON, got a truncated or damaged file .Expecting value"),
+        ("a.npz", "not an archive", "archive of arrays"),
+    ],
+)
+def test_files_that_are_not_what_their_name_says(tmp_path, name, content, words):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(kineme.DataError, match=words):
+        read_recording(tmp_path / name)
+
+
+def test_bytes_that_are_no_text(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"\xff\x00\x01" * 9)
+    with pytest.raises(kineme.DataError, match=r"a\.csv: expected text, got bytes that are none"):
+        read_recording(tmp_path / "a.csv")
+
+
+def test_numbers_that_are_no_movement_name_the_file(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps({"times": [0, 1, 1, 2], "positions": [1, 2, 3, 4]}))
+    with pytest.raises(kineme.TrajectoryError, match=r"a\.json: expected strictly increasing times"):
+        read_recording(tmp_path / "a.json")
+
+
+def test_writing_to_an_unknown_ending_is_refused(tmp_path):
+    with pytest.raises(kineme.DataError, match=r"\.csv, \.npz, \.json, got '\.xls'"):
+        write_movement(tmp_path / "a.xls", {"times": TIMES, "positions": PATH})

@@ -1,0 +1,363 @@
+"""Tables of samples by lines: how they may be written, what their columns are, and what is wrong where."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kineme
+from kineme.files.recordings import read_recordings, read_recordings_from_bytes
+from kineme.files.tables.columns import choose_roles, is_time
+from kineme.files.tables.layout import Layout
+
+SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
+
+
+def read(text, name="a.csv", **options):
+    data = text if isinstance(text, bytes) else text.encode()
+    return read_recordings_from_bytes(data, name, Layout(**options))
+
+
+def lines(rows, head="time,x,y"):
+    return "\n".join([head, *(",".join(map(str, row)) for row in rows)]) + "\n"
+
+
+finite = st.floats(-1e100, 1e100)  # the range of positions
+formats = st.sampled_from(["{!r}", "{:.17g}", "{:.17e}", "{:+.17E}", " {!r} ", '"{!r}"'])
+
+
+@given(
+    values=st.lists(st.tuples(finite, finite), min_size=4, max_size=30),
+    style=formats,
+    separator=st.sampled_from([",", ";", "\t", ", "]),
+    comma=st.booleans(),
+    end=st.sampled_from(["\n", "\r\n", "\n\n", "\n# between\n"]),
+    names=st.booleans(),
+)
+@settings(max_examples=300)
+def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separator, comma, end, names):
+    if separator == "\t" and style.startswith(" "):
+        style = style.strip()
+    comma = comma and "," not in separator
+    values = [*values, (0.0, 1.0), (1.0, 0.0)]  # an extent in range
+    rows = [[style.format(float(k)), *(style.format(value) for value in row)] for k, row in enumerate(values)]
+    rows = [[cell.replace(".", ",") if comma else cell for cell in row] for row in rows]
+    if names:
+        rows = [["demo", "time", "a", "b"]] + [['"one, or two"', *row] for row in rows]
+    else:
+        rows = [["time", "a", "b"], *rows]
+    found = read(end.join(separator.join(row) for row in rows) + end, units="s").demonstrations
+    np.testing.assert_array_equal(found.positions, np.array(values))
+    np.testing.assert_array_equal(found.times, np.arange(len(values)))
+
+
+@given(
+    text=st.text("time,xy;\t 01.5e-+#%\"'\n\r\u00e4nalbeld", max_size=200) | st.text(max_size=80),
+    skip=st.sampled_from(["movement", "sample"]),
+)
+@settings(max_examples=400)
+def test_any_text_is_a_table_or_an_error(text, skip):
+    try:
+        found = read(text.encode("utf-8", "replace"), skip=skip)
+    except kineme.DataError as error:
+        assert "a.csv" in str(error)  # noqa: PT017 - both ends are right
+    else:
+        assert np.isfinite(found.demonstrations.positions).all()
+        assert (found.demonstrations.lengths >= 4).all()
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda: np.savetxt("x.csv", np.array(SIX), delimiter=",", header="time,x,y"),
+        lambda: np.savetxt("x.csv", np.array(SIX), delimiter=",", header="time,x,y", comments=""),
+        lambda: np.savetxt("x.csv", np.array(SIX), header="time x y"),
+        lambda: np.savetxt("x.csv", np.array(SIX)),
+        lambda: np.savetxt("x.csv", np.array(SIX), delimiter="\t", fmt="%.3f"),
+    ],
+)
+def test_what_numpy_writes_is_read(tmp_path, monkeypatch, write):
+    monkeypatch.chdir(tmp_path)
+    write()
+    one = read_recordings("x.csv").demonstrations[0]
+    np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        lines(SIX, "time,x [µm],y").encode(),
+        lines(SIX, "time,x [µm],y").encode("latin-1"),
+        lines(SIX, "time,x [µm],y").encode("utf-8-sig"),
+        lines(SIX, "time,x [µm],y").encode("utf-16"),
+        lines(SIX, "time,x [µm],y").replace("\n", "\r").encode(),
+    ],
+)
+def test_encodings(data):
+    found = read(data)
+    assert found.detected[0][0].columns == ("x [µm]", "y")
+    np.testing.assert_array_equal(found.demonstrations.positions, np.array(SIX)[:, 1:])
+
+
+@pytest.mark.parametrize(
+    ("head", "scale", "units"),
+    [
+        ("time [ms]", 1e3, ("ms", "head")),
+        ("Time (us)", 1e6, ("us", "head")),
+        ("t_ns", 1e9, ("ns", "head")),
+        ("timeMs", 1e3, ("ms", "head")),
+        ("time/ms", 1e3, ("ms", "head")),
+        ("seconds", 1, ("s", "head")),
+        ("time", 1, ("s", "assumed")),
+        ("time", 1e3, ("ms", "by its steps")),
+        ("time", 1e6, ("us", "by its steps")),
+        ("time", 1e9, ("ns", "by its steps")),
+    ],
+)
+def test_units_of_time_are_told_by_head_or_by_size(head, scale, units):
+    times = np.arange(8) / 100
+    text = lines([(repr(float(t)), 1, k) for k, t in enumerate(times * scale)], f"{head},x,y")
+    found = read(text)
+    how = found.detected[0][0]
+    assert (how.units, how.units_from) == units
+    np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15, atol=0)
+
+
+@pytest.mark.parametrize(("scale", "units"), [(1, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_stamps_since_1970_tell_their_unit_whatever_the_rate(scale, units):
+    times = 1.7e9 + np.arange(8) / 4
+    found = read(lines([(f"{t * scale:.2f}", 1, k) for k, t in enumerate(times)], "stamp,x,y"))
+    assert found.detected[0][0][4:6] == (units, "since 1970")
+    np.testing.assert_allclose(found.demonstrations.times, times, rtol=1e-15)
+
+
+@pytest.mark.parametrize(("units", "divisor"), [("ms", 1000), ("us", 10**6), (0.5, 2), ("milliseconds", 1000)])
+def test_units_that_are_given_win(units, divisor):
+    found = read(lines(SIX, "time [s],x,y"), units=units)
+    assert found.detected[0][0][4:6] == (units, "given")
+    np.testing.assert_array_equal(found.demonstrations.times, np.arange(6) / divisor)
+
+
+def test_rows_without_stamps_are_a_given_step_apart():
+    with pytest.raises(kineme.DataError, match="or the step between samples with units= where there is none"):
+        read(lines(SIX, "a,b,c"))
+    found = read(lines(SIX, "a,b,c"), units=0.02)
+    np.testing.assert_allclose(found.demonstrations.times, np.arange(6) * 0.02)
+    assert found.demonstrations.n_dims == 3
+    long = read(lines([("p" if k < 4 else "q", *SIX[k % 6]) for k in range(8)], "trial,a,b,c"), units=0.02)
+    np.testing.assert_allclose(long.demonstrations.times, np.tile(np.arange(4) * 0.02, 2))
+
+
+@pytest.mark.parametrize("head", ["t", "T", "Time", "time [s]", "timestamp", "t_ms", "ElapsedTime", "sec", "unix time"])
+def test_heads_that_are_time(head):
+    assert is_time(head)
+
+
+@pytest.mark.parametrize("head", ["x", "t0", "tx", "s", "temp", "torque", "time constant", "", "min", "states"])
+def test_heads_that_are_not(head):
+    assert not is_time(head)
+
+
+@pytest.mark.parametrize(
+    ("heads", "roles"),
+    [
+        ("time x y", (0, (1, 2), (), None, ())),
+        ("x t y", (1, (0, 2), (), None, ())),
+        ("id label t x", (2, (3,), (0,), 1, ())),
+        ("subject trial gesture stamp q1 q2", (3, (4, 5), (0, 1), 2, ())),
+        ("frame time x y v_x v_y a_x a_y", (1, (2, 3), (), None, (0, 4, 5, 6, 7))),
+        ("Unnamed:_0 time x y vx vy", (1, (2, 3), (), None, (0, 4, 5))),
+        ("time v_x v_y", (0, (1, 2), (), None, ())),
+        ("class_name movement_id time_ms x", (2, (3,), (1,), 0, ())),
+    ],
+)
+def test_columns_find_their_roles(heads, roles):
+    assert choose_roles(heads.split(), ["number"] * len(heads.split()), Layout()) == roles
+
+
+def test_roles_that_are_given_win():
+    text = lines([("n", *row) for row in SIX], "note,clock,x,y")
+    found = read(text, time="clock", columns=("y", "x"), label="note")
+    np.testing.assert_array_equal(found.demonstrations.positions, np.array(SIX)[:, [2, 1]])
+    assert found.labels == ("n",)
+    by_number = read(text, time=1, columns=(3, "2"), label=0)
+    np.testing.assert_array_equal(by_number.demonstrations.positions, found.demonstrations.positions)
+    assert read(text, time="clock").detected[0][0].ignored == ("note",)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"columns": "z"}, r"expected a column 'z', got the columns \['time', 'x', 'y'\]"),
+        ({"time": 7}, r"expected a column 7, got the columns"),
+        ({"columns": "time", "time": "time", "label": "q"}, r"expected a column 'q'"),
+    ],
+)
+def test_a_column_that_is_not_there_is_refused_with_those_that_are(options, words):
+    with pytest.raises(kineme.DataError, match=words):
+        read(lines(SIX), **options)
+
+
+def test_ambiguous_columns_are_refused():
+    with pytest.raises(kineme.DataError, match=r"expected one column of times, .*\['time', 'stamp', 'y'\]; say which"):
+        read(lines(SIX, "time,stamp,y"))
+    with pytest.raises(kineme.DataError, match=r"expected one column of labels, got \['label', 'class'\]; say which"):
+        read(lines([("a", "b", *row) for row in SIX], "label,class,time,x,y"))
+
+
+def test_movements_of_a_long_table_may_be_interleaved_and_share_their_number_between_labels():
+    rows = [(label, k % 2, t, x, y) for t, x, y in SIX for k, label in enumerate(("wave", "wave", "point", "point"))]
+    found = read(lines(rows, "label,trial,time,x,y"))
+    assert [(one.label, one.place) for one in found.sources] == [
+        (label, f"{label}/{k}") for label in ("wave", "point") for k in "01"
+    ]
+    for one in found.demonstrations:
+        np.testing.assert_array_equal(np.column_stack((one.times, one.positions)), np.array(SIX))
+
+
+def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
+    rows = [(label, *row) for label in ("wave", "wave", "rest", "wave") for row in SIX]
+    rows += [("nod", 100 + row[0], *row[1:]) for row in SIX]
+    found = read(lines(rows, "label,time,x,y"))
+    assert found.labels == ("wave", "wave", "rest", "wave", "nod")
+    assert [one.place for one in found.sources] == ["0", "1", "2", "3", "4"]
+    assert found.demonstrations.lengths.tolist() == [6] * 5
+
+
+def test_names_are_text_whatever_they_look_like():
+    rows = [(name, label, *row) for name, label in (("001", "1e3"), ("1", "nan"), ("a, b; c", "")) for row in SIX]
+    text = "\n".join(["id\tlabel\ttime\tx\ty", *("\t".join(map(str, row)) for row in rows)])
+    found = read(text)
+    assert [one.place for one in found.sources] == ["001", "1", "a, b; c"]
+    assert found.labels == ("1e3", "nan", None)
+
+
+FAULTS = [
+    ("oops", "expected a number in 'x', got 'oops'"),
+    ("", "expected a number in 'x', got nothing"),
+    ("NA", "expected a number in 'x', got 'NA'"),
+    ("1_0", "expected a number in 'x', got '1_0'"),
+    ("0x10", "expected a number in 'x', got '0x10'"),
+    ("1,2", "expected 4 columns, got 5"),
+    ("inf", r"expected finite positions, got [inf, 18.0] at sample 2"),
+    ("nan", r"expected finite positions, got [nan, 18.0] at sample 2"),
+]
+
+
+@pytest.mark.parametrize(("cell", "reason"), FAULTS)
+@pytest.mark.parametrize("good", [6, 3000])  # the slow reader has more than one stretch of lines
+def test_a_bad_cell_costs_its_movement_and_is_found_by_its_line(cell, reason, good):
+    rows = [("a", k, 10 + k, 20 - k) for k in range(good)] + [("b", k, 10 + k, 20 - k) for k in range(6)]
+    rows[good + 2] = ("b", 2, cell, 18.0)
+    found = read("# a comment\n\n" + lines(rows, "demo,time,x,y"))
+    (problem,) = found.problems
+    assert (problem.file, problem.line, problem.reason) == ("a.csv", 3 + good + 3, f"movement b: {reason}")
+    assert [one.place for one in found.sources] == ["a"]
+    kept = read("# a comment\n\n" + lines(rows, "demo,time,x,y"), skip="sample")
+    assert kept.demonstrations.lengths.tolist() == [good, 5]
+    assert kept.problems[0].reason == f"movement b: {reason}; this sample left out"
+
+
+@pytest.mark.parametrize(
+    ("times", "reason", "kept"),
+    [
+        ((0, 1, 1, 2, 3, 4), "got duplicate stamps 1 and 1 s at sample 2", [0, 1, 2, 3, 4]),
+        ((0, 1, 2, 1.5, 1.7, 3), "got decreasing stamps 2 and 1.5 s at sample 3", [0, 1, 2, 3]),
+        ((0, 1, "inf", 3, 4, 5), "expected finite times, got inf at sample 2", [0, 1, 3, 4, 5]),
+        ((5, 0, 1, 2, 3, 6), "got decreasing stamps 5 and 0 s at sample 1", None),
+    ],
+)
+def test_time_must_go_on(times, reason, kept):
+    text = lines([(t, k, -k) for k, t in enumerate(times)], "time,x,y")
+    with pytest.raises(kineme.DataError, match=rf"line [345]: .*{reason}"):
+        read(text)
+    if kept is None:
+        with pytest.raises(kineme.DataError, match="expected at least 4 samples, got 2"):
+            read(text, skip="sample")
+    else:
+        assert read(text, skip="sample").demonstrations.times.tolist() == kept
+
+
+@pytest.mark.parametrize("text", ["time,x,y,\n" + "".join(f"{k},1,{k},\n" for k in range(5))])
+def test_a_separator_at_the_end_of_every_line_is_no_column(text):
+    found = read(text)
+    assert found.demonstrations.n_dims == 2
+    assert found.detected[0][0].ignored == ("",)
+
+
+def test_many_faults_are_told_once_per_movement():
+    rows = [(k, "" if k % 3 == 0 else k, k) for k in range(30)]
+    with pytest.raises(kineme.DataError, match=r"line 2: expected a number in 'x', got nothing; 9 more like this"):
+        read(lines(rows))
+    kept = read(lines(rows), skip="sample")
+    assert kept.problems[0].reason.endswith("; 10 samples like this left out")
+    assert kept.demonstrations.lengths.tolist() == [20]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "expected samples, got an empty file"),
+        ("# nothing\n\n", "expected samples, got an empty file"),
+        ("time,x\n", "expected samples, got none below the heads|at least 4 samples"),
+        ("1\n2\n3\n4\n", "at least one of positions, got one column"),
+        ("a,b\nc,d\ne,f\n", r"one column of times"),
+        ("time,x\n1,a\n2,b\n3,c\n4,d\n", "at least one of positions"),
+    ],
+)
+def test_no_table(text, words):
+    with pytest.raises(kineme.DataError, match=words):
+        read(text)
+
+
+def test_missing_numbers_agree_with_an_independent_reader():
+    rng = np.random.default_rng(0)
+    table = np.round(rng.normal(size=(4000, 3)), 6)
+    gone = rng.random(table.shape) < 0.1
+    cells = [["" if lost else repr(float(cell)) for cell, lost in zip(row, drop, strict=True)]
+             for row, drop in zip(table, gone, strict=True)]  # fmt: skip
+    text = "time,x,y,z\n" + "\n".join(f"{k},{','.join(row)}" for k, row in enumerate(cells)) + "\n"
+    expected = np.genfromtxt(io.StringIO(text), delimiter=",", skip_header=1)
+    expected = expected[np.isfinite(expected).all(axis=1)]
+    found = read(text, skip="sample").demonstrations
+    np.testing.assert_array_equal(np.column_stack((found.times, found.positions)), expected)
+
+
+@pytest.mark.parametrize("style", ["{}", "{}Z", "{}+02:00", " {} "])
+@pytest.mark.parametrize("between", ["T", " "])
+@pytest.mark.parametrize("head", ["time,x,y", "", "Timestamp [ms],x,y"])
+def test_dates_are_time_stamps(style, between, head):
+    dates = [f"2024-05-06{between}07:08:{9 + k / 4:09.6f}" for k in range(6)]
+    rows = [",".join(map(str, (style.format(date), k, -k))) for k, date in enumerate(dates)]
+    found = read("\n".join([head] * bool(head) + rows))
+    np.testing.assert_allclose(np.diff(found.demonstrations.times), 0.25, atol=3e-7)
+    offset = 7200 if "+" in style else 0
+    assert found.demonstrations.times[0] == 1714979289 - offset
+    assert found.detected[0][0][4:6] == ("s", "dates")
+    assert found.demonstrations.n_dims == 2
+
+
+def test_a_cell_that_is_no_date_is_found_by_its_line():
+    rows = [(f"2024-05-06 07:{8 + k // 60:02}:{k % 60:02}", k) for k in range(40)]
+    rows[30] = ("yesterday", 30)
+    with pytest.raises(kineme.DataError, match="line 32: expected a date in 'time', got 'yesterday'"):
+        read(lines(rows, "time,x"))
+    assert read(lines(rows, "time,x"), skip="sample").demonstrations.lengths.tolist() == [39]
+
+
+def test_decimal_commas_between_blanks():
+    found = read("0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
+    np.testing.assert_array_equal(
+        np.column_stack((found.times, found.positions)), [[0, 1.5], [0.1, 2.5], [0.2, 3.5], [0.3, 4.5]]
+    )
+    named = read("t x\n0,0 1,5\n0,1 2,5\n0,2 3,5\n0,3 4,5\n").demonstrations
+    np.testing.assert_array_equal(named.positions, found.positions)
+
+
+def test_a_line_that_numbers_the_columns_is_no_sample():
+    rows = [(k / 10, 1.5 * k, k) for k in range(5)]
+    np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)
+    whole = [(k, k + 1, k + 2) for k in range(5)]
+    assert read("\n".join(",".join(map(str, row)) for row in whole)).demonstrations.lengths.tolist() == [5]
