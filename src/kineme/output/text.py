@@ -52,5 +52,10 @@ def in_markup(text: Any) -> str:
     return escape(printable_lines(text))
 
 
+def counted(number: int, noun: str) -> str:
+    """A number and its noun: ``1 movement``, ``2 movements``."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 def _written_out(mark: str) -> str:
     return mark.encode("unicode_escape").decode("ascii")
