@@ -34,9 +34,10 @@ from kineme import (
     preprocess,
     styles,
 )
-from kineme.comparison.describe import view
+from kineme.comparison.describe import feature_rows
 from kineme.comparison.normalization import SCALES, Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.features.rows import FEATURES
@@ -244,10 +245,11 @@ def described(scale: str, translation: bool, cutoff: float | None) -> Batched:
                 np.split(demos.positions / unit, demos.offsets[1:-1]),
                 times=np.split(demos.times, demos.offsets[1:-1]),
             )
-        rows = view(demos, DEFAULT_REPRESENTATIONS, Normalization(translation, scale), cutoff)
+        specification = ComparisonSpecification(normalization=Normalization(translation, scale), cutoff=cutoff)
+        rows = feature_rows(demos, specification)
         return each(len(demos), **{one.name: row for one, row in zip(DEFAULT_REPRESENTATIONS, rows, strict=True)})
 
-    return Batched(f"view {scale} {translation} {cutoff}", call, 1e-8)
+    return Batched(f"feature_rows {scale} {translation} {cutoff}", call, 1e-8)
 
 
 def gram_row(name: str, kernel: Any, dtype: str) -> Batched:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.stored import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
@@ -16,9 +17,9 @@ from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
-from kineme.recognition.answer import Answer, Neighbor, answers, is_one
+from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.two_stage_search import Shortlist, Stored
+from kineme.recognition.two_stage_search import TwoStageSearch
 
 Ids = NDArray[np.int64]
 
@@ -53,20 +54,20 @@ class Serving:
     _version: int | None = None
     _index: Index | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: Recognizer | Shortlist | None = None
+    _model: Recognizer | TwoStageSearch | None = None
 
     def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
         demos = Demonstrations.of([X] if is_one(X) else X)
-        if isinstance(model, Shortlist):
+        if isinstance(model, TwoStageSearch):
             found = model.recognize(demos, error_rate)
         else:
-            found = answers(model, demos, error_rate)
+            found = model.recognize(demos, error_rate)
         found = self._named(found)
         return found[0] if is_one(X) else found
 
-    def model(self) -> Recognizer | Shortlist:
+    def model(self) -> Recognizer | TwoStageSearch:
         """The recognizer of the library as it is now: an ordinary one, or one in two stages."""
         version = self.store.version
         if self._model is None or version != self._version:
@@ -80,7 +81,7 @@ class Serving:
         demos = read.movements(self.store, members.ids, [None] * len(members.ids))
         return self.store.specification.recognizer().fit(demos, members.labels)
 
-    def _large(self, members: Members) -> Shortlist:
+    def _large(self, members: Members) -> TwoStageSearch:
         self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
         self._ids = self._index.ids
         return two_stages(self.store, self._index, members)
@@ -129,24 +130,23 @@ def members_of(store: Store) -> Members:
     return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
 
 
-def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
+def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
-    recognizer = sample_recognizer(store, members)
-    looks = store.specification.representations
-    kept = [looks.index(one) for one in recognizer.looks()]
+    comparison = sample_recognizer(store, members).comparison_
+    kept = [store.specification.representations.index(one) for one in comparison.representations]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
-    def views(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
+    def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
         blocks = np.split(read.features(store, index.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in kept)
 
-    stored = Stored(
+    stored = StoredReferences(
         tuple(index.bases[r] for r in kept),
         tuple(tuple(block[r] for r in kept) for block in index.blocks),
         index.rows(members.ids),
         members.first,
-        views,
+        features,
         lambda rows: read.movements(store, index.ids[rows], [None] * len(rows)),
     )
-    recognizer.calibration_ = calibrate(store, members, recognizer, stored)
-    return Shortlist(recognizer, members.names, stored)
+    calibration = calibrate(store, members, comparison.similarity, stored)
+    return TwoStageSearch(comparison, calibration, members.names, stored)

@@ -12,7 +12,7 @@ from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-from kineme.anchoring.seen import see_rows
+from kineme.comparison.describe import describe_rows
 from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
 from kineme.library.storage.symbols import Symbol
@@ -31,8 +31,8 @@ def prototype_of(library: ActionLibrary, symbol: Symbol) -> int:
     if symbol.prototype is not None:
         return int(symbol.prototype)
     members = _some(symbol)
-    seen = see_rows(library.features(members), library.n_dims or 0, library.specification.recognizer())
-    return int(members[medoid_of(seen, library.specification.recognizer())])
+    described = describe_rows(library.features(members), library.n_dims or 0, library.specification.recognizer())
+    return int(members[medoid_of(described, library.specification.recognizer())])
 
 
 def primitive_of(library: ActionLibrary, who: str) -> Primitives:
@@ -65,7 +65,7 @@ def space_of(library: ActionLibrary) -> ConceptualSpace:
         )
     like = library.specification.recognizer()
     rows = library.features([prototype_of(library, symbol) for symbol in symbols])
-    return conceptual_space([one.name for one in symbols], see_rows(rows, library.n_dims or 0, like), like)
+    return conceptual_space([one.name for one in symbols], describe_rows(rows, library.n_dims or 0, like), like)
 
 
 def morph_symbols(library: ActionLibrary, a: str, b: str, shares: Any) -> Primitives:

@@ -13,7 +13,7 @@ from kineme.anchoring.proposals.assign import place
 from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import propose
-from kineme.anchoring.seen import see_rows
+from kineme.comparison.describe import describe_rows
 from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -87,8 +87,8 @@ def propose_kinds(
         found = place(library.movements(ids=chosen), known_recognizer(library), min_members=min_members).proposals
     else:
         like = library.specification.recognizer()
-        seen = see_rows(library.features(chosen), library.n_dims or 0, like)
-        found = propose(seen, method or "agglomerative", n_clusters, min_members=min_members, like=like)
+        described = describe_rows(library.features(chosen), library.n_dims or 0, like)
+        found = propose(described, method or "agglomerative", n_clusters, min_members=min_members, like=like)
     return LibraryProposals(chosen, _without(found, _rejected_before(library, chosen)) if ids is None else found)
 
 
@@ -188,10 +188,10 @@ def review_symbols(library: ActionLibrary) -> Review:
     if len(np.unique(labels)) < 2:
         return Review((), ())
     like = library.specification.recognizer()
-    seen = see_rows(library.features(ids), library.n_dims or 0, like)
-    splits = suggest_splits(seen, labels, like=like)
+    described = describe_rows(library.features(ids), library.n_dims or 0, like)
+    splits = suggest_splits(described, labels, like=like)
     return Review(
-        suggest_merges(seen, labels, like=like),
+        suggest_merges(described, labels, like=like),
         tuple(one._replace(parts=(ids[one.parts[0]], ids[one.parts[1]])) for one in splits),
     )
 
