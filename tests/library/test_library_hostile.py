@@ -16,7 +16,8 @@ from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
 from kineme.library.storage import guard
-from kineme.library.storage.connection import FILE, connect
+from kineme.library.storage.connection import connect
+from kineme.library.storage.folder import FILE
 
 
 @pytest.fixture(scope="module")
