@@ -274,14 +274,14 @@ class ActionLibrary:
 
     def export(self, path: str | Path) -> Path:
         """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
-        from kineme.library.storage.exchange import export
+        from kineme.library.storage.export_import import export
 
         return export(self.store, path)
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
         """Make a library in `folder` of a file that `export` wrote, after checking every byte of it, and open it."""
-        from kineme.library.storage.exchange import import_
+        from kineme.library.storage.export_import import import_
 
         import_(path, folder)
         return cls(folder, **options)

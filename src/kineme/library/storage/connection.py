@@ -17,9 +17,9 @@ from pathlib import Path
 from urllib.parse import quote
 
 from kineme.errors import DataError
+from kineme.library.storage.defense import defend
 from kineme.library.storage.folder import LOGS, new_database
-from kineme.library.storage.guard import defend
-from kineme.library.storage.over_forks import Connection, open_connection
+from kineme.library.storage.fork_safety import Connection, open_connection
 from kineme.library.storage.rows import Row, damage, insert, select
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 from kineme.library.storage.sqlite_errors import in_plain_words

@@ -14,9 +14,9 @@ from threading import Lock, RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.storage import over_forks
+from kineme.library.storage import fork_safety
 from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
-from kineme.library.storage.guard import size_of
+from kineme.library.storage.defense import size_of
 from kineme.library.storage.rows import insert, parsed_column, select
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
@@ -64,7 +64,7 @@ class Store:
         self._waking, self._asleep, self._closed = Lock(), False, False
         if not self.path.exists():
             self._create(specification)
-        with in_plain_words(self.path, wait), over_forks.awake():
+        with in_plain_words(self.path, wait), fork_safety.awake():
             self._reader = self._connect()
             try:
                 self._check_kind()
@@ -75,10 +75,10 @@ class Store:
             except BaseException:
                 self._reader.close()
                 raise
-            over_forks.register(self)
+            fork_safety.register(self)
 
     def _connect(self) -> sqlite3.Connection:
-        over_forks.refuse_if_lost(self.path)
+        fork_safety.refuse_if_lost(self.path)
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
 
     def sleep(self) -> None:
@@ -91,7 +91,7 @@ class Store:
             self._writer = None
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """The connections that a fork found open; see `over_forks`."""
+        """The connections that a fork found open; see `fork_safety`."""
         if self._closed or self._asleep:
             return []
         return [one for one in (self._writer, self._reader) if one is not None]
@@ -165,8 +165,8 @@ class Store:
         DataError
             The library was closed, or is not to be used in this process.
         """
-        with over_forks.awake(), in_plain_words(self.path, self.wait):
-            over_forks.refuse_if_lost(
+        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+            fork_safety.refuse_if_lost(
                 self.path
             )  # first: in a child, the turn may be that of a thread that is not there
             with self._look:
@@ -193,8 +193,8 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        with over_forks.awake(), in_plain_words(self.path, self.wait):
-            over_forks.refuse_if_lost(
+        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+            fork_safety.refuse_if_lost(
                 self.path
             )  # first: in a child, the turn may be that of a thread that is not there
             with self._turn:
@@ -245,9 +245,9 @@ class Store:
 
     def close(self) -> None:
         """Close both connections, once no other thread uses them; the last one to close leaves a single file."""
-        if over_forks.is_lost(self.path):
+        if fork_safety.is_lost(self.path):
             return
-        with over_forks.awake():
+        with fork_safety.awake():
             self._closed = True  # nobody begins any more
             with self._look:
                 self._reader.close()

@@ -26,7 +26,7 @@ from typing import Any, Protocol
 from weakref import WeakSet
 
 from kineme.errors import DataError
-from kineme.library.storage.guard import Watched
+from kineme.library.storage.defense import Watched
 from kineme.runtime import forks
 
 _PATIENCE = 10.0  # seconds
