@@ -1,7 +1,7 @@
 """What rows must hold that SQLite cannot judge: numbers inside bytes, and JSON.
 
-Each function gets rows that fit their seals and `column_checks.CHECKS`, and gives the keys of those that no library holds,
-with what was expected of them.
+Each function gets rows whose checksums are right and whose columns fit `column_checks.CHECKS`, and gives the keys of
+those that no library holds, with what is wrong with them.
 """
 
 from __future__ import annotations
