@@ -22,9 +22,9 @@ _QUICK_SPLITS = 2
 @click.command(short_help="Compare recognizers on a data set.")
 @click.argument("data")
 @click.option("--protocol", "protocols", multiple=True, type=click.Choice(PROTOCOL_NAMES),
-              help="Protocol to run; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
+              help="Protocol; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
 @click.option("--method", "methods", multiple=True, type=click.Choice(METHOD_NAMES),
-              help="Method to compare; may be repeated.  [default: all]")  # fmt: skip
+              help="Method; may be repeated.  [default: all]")  # fmt: skip
 @click.option("--splits", type=whole(1), default=10, show_default=True, help="Random splits per protocol.")
 @click.option("--shots", multiple=True, type=whole(1), default=(1, 3, 5), show_default=True,
               help="Training movements per class; may be repeated.")  # fmt: skip

@@ -40,7 +40,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--columns", type=Heads(), help="Columns of the coordinates."),
     click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
-    click.option("--units", type=Unit(), help="Unit of the time stamps; as a number in seconds, also the step of samples without stamps."),
+    click.option("--units", type=Unit(), help="Unit of the time stamps, by name or in seconds."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a missing or repeated sample.",
