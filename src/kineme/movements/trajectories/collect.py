@@ -155,6 +155,8 @@ def collect_arrays(
     n = len(offsets) - 1
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
+    if times is None:
+        _refuse_transposed(offsets, positions.shape[1], names)
     check_finite(positions, offsets, names, "positions")
     check_extents(positions, offsets, names)
     stamps = None if times is None else _join_times(times, offsets, names)
@@ -170,20 +172,34 @@ def collect_arrays(
 
 
 def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp]]:
-    if block.ndim != 3:
+    if block.ndim not in (1, 2, 3):
         raise TrajectoryError(
-            f"expected an array of shape (n, T, d), movements by samples by dimensions, got shape {block.shape}; "
-            "pass one movement as [array]"
+            f"expected an array of shape (n, T, d), movements by samples by dimensions, or one movement of shape "
+            f"(T, d), got shape {block.shape}"
         )
+    is_many = block.ndim == 3
+    block = block if is_many else block[None] if block.ndim == 2 else block[None, :, None]
     if len(block) == 0:
         raise TrajectoryError("expected at least one movement, got none")
     if block.dtype.kind not in "biuf":
         raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
     refuse_lossy(block, "the block")
-    as_positions(block[0], "every movement of the block")
+    as_positions(block[0], "every movement of the block" if is_many else "the movement")
     n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
+
+
+def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[str | None] | None) -> None:
+    """Refuse a movement without time stamps that has more dimensions than samples; stamps say which axis is time."""
+    lengths = np.diff(offsets)
+    if (wide := lengths < n_dims).any():
+        i = int(np.argmax(wide))
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
+            f"({lengths[i]}, {n_dims}), more dimensions than samples; transpose the array, or, if it is right, pass its "
+            "time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
+        )
 
 
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
