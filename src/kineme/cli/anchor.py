@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option, whole
-from kineme.cli.output import count, say, write
-from kineme.output.text import printable
+from kineme.cli.output import say, write
+from kineme.output.text import counted, printable
 
 _SHOWN = 5  # movements left over, written out
 
@@ -188,21 +188,21 @@ def _as_data(proposals: Any) -> dict[str, Any]:
 def _text(data: dict[str, Any], alone: str) -> str:
     from kineme.output.table import Table, to_text
 
-    lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
-    lines += [f"{count(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
+    lines = [f"{counted(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
+    lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
     found = data["proposals"]
     rows = [
         (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",
          "" if one["nearest"] is None else str(one["nearest"]))
         for one in found
     ]  # fmt: skip
-    title = f"{count(len(found), 'proposal')}, {count(len(data['left_over']), 'movement')} left over{alone}"
+    title = f"{counted(len(found), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
     lines.append(
         to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
     )
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")
-    lines += [f"{printable(name)}: {count(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
+    lines += [f"{printable(name)}: {counted(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
     if data.get("rejected"):
         lines.append(f"rejected {', '.join(map(str, data['rejected']))}")
     return "\n".join(lines)

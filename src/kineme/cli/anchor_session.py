@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.output import ask, confirm, count, write
+from kineme.cli.output import ask, confirm, write
 from kineme.errors import KinemeError
-from kineme.output.text import printable
+from kineme.output.text import counted, printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
@@ -64,7 +64,7 @@ class Session:
             except KinemeError as error:
                 write(f"  {printable(error)}")
         left = len(self.library.unlabeled())
-        write(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
+        write(f"{counted(len(self.library.symbols()), 'symbol')}, {counted(left, 'movement')} without one")
 
     def _answer(self, item: Item, line: str) -> bool:
         """Do what the person says; whether to go on."""
@@ -96,7 +96,7 @@ class Session:
         self.library.accept(item.proposal, name)
         self.items.popleft()
         symbol = self.library[name]
-        write(f"  {printable(symbol.name)}: {count(len(symbol), 'movement')} ({symbol.id})")
+        write(f"  {printable(symbol.name)}: {counted(len(symbol), 'movement')} ({symbol.id})")
 
     def _split(self, item: Item) -> None:
         parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
@@ -115,4 +115,4 @@ class Session:
     def _summary(self, item: Item) -> str:
         one = item.proposal
         where = f"; see {printable(item.picture)}" if item.picture else ""
-        return f"\n{item.title}: {count(len(one), 'movement')}, stability {one.stability:.2f}{where}"
+        return f"\n{item.title}: {counted(len(one), 'movement')}, stability {one.stability:.2f}{where}"

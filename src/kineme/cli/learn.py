@@ -10,9 +10,9 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option
-from kineme.cli.output import count, say
+from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
-from kineme.output.text import printable
+from kineme.output.text import counted, printable
 
 _SHOWN = 10  # problems written out
 
@@ -107,12 +107,12 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
 
 
 def _text(data: dict[str, Any]) -> str:
-    new = f", {count(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
+    new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
     known = f", {data['known']:,} known already{joined}" if data["known"] else ""
-    held = f"{printable(data['library'])} holds {count(data['movements'], 'movement')}"
+    held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
     problems = data["problems"]
-    lines = [f"learned {count(data['added'], 'movement')}{known}{new}; {held}"]
+    lines = [f"learned {counted(data['added'], 'movement')}{known}{new}; {held}"]
     lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
     if len(problems) > _SHOWN:
         lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from kineme.cli.options import ID, SymbolName, json_option, library_option, whole
-from kineme.cli.output import confirm, count, in_words, say
-from kineme.output.text import printable
+from kineme.cli.output import confirm, in_words, say
+from kineme.output.text import counted, printable
 
 
 @click.group()
@@ -46,8 +46,8 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
 
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
         title = (
-            f"{count(data['movements'], 'movement')}, {count(len(symbols), 'symbol')}, {unlabeled} without a symbol; "
-            f"version {data['version']}"
+            f"{counted(data['movements'], 'movement')}, {counted(len(symbols), 'symbol')}, "
+            f"{unlabeled} without a symbol; version {data['version']}"
         )
         return to_text(Table(title, ("symbol", "movements", "id", "description"), rows)) if rows else title
 
@@ -106,7 +106,7 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
     """
     if (symbol is None) == (not movements):
         raise click.UsageError("expected a SYMBOL, or --movement ID, and not both")
-    what = printable(symbol) if symbol is not None else count(len(movements), "movement")
+    what = printable(symbol) if symbol is not None else counted(len(movements), "movement")
     if not yes:
         confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
     with opened(folder, read_only=False) as actions:
@@ -132,7 +132,7 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
             (str(one.id), one.at[:19].replace("T", " "), one.action, printable(in_words(one.detail)))
             for one in versions[-limit:]
         ]
-        return to_text(Table(count(len(versions), "version"), ("version", "at (UTC)", "action", "what"), rows))
+        return to_text(Table(counted(len(versions), "version"), ("version", "at (UTC)", "action", "what"), rows))
 
     say(as_json, data, text)
 
@@ -150,7 +150,7 @@ def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
     say(
         as_json,
         data,
-        lambda: "\n".join(map(printable, problems)) if problems else f"{count(n, 'movement')}, nothing wrong",
+        lambda: "\n".join(map(printable, problems)) if problems else f"{counted(n, 'movement')}, nothing wrong",
     )
     ctx.exit(1 if problems else 0)
 
@@ -164,7 +164,7 @@ def export(path: Path, folder: Path, as_json: bool) -> None:
     with opened(folder) as actions:
         actions.export(path)
         data: dict[str, Any] = {"path": str(path), "movements": len(actions), "bytes": path.stat().st_size}
-    say(as_json, data, lambda: f"wrote {printable(path)}: {count(data['movements'], 'movement')}")
+    say(as_json, data, lambda: f"wrote {printable(path)}: {counted(data['movements'], 'movement')}")
 
 
 @library.command("import")
@@ -177,7 +177,7 @@ def import_(path: Path, folder: Path, as_json: bool) -> None:
 
     with ActionLibrary.import_(path, folder) as actions:
         data: dict[str, Any] = {"library": str(folder), "movements": len(actions), "symbols": len(actions.symbols())}
-    say(as_json, data, lambda: f"{printable(folder)}: {count(data['movements'], 'movement')}")
+    say(as_json, data, lambda: f"{printable(folder)}: {counted(data['movements'], 'movement')}")
 
 
 def brief(symbol: Any) -> dict[str, Any]:

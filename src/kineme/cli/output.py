@@ -51,11 +51,6 @@ def to_json(data: Any, encoding: str = "utf-8") -> str:
     return text if shown else json.dumps(data, allow_nan=False, indent=1)
 
 
-def count(number: int, what: str) -> str:
-    """A number and its noun: ``1 movement``, ``2 movements``."""
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
-
-
 def in_words(detail: Mapping[str, Any]) -> str:
     """Keys with their values, ``added 30; symbols nod, wave``: nothing of what is empty, the number of a long list."""
     parts = []

@@ -8,8 +8,8 @@ import click
 
 from kineme.cli.library import brief, opened
 from kineme.cli.options import ID, SymbolName, json_option, library_option
-from kineme.cli.output import count, say
-from kineme.output.text import printable
+from kineme.cli.output import say
+from kineme.output.text import counted, printable
 
 
 @click.command()
@@ -22,7 +22,7 @@ def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> N
     with opened(folder, read_only=False) as actions:
         actions.merge(symbols, into)
         data = {**brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}")
 
 
 @click.command()
@@ -36,7 +36,7 @@ def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_j
     with opened(folder, read_only=False) as actions:
         actions.split(symbol, list(movements), into)
         data = {**brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {count(data['movements'], 'movement')}")
+    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}")
 
 
 @click.command()

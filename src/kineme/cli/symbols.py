@@ -11,8 +11,8 @@ import click
 
 from kineme.cli.library import opened
 from kineme.cli.options import SymbolName, json_option, library_option, whole
-from kineme.cli.output import count, say, to_json
-from kineme.output.text import printable
+from kineme.cli.output import say, to_json
+from kineme.output.text import counted, printable
 
 
 @click.command(short_help="Write a symbol for a planner, as JSON.")
@@ -79,7 +79,7 @@ def draw(path: Path, folder: Path, as_json: bool) -> None:
         typical = [prototype_of(actions, actions[name]) for name in space.symbols]
         save_figure(draw_map(space, actions.movements(ids=typical)), path)
         data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
-    say(as_json, data, lambda: f"wrote {printable(path)}: {count(len(data['symbols']), 'symbol')}")
+    say(as_json, data, lambda: f"wrote {printable(path)}: {counted(len(data['symbols']), 'symbol')}")
 
 
 def _lies(one: dict[str, Any]) -> str:

@@ -133,7 +133,7 @@ def _time(
 def is_time(head: str) -> bool:
     """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
     words = words_of(head)
-    if words[:-1] == [] and words != ["s"] and set(words) & set(PER_SECOND):
+    if len(words) <= 1 and words != ("s",) and set(words) & set(PER_SECOND):
         return True
     return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
 
@@ -159,7 +159,7 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
         return ()
     kind = MOVEMENT_WORDS
     return tuple(
-        k for k, head in enumerate(heads) if k != label and (_named_as(head, kind) or words_of(head) == ["id"])
+        k for k, head in enumerate(heads) if k != label and (_named_as(head, kind) or words_of(head) == ("id",))
     )
 
 

@@ -81,9 +81,11 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
     """How a table is written, from its first lines; no more are taken than needed."""
-    lines, kept = [], []
+    lines, kept, longest = [], [], 0
     for line in text:
-        check_expanded(_CELL * len(line), "lines")
+        if len(line) > longest:
+            longest = len(line)
+            check_expanded(_CELL * longest, "lines")
         lines.append(line)
         if not is_skipped(line):
             kept.append(len(lines) - 1)
@@ -112,8 +114,10 @@ def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int
     As long as the first cells of all other rows are no numbers; else a row was commented out.
     """
     separator = _separator([lines[kept[0]]])
+    if separator is None or len(kept) == len(lines) - kept[0]:  # none below is left out
+        return kept
     rows = [split(lines[k], separator) for k in kept]
-    if separator is None or any(is_number(row[0], separator != ",") for row in rows):
+    if any(is_number(row[0], separator != ",") for row in rows):
         return kept
     below = (k for k in range(kept[0] + 1, len(lines)) if lines[k].strip() and is_skipped(lines[k]))
     marked = (k for k in below if _is_row(split(lines[k], separator), len(rows[0]), separator))

@@ -77,9 +77,16 @@ def _encoding(data: bytes) -> str:
 
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
+    """The lines; of encodings that `_encoding` has checked, or that any bytes are, without a look at each."""
+    if encoding != "utf-16":
+        return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
+    return _checked_lines(data, encoding)
+
+
+def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
     try:
         for line in io.TextIOWrapper(io.BytesIO(data), encoding=encoding):
-            if encoding == "utf-16" and "\0" in line:
+            if "\0" in line:
                 raise DataError("expected text, got bytes that are none")
             yield line
     except UnicodeError as error:

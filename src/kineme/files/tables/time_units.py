@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,9 +36,10 @@ _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
 GUESSED = ("since 1970", "by its steps", "assumed")
 
 
-def words_of(head: str) -> list[str]:
+@lru_cache(maxsize=256)  # thousands of files have the same heads
+def words_of(head: str) -> tuple[str, ...]:
     """The words in a column's head, in lower case: ``"timeStamp [ms]"`` is time, stamp, ms."""
-    return [word.lower() for word in _WORDS.findall(head)]
+    return tuple(word.lower() for word in _WORDS.findall(head))
 
 
 def unit_in_head(head: str) -> str | None:

@@ -20,7 +20,7 @@ class Step(Protocol):
 
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
-    """Refuse what is not an iterable of steps; a step's class without parentheses is not a step."""
+    """Refuse anything but an iterable of steps; the class of a step, without parentheses, is not a step."""
     try:
         found = tuple(steps)
     except TypeError:
@@ -36,7 +36,7 @@ def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
 
 
 def preprocess(movements: MovementsLike, steps: Iterable[Step]) -> Demonstrations:
-    """Apply steps in order to movements in any form; the result's ``steps`` records them after earlier ones."""
+    """Apply steps in order to movements; they are appended to the ``steps`` of the result."""
     demonstrations = Demonstrations.of(movements)
     for step in check_steps(steps):
         demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))

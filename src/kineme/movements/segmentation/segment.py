@@ -1,4 +1,4 @@
-"""One long recording in, movements out."""
+"""`segment`: cut one long recording into movements."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def segment(
         One movement, in any way that `Demonstrations.of` takes it. An array (T, d) is taken as evenly sampled over one
         second; pass a `Trajectory` with its time stamps, so that parameters in seconds mean something.
     by : {"rest", "speed", "change-points"} or Segmenter, default "rest"
-        Where to cut: where it rests, where it slows down, where its velocity changes regime (needs
+        Where to cut: at rests, at minima of speed, or at change points of the velocity (needs
         ``pip install kineme[segmentation]``). See `Rest`, `SpeedMinima` and `ChangePoints`.
     cover : bool, default False
         Whether every sample belongs to exactly one movement. By default rests belong to none.
@@ -46,7 +46,7 @@ def segment(
     Raises
     ------
     TrajectoryError
-        A recording that rests all along, of fewer than eight samples, or with values that are not finite.
+        A recording without motion, with fewer than eight samples, or with values that are not finite.
     SpecificationError
         An unknown method or parameter, a parameter out of range, or the library of "change-points" is missing.
 
@@ -70,7 +70,7 @@ def segment(
 
 
 def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
-    """The method of that name with these parameters; a method itself takes none."""
+    """The method of that name with these parameters; a method that is passed itself takes no parameters."""
     if not isinstance(by, str):
         if isinstance(by, type) or not callable(getattr(by, "inner_cuts", None)) or parameters:
             raise SpecificationError(
@@ -88,7 +88,7 @@ def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
 
 
 def as_recording(recording: MovementsLike) -> Trajectory:
-    """One recording, whatever way it is held.
+    """One recording as a `Trajectory`.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def as_recording(recording: MovementsLike) -> Trajectory:
 
 
 def enough_samples(pieces: Rows) -> Rows:
-    """Pieces of fewer samples than a trajectory needs join the one before, the first one the one after."""
+    """Merge pieces of fewer samples than a trajectory needs with the piece before, the first with the one after."""
     starts = [0]
     for start in pieces[1:, 0].tolist():
         if start - starts[-1] >= MIN_SAMPLES and pieces[-1, 1] - start >= MIN_SAMPLES:
@@ -113,7 +113,7 @@ def enough_samples(pieces: Rows) -> Rows:
 
 
 def moving(motion: Motion, pieces: Rows, resolution: float) -> Rows:
-    """Those pieces that move, narrowed to their motion."""
+    """The pieces with motion, narrowed to it."""
     padded = np.append(motion.speed, 0.0)
     fastest = np.maximum.reduceat(padded, pieces.ravel())[::2]
     pieces = pieces[fastest > 2.0 * max(resolution * motion.peak, 2.0 * motion.noise)]

@@ -23,9 +23,9 @@ class Segmentation:
     Attributes
     ----------
     recording : Trajectory
-        What was cut.
+        The recording that was cut.
     method : Segmenter
-        How: a record with all its parameters.
+        The method, with all its parameters.
     rows : ndarray of shape (n, 2)
         First sample of each movement, and one past its last.
     """
@@ -81,5 +81,5 @@ def pieces_of(recording: Trajectory, rows: Rows) -> Demonstrations:
 
 
 def _seconds(time: float) -> str:
-    """To a tenth of a millisecond, also where stamps count seconds since 1970."""
+    """Seconds with four decimals, for seconds since 1970 too."""
     return np.format_float_positional(time, precision=4, trim="-")

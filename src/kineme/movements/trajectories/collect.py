@@ -1,4 +1,4 @@
-"""From what users hold, lists of arrays or trajectories, to one contiguous block."""
+"""Collect lists of arrays or trajectories into one contiguous block."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from kineme.validation import (
 Names = tuple[str | None, ...] | None
 
 _EVEN = 1e-9  # stamps off an even grid by less than this share of a step count as even
-_SAMPLES_AT_ONCE = 65_536  # stamps looked at together: uneven ones are found soon, and temporaries stay in the cache
+_SAMPLES_AT_ONCE = 65_536  # stamps checked at a time: uneven ones are found early, and temporaries stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Movements:
 
     @cached_property
     def separated(self) -> Movements:
-        """The same movements, samples at nearly the same time made one, for interpolation; usually themselves."""
+        """The same movements with close samples merged, for interpolation; usually there are none."""
         merged = None if self.times is None else merge_close(self.times, self.positions, self.offsets)
         if merged is None:
             return self
@@ -98,7 +98,7 @@ class Movements:
         return self.stamps if self.times is None else spread_close(self.times, self.offsets)
 
     def take(self, chosen: NDArray[np.intp]) -> Movements:
-        """The chosen movements, in that order, copied into a block of their own."""
+        """The chosen movements, in that order, copied into a new block."""
         if len(chosen) == 0:
             raise TrajectoryError("expected at least one movement, got an empty selection")
         lengths = np.diff(self.offsets)[chosen]
@@ -115,7 +115,7 @@ class Movements:
 
 
 def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
-    """Join trajectories, which have been checked one by one already."""
+    """Concatenate trajectories, each of which has been checked already."""
     trajectories = list(trajectories)
     for i, one in enumerate(trajectories):
         if not isinstance(one, Trajectory):
@@ -145,7 +145,7 @@ def collect_arrays(
     names: Sequence[str | None] | None,
     copy: bool,
 ) -> Movements:
-    """Join arrays and check them all at once; see `Demonstrations.from_arrays`."""
+    """Concatenate arrays and check them all at once; see `Demonstrations.from_arrays`."""
     is_block = isinstance(arrays, np.ndarray) and arrays.dtype != object
     if names is not None:
         _check_sized(names, "names as a list, one for each movement")
@@ -213,7 +213,7 @@ def _check_sized(value: Any, expected: str) -> None:
 
 
 def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...], names: Names) -> list[Array]:
-    """Check movement by movement; only an error costs the time to say which one it was."""
+    """Check movement by movement, to name the invalid one; runs only after a check of all has failed."""
     try:
         return list(map(check, *columns))
     except TrajectoryError:

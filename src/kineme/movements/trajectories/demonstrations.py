@@ -1,4 +1,4 @@
-"""Many movements of unequal length and sampling, held contiguously."""
+"""Many movements of unequal length and sampling, stored contiguously."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Demonstrations(Sequence[Trajectory]):
     Raises
     ------
     TrajectoryError
-        No movement at all, or movements of different dimensions; the message names the first culprit.
+        No movement at all, or movements of different dimensions; the message names the first such movement.
     """
 
     def __init__(self, trajectories: Sequence[Trajectory]) -> None:
@@ -115,7 +115,7 @@ class Demonstrations(Sequence[Trajectory]):
 
     @classmethod
     def of_movements(cls, movements: Movements, steps: tuple[Any, ...] = ()) -> Demonstrations:
-        """Hold a block that has been checked already."""
+        """`Demonstrations` from a block that has been checked already."""
         new = cls.__new__(cls)
         new._hold(movements, steps)
         return new
