@@ -65,7 +65,9 @@ def folder(letters, tmp_path_factory):
         if i % 7 < 4:
             path = folder / one.label / f"{i}.csv"
             path.parent.mkdir(exist_ok=True)
-            np.savetxt(path, np.column_stack((one.times, one.positions))[::8], "%.17g", ",", header="t,x,y", comments="")
+            np.savetxt(
+                path, np.column_stack((one.times, one.positions))[::8], "%.17g", ",", header="t,x,y", comments=""
+            )
     return folder
 
 
