@@ -197,8 +197,8 @@ def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[s
         i = int(np.argmax(wide))
         raise TrajectoryError(
             f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
-            f"({lengths[i]}, {n_dims}), more dimensions than samples; transpose the array, or, if it is right, pass its "
-            "time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
+            f"({lengths[i]}, {n_dims}), more dimensions than samples; transpose the array, or, if it is right, pass "
+            "its time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast, overload
 
 import numpy as np
@@ -13,7 +13,6 @@ from kineme.movements.trajectories.collect import Movements, collect_arrays, col
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array
-
 
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
