@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.files.parsed_file import Block, Detected, Problem
 from kineme.files.read_file import FileRead
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
 
 

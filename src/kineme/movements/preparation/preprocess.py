@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
 
 

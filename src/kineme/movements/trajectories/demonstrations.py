@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.trajectories.collect import Movements, collect_arrays, collect_trajectories
+from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
+from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array
