@@ -56,7 +56,8 @@ def anchor(folder: Path, **options: Any) -> None:
     """
     from kineme.cli.anchor_session import Session
     from kineme.library.library import ActionLibrary
-    from kineme.library.symbols.proposals import join, joinable, propose_kinds
+    from kineme.library.symbols.proposals import propose
+    from kineme.library.symbols.recognized import assign_recognized, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
@@ -64,10 +65,10 @@ def anchor(folder: Path, **options: Any) -> None:
     writes = scripted or interactive
     with ActionLibrary(folder, read_only=not writes) as library:
         # What joins is left out whether it is written or not: a number means the same when listed and when accepted.
-        joining = joinable(library) if options["join"] else {}
+        joining = recognized(library.store) if options["join"] else {}
         members = [one for ids in joining.values() for one in ids.tolist()]
-        proposals = propose_kinds(
-            library, None, options["method"], options["clusters"], options["min_members"], members
+        proposals = propose(
+            library.store, None, options["method"], options["clusters"], options["min_members"], members
         )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
@@ -75,7 +76,7 @@ def anchor(folder: Path, **options: Any) -> None:
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
-            "joined": join(library, joining) if writes else {},
+            "joined": assign_recognized(library.store, joining) if writes else {},
             "would_join": {} if writes else {name: len(ids) for name, ids in joining.items()},
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
@@ -126,7 +127,7 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     if not len(proposals):
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    movements = proposals.movements(library)
+    movements = library.movements(ids=proposals.ids)
     like = library.specification.recognizer()
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
     for k, one in enumerate(proposals.found.proposals):

@@ -62,7 +62,7 @@ def _primitive(options: dict[str, Any]) -> Any:
         from kineme.library.symbols.grounding import primitive_of
 
         with ActionLibrary(options["folder"], read_only=True) as library:
-            return primitive_of(library, source)
+            return primitive_of(library.store, source)
     from kineme.primitives.discrete.dmp import DMP
     from kineme.primitives.generation.generate import primitives_from
 

@@ -87,7 +87,7 @@ def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], l
     from kineme.library.learning.recordings import learn_recordings
 
     with _progress(len(recordings)) as progress:
-        return learn_recordings(library, recordings, options, labels, progress, root)
+        return learn_recordings(library.store, recordings, options, labels, progress, root)
 
 
 def _joined(library: Any, before: int) -> int:

@@ -60,11 +60,11 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
 @json_option
 def show(symbol: str, folder: Path, as_json: bool) -> None:
     """Show one symbol: its movements, where they come from, and how they vary."""
-    from kineme.library.symbols.symbol_report import sheet
+    from kineme.library.symbols.symbol_report import symbol_report
 
     with opened(folder) as actions:
-        data = sheet(actions, symbol)
-    say(as_json, data, lambda: _sheet_text(data))
+        data = symbol_report(actions.store, symbol)
+    say(as_json, data, lambda: _report_text(data))
 
 
 @library.command()
@@ -192,7 +192,7 @@ def brief(symbol: Any) -> dict[str, Any]:
     }
 
 
-def _sheet_text(data: dict[str, Any]) -> str:
+def _report_text(data: dict[str, Any]) -> str:
     from kineme.output.table import Table, to_text
 
     rows = [

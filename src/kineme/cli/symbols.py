@@ -75,8 +75,8 @@ def draw(path: Path, folder: Path, as_json: bool) -> None:
     from kineme.output.figures import save_figure
 
     with opened(folder) as actions:
-        space = space_of(actions)
-        typical = [prototype_of(actions, actions[name]) for name in space.symbols]
+        space = space_of(actions.store)
+        typical = [prototype_of(actions.store, actions[name]) for name in space.symbols]
         save_figure(draw_map(space, actions.movements(ids=typical)), path)
         data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
     say(as_json, data, lambda: f"wrote {printable(path)}: {counted(len(data['symbols']), 'symbol')}")
