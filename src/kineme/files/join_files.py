@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.parsed_file import Block, Detected, Problem
 from kineme.files.read_file import FileRead
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.trajectory import Trajectory
 
 
 class Source(NamedTuple):
@@ -47,6 +49,8 @@ class Source(NamedTuple):
 class Recordings:
     """Movements with their sources, and the problems of what could not be read.
 
+    A sequence of `Trajectory`, taken wherever movements are expected.
+
     Attributes
     ----------
     demonstrations : Demonstrations
@@ -66,6 +70,17 @@ class Recordings:
 
     def __len__(self) -> int:
         return len(self.sources)
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return iter(self.demonstrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
+    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
+        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
+        return self.demonstrations[index]
 
     @property
     def labels(self) -> tuple[str | None, ...]:
