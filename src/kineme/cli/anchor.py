@@ -1,4 +1,4 @@
-"""``kineme anchor``: from movements without a name to symbols, with a person or by a script."""
+"""``kineme anchor``: propose symbols among unlabeled movements, and accept them in a dialogue or by options."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import click
 
 from kineme.cli.options import json_option, library_option, whole
-from kineme.cli.output import count, say, write
-from kineme.output.text import printable
+from kineme.cli.output import say, write
+from kineme.output.text import counted, printable
 
-_SHOWN = 5  # movements left over, written out
+_SHOWN = 5  # remaining movements that are listed
 
 
 class Choice(click.ParamType):  # type: ignore[type-arg]
-    """Numbers of proposals separated by commas, or all."""
+    """Numbers of proposals separated by commas, or "all"."""
 
     name = "0,1,...|all"
 
@@ -31,43 +31,47 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
 
 
-@click.command(short_help="Turn movements without a name into symbols.")
+@click.command(short_help="Turn unlabeled movements into symbols.")
 @library_option
 @click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
-              help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip
-@click.option("--clusters", type=whole(1), help="How many kinds.  [default: as many as fit]")
-@click.option("--min-members", type=whole(2), default=3, show_default=True, help="That make a kind.")
+              help="Clustering.  [default: members as similar as those of the stored symbols]")  # fmt: skip
+@click.option("--clusters", type=whole(1), help="Number of clusters.  [default: chosen from the data]")
+@click.option(
+    "--min-members", type=whole(2), default=3, show_default=True, help="Smallest number of movements in a proposal."
+)
 @click.option("--join/--no-join", default=True, show_default=True,
-              help="First let movements join the symbols that they are recognized as.")  # fmt: skip
-@click.option("--accept", type=Choice(), help="Name these proposals, without asking.")
-@click.option("--reject", type=Choice(), help="Leave these movements unnamed, and do not propose them again.")
+              help="First add movements to the symbols that they are recognized as.")  # fmt: skip
+@click.option("--accept", type=Choice(), help="Accept these proposals without asking.")
+@click.option("--reject", type=Choice(), help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help='A JSON file of names: {"0": "wave", "1": "nod"}.  [default: kind 1, kind 2, ...]')  # fmt: skip
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
 def anchor(folder: Path, **options: Any) -> None:
-    """Propose kinds among the movements without a name, and turn them into symbols.
+    """Propose symbols among the unlabeled movements, and accept them.
 
-    On a terminal it asks for each; with --accept or --reject it does not; else it changes nothing, and lists them under
-    the numbers that --accept will know them by.
+    On a terminal it asks about each proposal. With --accept or --reject it does not ask. Otherwise it changes nothing
+    and lists the proposals by the numbers that --accept takes.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     from kineme.cli.anchor_session import Session
     from kineme.library.library import ActionLibrary
-    from kineme.library.symbols.proposals import join, joinable, propose_kinds
+    from kineme.library.symbols.proposals import propose
+    from kineme.library.symbols.recognized import assign_recognized, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
     names = _names(options["names"])
     writes = scripted or interactive
     with ActionLibrary(folder, read_only=not writes) as library:
-        # What joins is left out whether it is written or not: a number means the same when listed and when accepted.
-        joining = joinable(library) if options["join"] else {}
+        # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
+        # listed and when it is accepted.
+        joining = recognized(library.store) if options["join"] else {}
         members = [one for ids in joining.values() for one in ids.tolist()]
-        proposals = propose_kinds(
-            library, None, options["method"], options["clusters"], options["min_members"], members
+        proposals = propose(
+            library.store, None, options["method"], options["clusters"], options["min_members"], members
         )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
@@ -75,7 +79,7 @@ def anchor(folder: Path, **options: Any) -> None:
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
-            "joined": join(library, joining) if writes else {},
+            "joined": assign_recognized(library.store, joining) if writes else {},
             "would_join": {} if writes else {name: len(ids) for name, ids in joining.items()},
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
@@ -91,7 +95,7 @@ def anchor(folder: Path, **options: Any) -> None:
 
 
 def _named(library: Any, ids: Any) -> str:
-    """The first movements by name, for a person."""
+    """Names of the first movements."""
     if not len(ids):
         return ""
     names = library.movements(ids=ids[:_SHOWN]).names or ()
@@ -118,7 +122,7 @@ def _names(path: Path | None) -> dict[int, str]:
 
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
-    """A sheet of all proposals, then a picture of each."""
+    """Draw an overview of all proposals, then a picture of each."""
     from kineme.anchoring.figures.proposal import draw_proposal
     from kineme.anchoring.figures.proposal_sheet import draw_proposals
     from kineme.output.figures import save_figure
@@ -126,13 +130,13 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     if not len(proposals):
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    movements = proposals.movements(library)
+    movements = library.movements(ids=proposals.ids)
     like = library.specification.recognizer()
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
     for k, one in enumerate(proposals.found.proposals):
         paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"kind-{k}.png"))
     old = len(proposals)
-    while (stale := folder / f"kind-{old}.png").exists():  # of an earlier run, under a number that means nothing now
+    while (stale := folder / f"kind-{old}.png").exists():  # pictures of an earlier run with more proposals
         stale.unlink()
         old += 1
     return paths
@@ -188,21 +192,21 @@ def _as_data(proposals: Any) -> dict[str, Any]:
 def _text(data: dict[str, Any], alone: str) -> str:
     from kineme.output.table import Table, to_text
 
-    lines = [f"{count(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
-    lines += [f"{count(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
+    lines = [f"{counted(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
+    lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
     found = data["proposals"]
     rows = [
         (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",
          "" if one["nearest"] is None else str(one["nearest"]))
         for one in found
     ]  # fmt: skip
-    title = f"{count(len(found), 'proposal')}, {count(len(data['left_over']), 'movement')} left over{alone}"
+    title = f"{counted(len(found), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
     lines.append(
         to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
     )
     if data["pictures"]:
         lines.append(f"pictures: {printable(data['pictures'][0])}")
-    lines += [f"{printable(name)}: {count(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
+    lines += [f"{printable(name)}: {counted(n, 'movement')}" for name, n in data.get("accepted", {}).items()]
     if data.get("rejected"):
         lines.append(f"rejected {', '.join(map(str, data['rejected']))}")
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""The dialogue of ``kineme anchor``: one proposal after the other, until all are named or the person stops."""
+"""The dialogue of ``kineme anchor``: one proposal after another, until all are named or the user stops."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import click
 
-from kineme.cli.output import ask, confirm, count, write
+from kineme.cli.output import ask, confirm, write
 from kineme.errors import KinemeError
-from kineme.output.text import printable
+from kineme.output.text import counted, printable
 
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
@@ -23,7 +23,7 @@ HELP = """\
 
 
 class Item(NamedTuple):
-    """A proposal on the list: its members are ids of movements."""
+    """A proposal in the queue; its members are ids of movements."""
 
     title: str
     proposal: Any
@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
 
 class Session:
-    """Ask about each proposal; every answer is committed at once.
+    """Ask about each proposal and commit every answer at once.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Session:
         self.items = deque(Item(str(k), proposals[k], pictures[k]) for k in range(len(proposals)))
 
     def run(self) -> None:
-        """Until the list is empty, /quit, or the end of the input."""
+        """Run until the queue is empty, the user enters /quit, or the input ends."""
         if self.items:
             write("Give each a name; /help says what else there is.")
         while self.items:
@@ -64,10 +64,10 @@ class Session:
             except KinemeError as error:
                 write(f"  {printable(error)}")
         left = len(self.library.unlabeled())
-        write(f"{count(len(self.library.symbols()), 'symbol')}, {count(left, 'movement')} without one")
+        write(f"{counted(len(self.library.symbols()), 'symbol')}, {counted(left, 'movement')} without one")
 
     def _answer(self, item: Item, line: str) -> bool:
-        """Do what the person says; whether to go on."""
+        """Carry out one line of input; return whether to continue."""
         command, _, rest = line.partition(" ")
         if command in {"/quit", "/q"}:
             return False
@@ -96,7 +96,7 @@ class Session:
         self.library.accept(item.proposal, name)
         self.items.popleft()
         symbol = self.library[name]
-        write(f"  {printable(symbol.name)}: {count(len(symbol), 'movement')} ({symbol.id})")
+        write(f"  {printable(symbol.name)}: {counted(len(symbol), 'movement')} ({symbol.id})")
 
     def _split(self, item: Item) -> None:
         parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
@@ -115,4 +115,4 @@ class Session:
     def _summary(self, item: Item) -> str:
         one = item.proposal
         where = f"; see {printable(item.picture)}" if item.picture else ""
-        return f"\n{item.title}: {count(len(one), 'movement')}, stability {one.stability:.2f}{where}"
+        return f"\n{item.title}: {counted(len(one), 'movement')}, stability {one.stability:.2f}{where}"

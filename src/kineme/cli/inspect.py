@@ -1,4 +1,4 @@
-"""``kineme inspect``: what a set of recordings holds, before anything is learned from it."""
+"""``kineme inspect``: summarize a set of recordings."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import click
 from kineme.cli.options import json_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
-from kineme.output.text import printable
 
 
-@click.command(short_help="Show what a set of recordings holds.")
+@click.command(short_help="Summarize a set of recordings.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @layout_options
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
@@ -27,18 +26,18 @@ def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) 
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
-    from kineme.files.inspection.inspect import inspect as look
+    from kineme.files.inspection.inspect import inspect as summarize
     from kineme.files.inspection.report import as_data, as_words
 
-    found = read(recordings, options)
+    recorded = read(recordings, options)
     if plot is not None:
-        _draw(found, plot)
-    seen = look(found)
-    say(as_json, as_data(seen), lambda: as_words(seen, printable))
+        _draw(recorded, plot)
+    summary = summarize(recorded)
+    say(as_json, as_data(summary), lambda: as_words(summary))
 
 
-def _draw(found: Any, path: Path) -> None:
+def _draw(recorded: Any, path: Path) -> None:
     from kineme.files.inspection.figure import draw_recordings
     from kineme.output.figures import save_figure
 
-    save_figure(draw_recordings(found), path)
+    save_figure(draw_recordings(recorded), path)

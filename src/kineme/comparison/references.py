@@ -14,7 +14,7 @@ from kineme.comparison.describe import Described
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
 
-class Movements(Protocol):
+class IndexedMovements(Protocol):
     """Movements by their indices: `Demonstrations`, or what reads them when asked."""
 
     @property
@@ -42,14 +42,14 @@ class References:
         Index of the first movement of each class.
     """
 
-    demonstrations: Movements
+    demonstrations: IndexedMovements
     described: Described
     labels: NDArray[Any]
     classes: NDArray[Any]
     first: NDArray[np.intp]
 
     @classmethod
-    def of(cls, demonstrations: Movements, described: Described, labels: NDArray[Any]) -> References:
+    def of(cls, demonstrations: IndexedMovements, described: Described, labels: NDArray[Any]) -> References:
         """Movements whose labels are sorted."""
         classes, first = np.unique(labels, return_index=True)
         return cls(demonstrations, described, labels, classes, first)

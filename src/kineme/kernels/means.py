@@ -1,4 +1,4 @@
-"""A-averages: joining per-dimension similarities (d, ...) into one, with what is proved of each."""
+"""A-averages of per-dimension similarities (d, ...), with what is proved about each."""
 
 from __future__ import annotations
 

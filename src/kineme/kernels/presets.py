@@ -9,7 +9,7 @@ from kineme.kernels.truncated import TruncatedEuclidean
 
 
 class PaperKernels(NamedTuple):
-    """The two kernels the paper applies to one representation."""
+    """The two kernels that the paper applies to one feature of one formulation."""
 
     rbf: RBF
     truncated: TruncatedEuclidean

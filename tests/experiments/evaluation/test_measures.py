@@ -24,21 +24,21 @@ def test_at_most_five_percent_of_the_known_are_rejected(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(5, 200))
     known, familiarity = np.arange(n + 40) < n, rng.normal(size=n + 40)
-    judged = open_set(np.zeros(n + 40), np.zeros(n + 40), familiarity, known)
-    rejected = 1 - judged["accuracy"]  # every class is right here
+    scores = open_set(np.zeros(n + 40), np.zeros(n + 40), familiarity, known)
+    rejected = 1 - scores["accuracy"]  # every class is right here
     assert rejected <= 0.05 + 1e-12
     assert rejected > 0.05 - 1 / n - 1e-12
 
 
 def test_separated_scores_reject_all_unknown():
     familiarity, known = np.array([3.0, 4.0, 1.0, 2.0]), np.array([True, True, False, False])
-    judged = open_set(np.array([0, 1, 0, 0]), np.array([0, 0, 7, 7]), familiarity, known)
-    assert judged == {"auroc": 1.0, "rejected": 1.0, "accuracy": 0.5}
+    scores = open_set(np.array([0, 1, 0, 0]), np.array([0, 0, 7, 7]), familiarity, known)
+    assert scores == {"auroc": 1.0, "rejected": 1.0, "accuracy": 0.5}
 
 
 def test_one_score_for_all_tells_nothing_apart():
-    judged = open_set(np.zeros(4), np.zeros(4), np.ones(4), np.array([True, True, False, False]))
-    assert judged == {"auroc": 0.5, "rejected": 0.0, "accuracy": 1.0}
+    scores = open_set(np.zeros(4), np.zeros(4), np.ones(4), np.array([True, True, False, False]))
+    assert scores == {"auroc": 0.5, "rejected": 0.0, "accuracy": 1.0}
 
 
 def test_accuracy_is_the_share_that_is_right():

@@ -3,19 +3,20 @@
 import numpy as np
 import pytest
 
-from kineme.experiments.evaluation import score_split as judging
+from kineme.experiments.evaluation import score_split as scoring
 from kineme.experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
-from kineme.experiments.evaluation.methods import METHODS, Method, Wishes
+from kineme.experiments.evaluation.methods import METHODS, Method, Options
 from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings, usable_shots
-from kineme.experiments.evaluation.score_split import answers_early, beginnings, judge
+from kineme.experiments.evaluation.score_split import classifies_partial, score_split
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme.recognition.early.early import cut
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
 AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable(2)]
 
 
 class Recording:
-    """A contender that remembers what it was given, and answers as a recognizer that knows everything."""
+    """A contender that records what it was given and knows the right class of every movement."""
 
     def __init__(self, log):
         self.log = log
@@ -23,61 +24,61 @@ class Recording:
     def fit(self, demonstrations):
         self.log.append((demonstrations.positions.copy(), demonstrations.labels.tolist()))
 
-    def answer(self, demonstrations):
+    def classify(self, demonstrations):
         self.log.append((demonstrations.positions.copy(), demonstrations.labels.tolist()))
         return demonstrations.labels, np.arange(len(demonstrations), dtype=float)
 
-    def answer_partial(self, demonstrations):
-        return self.answer(demonstrations)[0]
+    def classify_partial(self, demonstrations):
+        return self.classify(demonstrations)[0]
 
 
 @pytest.fixture
-def seen(monkeypatch):
+def logs(monkeypatch):
     """Method name -> what it was given; two methods of those names exist."""
-    logs = {"one": [], "other": []}
-    made = {name: Method(name, lambda _, log=log: Recording(log)) for name, log in logs.items()}
-    monkeypatch.setattr(judging, "METHODS", made)
-    return logs
+    given = {"one": [], "other": []}
+    made = {name: Method(name, lambda _, log=log: Recording(log)) for name, log in given.items()}
+    monkeypatch.setattr(scoring, "METHODS", made)
+    return given
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("index", [0, 1])
-def test_every_method_sees_the_same_movements(small, seen, protocol, index):
-    verdicts = [judge(small, protocol, method, index, SETTINGS) for method in seen]
-    assert len(seen["one"]) == len(seen["other"]) >= 2
-    for (x, labels), (y, others) in zip(seen["one"], seen["other"], strict=True):
+def test_every_method_sees_the_same_movements(small, logs, protocol, index):
+    scores = [score_split(small, protocol, method, index, SETTINGS) for method in logs]
+    assert len(logs["one"]) == len(logs["other"]) >= 2
+    for (x, labels), (y, others) in zip(logs["one"], logs["other"], strict=True):
         np.testing.assert_array_equal(x, y)
         assert labels == others
-    assert [one._replace(seconds=0) for one in verdicts[0]] == [one._replace(seconds=0) for one in verdicts[1]]
+    assert [one._replace(seconds=0) for one in scores[0]] == [one._replace(seconds=0) for one in scores[1]]
 
 
 @pytest.mark.parametrize("protocol", sorted(set(PROTOCOLS) - {"open-set"}))
-def test_who_knows_everything_is_always_right(small, seen, protocol):
-    assert all(one.values == {"accuracy": 1.0} for one in judge(small, protocol, "one", 0, SETTINGS))
+def test_who_knows_everything_is_always_right(small, logs, protocol):
+    assert all(one.values == {"accuracy": 1.0} for one in score_split(small, protocol, "one", 0, SETTINGS))
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
 @pytest.mark.parametrize("protocol", [name for name in PROTOCOLS if name != "earliness"])
 def test_every_method_goes_through_every_protocol_and_recognizes_what_is_easy(small, protocol, method):
-    verdicts = judge(small, protocol, method, 0, SETTINGS)
-    assert verdicts
-    assert all(0 <= value <= 1 for one in verdicts for value in one.values.values())
+    scores = score_split(small, protocol, method, 0, SETTINGS)
+    assert scores
+    assert all(0 <= value <= 1 for one in scores for value in one.values.values())
     if protocol in {"few-shot", "cross-validation", "leave-one-out"}:
-        assert np.mean([one.values["accuracy"] for one in verdicts]) > 0.9
+        assert np.mean([one.values["accuracy"] for one in scores]) > 0.9
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
 def test_two_classes_one_movement_each(make_small, method):
     two = make_small(n_classes=2, n_each=2)
-    assert judge(two, "few-shot", method, 0, Settings(1, 0, (1,)))[0].values["accuracy"] >= 0.5
+    assert score_split(two, "few-shot", method, 0, Settings(1, 0, (1,)))[0].values["accuracy"] >= 0.5
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
 def test_familiarity_is_higher_for_what_was_trained_on(small, method):
-    contender = METHODS[method].make(Wishes())
+    contender = METHODS[method].make(Options())
     known = small.labels != "class 3"
     contender.fit(small[known])
-    _, familiarity = contender.answer(small)
+    _, familiarity = contender.classify(small)
     assert np.median(familiarity[known]) > np.median(familiarity[~known])
 
 
@@ -85,7 +86,7 @@ def test_robustness_grows_and_has_one_reference_of_each_kind():
     conditions = robustness_conditions(2)
     assert len(conditions) == 1 + 3 * len(STRENGTHS) + len(TOGETHER)
     for kind in [*STRENGTHS, "together"]:
-        own = [(one.strength, reference) for one, _, reference in conditions if one.kind == kind and one.strength > 0]
+        own = [(one.strength, reference) for one, _, reference in conditions if one.varied == kind and one.strength > 0]
         assert own == sorted(own)
         assert [reference for _, reference in own] == [False, True, False]
     assert len({one for one, _, _ in conditions}) == len(conditions)
@@ -98,7 +99,7 @@ def test_other_dimensions_are_not_turned(make_small, d):
     demos = make_small(n_dims=d)
     assert "2 or 3 dimensions, these have" in PROTOCOLS["any-angle"].unsuitable(demos)
     for protocol in ("robustness", "open-set"):
-        assert judge(demos, protocol, "kineme", 0, SETTINGS)
+        assert score_split(demos, protocol, "kineme", 0, SETTINGS)
 
 
 def test_an_open_set_needs_two_known_and_two_unknown_classes(make_small):
@@ -112,24 +113,24 @@ def test_shots_leave_every_class_something_to_test(small):
 
 def test_slow_methods_take_the_reference_only(small, monkeypatch):
     log = []
-    monkeypatch.setattr(judging, "METHODS", {"slow": Method("slow", lambda _: Recording(log), slow=True)})
-    assert [one.condition.label for one in judge(small, "few-shot", "slow", 0, SETTINGS)] == ["1 shot"]
-    labels = [one.condition.label for one in judge(small, "robustness", "slow", 0, SETTINGS)]
+    monkeypatch.setattr(scoring, "METHODS", {"slow": Method("slow", lambda _: Recording(log), slow=True)})
+    assert [one.condition.label for one in score_split(small, "few-shot", "slow", 0, SETTINGS)] == ["1 shot"]
+    labels = [one.condition.label for one in score_split(small, "robustness", "slow", 0, SETTINGS)]
     assert labels == [one.label for one, _, reference in robustness_conditions(2) if reference]
 
 
 def test_beginnings_end_where_that_share_of_the_path_does(small):
     whole = Perturbation().apply(small, 0)
     for fraction in (0.2, 0.5, 1.0):
-        for part, full in zip(beginnings(small, fraction), whole, strict=True):
+        for part, full in zip(cut(small, fraction), whole, strict=True):
             n = len(part)
-            np.testing.assert_allclose(part.positions, full.positions[:n], atol=1e-9)
+            np.testing.assert_allclose(part.positions, full.positions[:n] - full.positions[0], atol=1e-9)
             np.testing.assert_allclose(part.times, full.times[:n] - full.times[0], atol=1e-12)
             steps = np.linalg.norm(np.diff(full.positions, axis=0), axis=1)
             share = steps[: n - 1].sum() / steps.sum()
             assert fraction - 0.03 < share <= fraction + 2e-3
-    np.testing.assert_array_equal(beginnings(small, 0.5).labels, small.labels)
+    np.testing.assert_array_equal(cut(small, 0.5).labels, small.labels)
 
 
 def test_rivals_do_not_answer_early():
-    assert not any(answers_early(name) for name in METHODS if name != "kineme")
+    assert not any(classifies_partial(name) for name in METHODS if name != "kineme")

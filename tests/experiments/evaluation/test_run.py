@@ -118,7 +118,7 @@ def test_the_point_cloud_is_for_the_plane(make_small, tmp_path):
 
 def test_a_protocol_that_nobody_can_answer_is_reported(data, tmp_path):
     result = run(data, tmp_path, (["few-shot", "earliness"], ["euclidean"]))
-    assert result.results.skipped == {"earliness": "none of the methods answers before the end"}
+    assert result.results.skipped == {"earliness": "none of the methods classifies movements before their end"}
 
 
 def outcome(absent=None, **accuracies):

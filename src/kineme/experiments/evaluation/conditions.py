@@ -1,4 +1,4 @@
-"""Under what the trials are held: how movements are perturbed, and how strongly."""
+"""The conditions of the trials: how movements are perturbed, and how strongly."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ class Condition(NamedTuple):
 
     Attributes
     ----------
-    kind : str
-        What varies; one panel of the plot.
+    varied : str
+        Name of what varies; one panel of the plot each.
     strength : float
-        How much of it.
+        How strongly it varies.
     label : str
-        Both, in words.
+        Both as text.
     """
 
-    kind: str
+    varied: str
     strength: float
     label: str
 
 
 UNTOUCHED = Condition("none", 0, "as recorded")
 
-#: Kind -> strengths; the middle one is the reference.
+#: Name of the perturbation -> strengths; the middle one is the reference.
 STRENGTHS: dict[str, tuple[float, float, float]] = {
     "shift": (0.5, 1.0, 2.0),  # extents
     "scale": (0.5, 1.0, 1.5),  # doublings
@@ -37,7 +37,7 @@ STRENGTHS: dict[str, tuple[float, float, float]] = {
     "noise": (1.0, 2.0, 3.0),  # % of the extent
 }
 
-_IN_WORDS = {
+_LABELS = {
     "shift": "shift {:g} extents",
     "scale": "scale 2^±{:g}",
     "rotation": "rotation ±{:g}°",
@@ -45,26 +45,26 @@ _IN_WORDS = {
     "noise": "noise {:g} %",
 }
 
-#: Everything at once, from weak to strong.
+#: All perturbations together, from weak to strong.
 TOGETHER = (
     Perturbation(0.5, 0.5, math.radians(10), 0.2, 0.005),
     Perturbation(1.0, 1.0, math.radians(20), 0.35, 0.01),
     Perturbation(2.0, 1.5, math.radians(40), 0.5, 0.03),
 )
-_TOGETHER_IN_WORDS = ("weakly", "moderately", "strongly")
+_TOGETHER_LABELS = ("weakly", "moderately", "strongly")
 
 
 def robustness_conditions(n_dims: int) -> list[tuple[Condition, Perturbation, bool]]:
-    """Each perturbation alone and all together, at growing strength; and which of them are the reference."""
-    found = [(Condition("shift", 0.0, "as recorded"), Perturbation(), True)]
-    for kind, strengths in STRENGTHS.items():
-        if kind == "rotation" and n_dims not in (2, 3):
+    """Each perturbation alone and all together at three strengths, and whether each is a reference condition."""
+    conditions = [(Condition("shift", 0.0, "as recorded"), Perturbation(), True)]
+    for varied, strengths in STRENGTHS.items():
+        if varied == "rotation" and n_dims not in (2, 3):
             continue
         for k, strength in enumerate(strengths):
-            amount = {"rotation": math.radians(strength), "noise": strength / 100}.get(kind, strength)
-            condition = Condition(kind, strength, _IN_WORDS[kind].format(strength))
-            found.append((condition, Perturbation(**{kind: amount}), k == 1))
+            amount = {"rotation": math.radians(strength), "noise": strength / 100}.get(varied, strength)
+            condition = Condition(varied, strength, _LABELS[varied].format(strength))
+            conditions.append((condition, Perturbation(**{varied: amount}), k == 1))
     for k, perturbation in enumerate(TOGETHER):
-        condition = Condition("together", k + 1.0, f"all {_TOGETHER_IN_WORDS[k]}")
-        found.append((condition, perturbation.in_dimensions(n_dims), k == 1))
-    return found
+        condition = Condition("together", k + 1.0, f"all {_TOGETHER_LABELS[k]}")
+        conditions.append((condition, perturbation.in_dimensions(n_dims), k == 1))
+    return conditions

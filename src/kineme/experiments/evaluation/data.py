@@ -20,7 +20,7 @@ PACKAGED = {"lasa": LASA_26, "lasa-letters": PAPER_LETTERS}
 
 
 class DataSet(NamedTuple):
-    """Labeled movements, and what was left out of them: file -> reason."""
+    """Labeled movements, and the files that were left out: file -> reason."""
 
     name: str
     demonstrations: Demonstrations

@@ -1,4 +1,4 @@
-"""Drawings of an evaluation: one panel per kind of condition, one line per method."""
+"""Figures of an evaluation: one panel per perturbation, one line per method."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _STYLES = dict(
 
 
 def draw_protocol(protocol: str, results: Results) -> bytes | None:
-    """SVG of accuracy over strength; None where nothing grows."""
+    """SVG of accuracy over strength; None for protocols without several strengths."""
     panels: dict[str, list[Condition]] = {}
     for condition in results.conditions(protocol):
-        panels.setdefault(condition.kind, []).append(condition)
-    panels = {kind: found for kind, found in panels.items() if kind in _AXES and len(found) > 1}
+        panels.setdefault(condition.varied, []).append(condition)
+    panels = {name: conditions for name, conditions in panels.items() if name in _AXES and len(conditions) > 1}
     if not panels or protocol == "open-set":
         return None
     columns = min(3, len(panels))
     rows = math.ceil(len(panels) / columns)
     figure = new_figure(2.6 * columns + 1.8, 2.1 * rows)
     axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    for k, (kind, conditions) in enumerate(panels.items()):
+    for k, (name, conditions) in enumerate(panels.items()):
         _draw_panel(axes.flat[k], protocol, results, conditions)
-        axes.flat[k].set(xlabel=_AXES[kind], ylim=(0, 1.03))
+        axes.flat[k].set(xlabel=_AXES[name], ylim=(0, 1.03))
     for row in axes:
         row[0].set_ylabel("accuracy")
     for empty in axes.flat[len(panels) :]:
@@ -55,9 +55,9 @@ def draw_protocol(protocol: str, results: Results) -> bytes | None:
 def _draw_panel(axes, protocol: str, results: Results, conditions: list[Condition]) -> None:  # type: ignore[no-untyped-def]
     for method in results.outcomes[protocol]:
         points = [(one.strength, results.mean(protocol, method, one, "accuracy")) for one in conditions]
-        known = [(x, y) for x, y in points if y is not None]
+        measured = [(x, y) for x, y in points if y is not None]
         color, line = _STYLES[method]
         label = METHODS[method].title
         width, front = (2.2, 3) if method == OURS else (1.1, 2)
-        x, y = [x for x, _ in known], [y for _, y in known]
+        x, y = [x for x, _ in measured], [y for _, y in measured]
         axes.plot(x, y, line, color=color, label=label, linewidth=width, marker="o", markersize=2.5, zorder=front)

@@ -1,4 +1,4 @@
-"""Rival that models how each class makes its movements: hidden Markov models."""
+"""Rival that fits a generative model to each class: a hidden Markov model."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from kineme.validation import Array
 
 _N_POINTS = 100
 _N_STATES = 10
-_MIN_VARIANCE = 1e-2  # of unit size: one demonstration has no spread of its own
+_MIN_VARIANCE = 1e-2  # for movements of unit size: one demonstration alone has no variance
 
 
 class HiddenMarkov:
-    """One left-to-right HMM per class on centered, scaled positions and their differences; the likeliest wins."""
+    """One left-to-right HMM per class on centered, scaled positions and their differences; the likeliest class wins."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -27,7 +27,7 @@ class HiddenMarkov:
     def fit(self, demonstrations: Demonstrations) -> None:
         """Learn one model per class."""
         self.hmm = optional_module("hmmlearn.hmm")
-        logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it reports steps of EM that are smaller than rounding
+        logging.getLogger("hmmlearn").setLevel(logging.ERROR)  # it warns when EM steps fall below rounding
         labels = require_labels(demonstrations)
         series = _series(demonstrations)
         self.classes = np.unique(labels)
@@ -47,7 +47,7 @@ class HiddenMarkov:
         model.covars_ = np.array([part.var(axis=(0, 1)) + _MIN_VARIANCE for part in parts])
         return model.fit(series.reshape(-1, d), [length] * n)
 
-    def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and log-likelihood of each movement."""
         series = _series(demonstrations)
         likelihood = np.array([[model.score(one) for model in self.models] for one in series])
@@ -55,7 +55,7 @@ class HiddenMarkov:
 
 
 def _series(demonstrations: Demonstrations) -> Array:
-    """Positions and their differences, brought to the size of the positions: (n, T, 2 d)."""
+    """Positions and their differences, scaled to the size of the positions: (n, T, 2 d)."""
     paths = standard_paths(demonstrations, _N_POINTS)
     steps = np.gradient(paths, axis=2)
     size = np.sqrt((steps**2).sum(axis=1, keepdims=True).mean(axis=2, keepdims=True))

@@ -1,4 +1,4 @@
-"""Rivals that learn a linear machine: an SVM on the alignment kernel, a ridge classifier on random convolutions."""
+"""Rivals that fit a linear classifier: an SVM on the alignment kernel, ridge on random convolutions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _N_POINTS = 100  # of GAK: its cost is quadratic
 
 
 def _familiarity(values: Array) -> Array:
-    """The largest decision value; of two classes there is one value, whose size counts."""
+    """The largest decision value; for two classes there is one value, and its magnitude counts."""
     return np.abs(values) if values.ndim == 1 else values.max(axis=1)
 
 
@@ -37,10 +37,10 @@ class AlignmentSVM:
         self.width = float(self.metrics.sigma_gak(self.stored, random_state=self.seed))
         self.model = SVC(kernel="precomputed", C=_PENALTY)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # many classes of few movements are meant
+            warnings.simplefilter("ignore", UserWarning)  # many classes with few movements each are intended
             self.model.fit(self._gram(self.stored), require_labels(demonstrations))
 
-    def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and largest decision value of each movement."""
         gram = self._gram(self._series(demonstrations))
         return np.asarray(self.model.predict(gram)), _familiarity(self.model.decision_function(gram))
@@ -54,7 +54,7 @@ class AlignmentSVM:
 
 
 class MiniRocket:
-    """MiniRocket (Dempster et al., KDD 2021) and a ridge classifier, as aeon has them."""
+    """MiniRocket (Dempster et al., KDD 2021) and a ridge classifier, as implemented in aeon."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -64,10 +64,10 @@ class MiniRocket:
         aeon = optional_module("aeon.classification.convolution_based")
         self.model = aeon.MiniRocketClassifier(random_state=self.seed, n_jobs=1)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # many classes of few movements are meant
+            warnings.simplefilter("ignore", UserWarning)  # many classes with few movements each are intended
             self.model.fit(standard_paths(demonstrations), require_labels(demonstrations))
 
-    def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and largest decision value of each movement."""
         values = self.model.pipeline_.decision_function(standard_paths(demonstrations))
         best = (values > 0).astype(int) if values.ndim == 1 else values.argmax(axis=1)

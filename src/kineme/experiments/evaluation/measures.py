@@ -1,4 +1,4 @@
-"""What an answer is worth: accuracy, and how well the known are told from the unknown."""
+"""Measures: accuracy, and how well known movements are told from unknown ones."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def open_set(
 ) -> dict[str, float]:
     """Area under the ROC curve of known against unknown, and what a threshold at 5 % false rejection gives.
 
-    The threshold is the lowest familiarity that at most 5 % of the known test movements stay below: it judges the
-    ranking, not the choice of a threshold.
+    The threshold is the lowest familiarity that at most 5 % of the known test movements stay below: it measures
+    the ranking, not the choice of a threshold.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Rivals that answer with the nearest training movement."""
+"""Rivals that give each movement the class of the nearest training movement."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def standard_paths(demonstrations: Demonstrations, n_points: int = N_POINTS) -> 
 
 
 class _Nearest:
-    """1-NN on whatever `describe` and `distances` say."""
+    """1-NN classifier; subclasses define `describe` and `distances`."""
 
     def fit(self, demonstrations: Demonstrations) -> None:
         """Store the training movements."""
         self.labels = require_labels(demonstrations)
         self.stored = self.describe(demonstrations)
 
-    def answer(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class of the nearest movement, and minus its distance."""
         distances = self.distances(self.describe(demonstrations), self.stored)
         return self.labels[distances.argmin(axis=1)], -distances.min(axis=1)
@@ -64,7 +64,7 @@ class PaperFeatures(_Nearest):
 
     def describe(self, demonstrations: Demonstrations) -> Array:  # noqa: D102 - see _Nearest
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DegenerateMovementWarning)  # it does as well as it does
+            warnings.simplefilter("ignore", DegenerateMovementWarning)  # small g - x0: part of what is measured
             return np.asarray(self.features.fit_transform(demonstrations))
 
 
@@ -83,7 +83,7 @@ class DTWNeighbor(_Nearest):
 
 
 class PointCloud(_Nearest):
-    """$P of Vatavu, Anthony and Wobbrock (ICMI 2012) as dollarpy has it: 32 points each, whatever their order."""
+    """$P of Vatavu, Anthony and Wobbrock (ICMI 2012) as dollarpy has it: 32 points each, in any order."""
 
     def describe(self, demonstrations: Demonstrations) -> Array:  # noqa: D102 - see _Nearest
         paths = relative_rows(demonstrations, 0, len(demonstrations), N_POINTS)
@@ -91,14 +91,14 @@ class PointCloud(_Nearest):
         return along - along.min(axis=2, keepdims=True)  # it expects no negative coordinates
 
     def distances(self, A: Array, B: Array) -> Array:  # noqa: D102 - see _Nearest
-        return np.array([self._from_one(one, B) for one in A])
+        return np.array([self._distances_from(one, B) for one in A])
 
-    def _from_one(self, one: Array, B: Array) -> Array:
+    def _distances_from(self, one: Array, B: Array) -> Array:
         dollarpy = optional_module("dollarpy")
         # A recognizer per pair, and fresh lists: it inserts points into those it is given.
         points = [[dollarpy.Point(x, y) for x, y in path.T.tolist()] for path in (one, *B)]
-        found = []
+        distances = []
         for cloud in points[1:]:
             _, score = dollarpy.Recognizer([dollarpy.Template("other", cloud)]).recognize(list(points[0]), _CLOUD)
-            found.append(2.0 - 2.0 * score)
-        return np.array(found)
+            distances.append(2.0 - 2.0 * score)
+        return np.array(distances)

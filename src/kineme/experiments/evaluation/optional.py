@@ -1,4 +1,4 @@
-"""Packages of rivals, which the library itself does without."""
+"""Optional packages, which only the rivals need."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def why_missing(name: str) -> str:
         optional_module(name)
     except SpecificationError:
         return f"not installed: {name.partition('.')[0]}"
-    except Exception as error:  # packages break in many ways when another one moves on
+    except Exception as error:  # an incompatible release of another package can raise anything
         return f"installed, but cannot be imported: {type(error).__name__}: {error}"
     return ""
 
@@ -37,5 +37,5 @@ def optional_module(name: str) -> Any:
             f"expected the package {package!r}, which is not installed; pip install 'kineme[{GROUP}]'"
         )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of file formats that are not asked for, and the like
+        warnings.simplefilter("ignore")  # warnings of the package, for example on optional file formats
         return import_module(name)

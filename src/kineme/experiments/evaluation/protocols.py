@@ -1,4 +1,4 @@
-"""What is asked of every method: one table of protocols, each a source of trials."""
+"""One table of protocols; each protocol generates trials, the same for every method."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EARLY_PERTURBATION = Perturbation(shift=1.0, scale=1.0, rotation=math.radians(3
 
 
 class Settings(NamedTuple):
-    """What the user chooses."""
+    """The options of the command."""
 
     splits: int = 10
     seed: int = 0
@@ -31,10 +31,10 @@ class Settings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One thing to learn and to answer, the same for every method.
+    """Training and test movements under one condition.
 
-    `fractions` asks for answers to the beginnings of the test movements. Slow methods take part in reference trials
-    only.
+    With `fractions`, only these shares of the test movements' paths are classified. Slow methods run in reference
+    trials only.
     """
 
     condition: Condition
@@ -54,33 +54,35 @@ class Protocol:
 
     Attributes
     ----------
-    title, reading : str
-        As the report prints them; `reading` says what is done.
+    title, description : str
+        Texts of the report.
     trials : callable
         (demonstrations, settings, index of the split) -> trials.
     n_splits : callable
         (demonstrations, settings) -> number of splits.
-    turns : bool
-        Needs movements that can be rotated.
-    least_classes : int
+    rotates : bool
+        Needs movements of two or three dimensions, which can be rotated.
+    min_classes : int
+        Smallest number of classes.
     by_default : bool
+        Whether the protocol runs if none is named.
     """
 
     title: str
-    reading: str
+    description: str
     trials: Trials
     n_splits: Callable[[Demonstrations, Settings], int] = lambda _, settings: settings.splits
-    turns: bool = False
-    least_classes: int = 2
+    rotates: bool = False
+    min_classes: int = 2
     by_default: bool = True
 
     def unsuitable(self, demonstrations: Demonstrations) -> str:
         """Why the data do not allow this protocol, or ""."""
-        if self.turns and demonstrations.n_dims not in (2, 3):
+        if self.rotates and demonstrations.n_dims not in (2, 3):
             return f"needs movements of 2 or 3 dimensions, these have {demonstrations.n_dims}"
         n_classes = len(np.unique(require_labels(demonstrations)))
-        few = n_classes < self.least_classes
-        return f"needs at least {self.least_classes} classes, these are {n_classes}" if few else ""
+        few = n_classes < self.min_classes
+        return f"needs at least {self.min_classes} classes, these are {n_classes}" if few else ""
 
 
 def usable_shots(demonstrations: Demonstrations, shots: tuple[int, ...]) -> tuple[int, ...]:
@@ -132,7 +134,7 @@ def _early(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Tr
     split = few_shot(require_labels(demos), usable_shots(demos, (_EARLY_SHOTS,))[0], settings.seed, index)
     perturbation = _EARLY_PERTURBATION.in_dimensions(demos.n_dims)
     moved = perturbation.apply(demos, [settings.seed, index])
-    yield Trial(Condition("path", 100, "seen"), moved, split, fractions=_FRACTIONS, reference=False)
+    yield Trial(Condition("path", 100, "whole path"), moved, split, fractions=_FRACTIONS, reference=False)
 
 
 PROTOCOLS: dict[str, Protocol] = {
@@ -150,15 +152,15 @@ PROTOCOLS: dict[str, Protocol] = {
     ),
     "any-angle": Protocol(
         "Rotation by any angle", "Fewest shots; every movement is turned by any angle, and max_angle is pi.",
-        _any_angle, turns=True,
+        _any_angle, rotates=True,
     ),
     "open-set": Protocol(
-        "Unknown classes", "A random half of the classes is known, up to five movements of each train. A threshold on "
-        "each method's own familiarity that rejects 5 % of the known test movements: how many unknown ones fall, and "
-        "how many known ones pass it and get the right class.", _open_set, least_classes=4,
+        "Unknown classes", "A random half of the classes is known, and up to five movements of each train. A threshold "
+        "on each method's own familiarity rejects 5 % of the known test movements: the share of unknown movements "
+        "below it, and the share of known ones above it that get the right class.", _open_set, min_classes=4,
     ),
     "earliness": Protocol(
-        "Early", "Up to three shots; only the first part of each test movement's path has been seen, and place, size "
-        "and direction within 30 degrees are unknown.", _early,
+        "Early", "Up to three shots; only the first part of each test movement's path is given, and position, "
+        "size and direction within 30 degrees are unknown.", _early,
     ),
 }  # fmt: skip

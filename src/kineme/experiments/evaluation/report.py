@@ -1,4 +1,4 @@
-"""The report: tables, drawings, and where a rival is ahead, in one self-contained HTML file."""
+"""The report: tables, figures, and where a rival is ahead, in one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def _table(protocol: str, results: Results) -> Table:
         )
         for method, outcome in outcomes.items()
     ]
-    # Many conditions read better downwards.
+    # With many conditions, one row per condition is easier to read.
     cells = [("", *heads), *rows]
     if len(heads) > len(rows) or len(heads) > 6:
         cells = list(zip(*cells, strict=True))
     head = ("method" if cells[0][1:] == tuple(heads) else "condition", *cells[0][1:])
     chosen = PROTOCOLS[protocol]
-    return Table(chosen.title, head, cells[1:], f"{chosen.reading} {rivals_ahead(protocol, results)}")
+    return Table(chosen.title, head, cells[1:], f"{chosen.description} {rivals_ahead(protocol, results)}")
 
 
 def _columns(protocol: str, results: Results) -> list[tuple[Any, str]]:
@@ -55,34 +55,34 @@ def _cell(values: list[float] | None, n_columns: int) -> str:
 
 
 def rivals_ahead(protocol: str, results: Results) -> str:
-    """Where a rival's mean is above ours, among the rivals that took part; and who did not."""
+    """Where a rival's mean is above ours, among the rivals that took part; and which rivals did not."""
     if OURS not in results.outcomes[protocol]:
         return ""
     rivals = [name for name in results.outcomes[protocol] if name != OURS]
     if not rivals:
         return f"No rival took part. {_not_compared(results)}".rstrip()
-    found = []
+    ahead = []
     for condition, measure in _columns(protocol, results):
         ours = results.mean(protocol, OURS, condition, measure)
         for rival in rivals:
             theirs = results.mean(protocol, rival, condition, measure)
             if ours is not None and theirs is not None and round(theirs, 3) > round(ours, 3):
                 what = "" if measure == "accuracy" else f" in {_MEASURES[measure]}"
-                found.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
-    ahead = f"Ahead of kineme: {'; '.join(found)}."
+                ahead.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
+    named = f"Ahead of kineme: {'; '.join(ahead)}."
     names = "; ".join(METHODS[rival].title for rival in rivals)
     none = f"No rival is ahead of kineme anywhere in this table. Rivals here: {names}."
-    return f"{ahead if found else none} {_not_compared(results)}".rstrip()
+    return f"{named if ahead else none} {_not_compared(results)}".rstrip()
 
 
 def _not_compared(results: Results) -> str:
-    """Whom the conclusion does not speak of, and why."""
+    """The rivals that the conclusion leaves out, and why."""
     absent = [f"{METHODS[name].title} ({why})" for name, why in results.absent.items() if name != OURS]
     return f"Not compared: {'; '.join(absent)}." if absent else ""
 
 
 def write_report(data: DataSet, results: Results, tables: dict[str, Table], facts: dict[str, Any]) -> str:
-    """HTML with tables and drawings."""
+    """HTML with tables and figures."""
     parts = [f'<p class="lead">{in_markup(_lead(data))}</p>']
     for name, table in tables.items():
         drawn = draw_protocol(name, results)

@@ -1,4 +1,4 @@
-"""What came out, by protocol, method, condition and measure."""
+"""All scores by protocol, method, condition and measure."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 from kineme.experiments.evaluation.conditions import Condition
 from kineme.experiments.evaluation.methods import METHODS
-from kineme.experiments.evaluation.score_split import Verdict
+from kineme.experiments.evaluation.score_split import Scores
 
 #: Condition -> measure -> value in each split.
 Outcome = dict[Condition, dict[str, list[float]]]
 
 
 class Results(NamedTuple):
-    """Outcomes by protocol and method, the seconds spent, and who and what did not take part, with reasons."""
+    """Outcomes and seconds by protocol and method; methods and protocols that did not run, with reasons."""
 
     outcomes: dict[str, dict[str, Outcome]]
     spent: dict[str, dict[str, float]]
@@ -23,16 +23,16 @@ class Results(NamedTuple):
     skipped: dict[str, str]
 
     def mean(self, protocol: str, method: str, condition: Condition, measure: str) -> float | None:
-        """Mean over splits; None where the method did not take part."""
+        """Mean over splits; None if the method did not take part."""
         values = self.outcomes[protocol].get(method, {}).get(condition, {}).get(measure)
         return fmean(values) if values else None
 
     def conditions(self, protocol: str) -> list[Condition]:
-        """All conditions of a protocol in their order, those of the method that took part in most of them."""
+        """All conditions of a protocol in their order, as listed by the method that took part in most of them."""
         return max((list(one) for one in self.outcomes[protocol].values()), key=len, default=[])
 
     def numbers(self) -> dict[str, Any]:
-        """Everything but the times, ready for JSON; six digits keep the order of summation out of the file."""
+        """Everything but the seconds, for JSON; in six digits, which do not depend on the order of summation."""
         protocols = {
             protocol: {
                 method: {
@@ -46,37 +46,37 @@ class Results(NamedTuple):
         return {"protocols": protocols, "absent_methods": self.absent, "skipped_protocols": self.skipped}
 
     def seconds(self) -> dict[str, dict[str, float]]:
-        """Seconds to learn and to answer, all splits together, by protocol and method."""
+        """Seconds to learn and to classify, all splits together, by protocol and method."""
         return {
             protocol: {method: round(value, 3) for method, value in by_method.items()}
             for protocol, by_method in self.spent.items()
         }
 
 
-def collect(verdicts: Mapping[Any, list[Verdict]], absent: dict[str, str], skipped: dict[str, str]) -> Results:
-    """Join the verdicts of all jobs; trials of one condition within a split, such as folds, are averaged.
+def collect(scores: Mapping[Any, list[Scores]], absent: dict[str, str], skipped: dict[str, str]) -> Results:
+    """Merge the scores of all jobs; trials of one condition within a split, such as folds, are averaged.
 
     Parameters
     ----------
-    verdicts : mapping
-        (protocol, method, index of the split) -> verdicts, in the order of splits.
+    scores : mapping
+        (protocol, method, index of the split) -> scores, in the order of splits.
     """
     outcomes: dict[str, dict[str, Outcome]] = {}
     spent: dict[str, dict[str, float]] = {}
     order = {name: k for k, name in enumerate(METHODS)}
-    for (protocol, method, _), found in sorted(verdicts.items(), key=lambda item: order[item[0][1]]):
+    for (protocol, method, _), own in sorted(scores.items(), key=lambda item: order[item[0][1]]):
         outcome = outcomes.setdefault(protocol, {}).setdefault(method, {})
-        for condition, values in _averaged(found).items():
+        for condition, values in _averaged(own).items():
             for measure, value in values.items():
                 outcome.setdefault(condition, {}).setdefault(measure, []).append(value)
         times = spent.setdefault(protocol, {})
-        times[method] = times.get(method, 0.0) + sum(one.seconds for one in found)
+        times[method] = times.get(method, 0.0) + sum(one.seconds for one in own)
     return Results(outcomes, spent, absent, skipped)
 
 
-def _averaged(verdicts: list[Verdict]) -> dict[Condition, dict[str, float]]:
+def _averaged(scores: list[Scores]) -> dict[Condition, dict[str, float]]:
     grouped: dict[Condition, list[dict[str, float]]] = {}
-    for one in verdicts:
+    for one in scores:
         grouped.setdefault(one.condition, []).append(one.values)
     return {
         condition: {measure: fmean(values[measure] for values in all_values) for measure in all_values[0]}

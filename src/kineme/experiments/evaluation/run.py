@@ -18,7 +18,7 @@ from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings
 from kineme.experiments.evaluation.results import Results, collect
-from kineme.experiments.evaluation.score_split import Verdict, answers_early, judge
+from kineme.experiments.evaluation.score_split import Scores, classifies_partial, score_split
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.atomic import write_atomically
 from kineme.output.table import Table
@@ -36,7 +36,7 @@ class Job(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """What a run gives back: the tables, what was left out, and the files written."""
+    """The result of a run: tables, numbers, and the files written."""
 
     tables: list[Table]
     results: Results
@@ -55,26 +55,26 @@ def evaluate(
         Names of protocols, and of methods.
     settings : Settings
     out : Path
-        Folder, created if it does not exist.
+        Folder for the files; created if it does not exist.
     runner : Runner
-        In how many processes, and how to show progress.
+        Number of processes, and how to show progress.
 
     Raises
     ------
     OSError
-        The folder cannot be written; found out before the work begins.
+        The folder cannot be written; checked before the work begins.
     """
     out.mkdir(parents=True, exist_ok=True)
-    TemporaryFile(dir=out).close()  # find out now, not after the work, that the folder cannot be written
+    TemporaryFile(dir=out).close()  # a folder that cannot be written fails now, not after the work
     began = time.perf_counter()
     demos = data.demonstrations
     absent = {name: why for name in plan[1] if (why := METHODS[name].unavailable(demos.n_dims))}
     skipped = {name: why for name in plan[0] if (why := PROTOCOLS[name].unsuitable(demos))}
-    if "earliness" in plan[0] and not any(map(answers_early, plan[1])):
-        skipped["earliness"] = "none of the methods answers before the end"
+    if "earliness" in plan[0] and not any(map(classifies_partial, plan[1])):
+        skipped["earliness"] = "none of the methods classifies movements before their end"
     jobs = _jobs(demos, plan, settings, {*absent, *skipped})
-    verdicts = dict(runner.progress(runner.run(demos, jobs, settings), total=len(jobs)))
-    results = collect({job: verdicts[job] for job in jobs}, absent, skipped)
+    scores = dict(runner.progress(runner.run(demos, jobs, settings), total=len(jobs)))
+    results = collect({job: scores[job] for job in jobs}, absent, skipped)
     facts = {
         "data": data.name,
         "movements": len(demos),
@@ -88,13 +88,13 @@ def evaluate(
 def _jobs(
     demos: Demonstrations, plan: tuple[Sequence[str], Sequence[str]], settings: Settings, without: set[str]
 ) -> list[Job]:
-    """Slow methods first, so that they do not keep one process busy at the end."""
+    """All jobs, slow methods first: otherwise they would run alone at the end."""
     methods = sorted((name for name in plan[1] if name not in without), key=lambda name: not METHODS[name].slow)
     return [
         Job(protocol, method, split)
         for method in methods
         for protocol in plan[0]
-        if protocol not in without and (protocol != "earliness" or answers_early(method))
+        if protocol not in without and (protocol != "earliness" or classifies_partial(method))
         for split in range(PROTOCOLS[protocol].n_splits(demos, settings))
     ]
 
@@ -105,33 +105,33 @@ class Runner(NamedTuple):
     processes: int
     progress: Callable[..., Any]
 
-    def run(self, demos: Demonstrations, jobs: list[Job], settings: Settings) -> Iterator[tuple[Job, list[Verdict]]]:
-        """Verdicts as they come."""
+    def run(self, demos: Demonstrations, jobs: list[Job], settings: Settings) -> Iterator[tuple[Job, list[Scores]]]:
+        """(job, its scores) as they come."""
         if self.processes == 1:
-            yield from ((job, judge(demos, *job, settings)) for job in jobs)
+            yield from ((job, score_split(demos, *job, settings)) for job in jobs)
             return
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(self.processes, context, _begin, (demos,)) as pool:
-            waiting = {pool.submit(_work, job, settings): job for job in jobs}
+        with ProcessPoolExecutor(self.processes, context, _init_worker, (demos,)) as pool:
+            waiting = {pool.submit(_run_job, job, settings): job for job in jobs}
             for future in as_completed(waiting):
                 yield waiting[future], future.result()
 
 
-_shared: dict[str, Demonstrations] = {}  # of a worker process
+_shared: dict[str, Demonstrations] = {}  # the data of a worker process
 
 
-def _begin(demos: Demonstrations) -> None:
-    """A worker has one core: neither kineme nor BLAS should start more threads."""
+def _init_worker(demos: Demonstrations) -> None:
+    """Prepare a worker process; it has one core, so neither kineme nor BLAS should start more threads."""
     from threadpoolctl import threadpool_limits
 
     threadpool_limits(1)
     os.environ["KINEME_NUM_THREADS"] = "1"
-    os.environ.setdefault("KINEME_COMPILED", "always")  # each job is small, all together repay loading Numba
+    os.environ.setdefault("KINEME_COMPILED", "always")  # each job is small; together they repay loading Numba
     _shared["demos"] = demos
 
 
-def _work(job: Job, settings: Settings) -> list[Verdict]:
-    return judge(_shared["demos"], *job, settings)
+def _run_job(job: Job, settings: Settings) -> list[Scores]:
+    return score_split(_shared["demos"], *job, settings)
 
 
 def _write(data: DataSet, results: Results, facts: dict[str, Any], out: Path, seconds: float) -> Evaluation:

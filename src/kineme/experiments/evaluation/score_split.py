@@ -1,4 +1,4 @@
-"""One method in one split of one protocol."""
+"""The scores of one method in one split of one protocol."""
 
 from __future__ import annotations
 
@@ -6,74 +6,58 @@ import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from kineme.experiments.evaluation.conditions import Condition
 from kineme.experiments.evaluation.measures import accuracy, open_set
-from kineme.experiments.evaluation.methods import METHODS, Contender, Wishes
+from kineme.experiments.evaluation.methods import METHODS, Contender, Options
 from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings, Trial
-from kineme.movements.preparation.arc_length import arc_length_phase
-from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
-from kineme.validation import MIN_SAMPLES
+from kineme.recognition.early.early import cut
 
 
-class Verdict(NamedTuple):
-    """What a method reached in a trial: measure -> value, and the seconds it took to learn and to answer."""
+class Scores(NamedTuple):
+    """The scores of a method in one trial, measure -> value, and the seconds that learning and classifying took."""
 
     condition: Condition
     values: dict[str, float]
     seconds: float
 
 
-def judge(demonstrations: Demonstrations, protocol: str, method: str, index: int, settings: Settings) -> list[Verdict]:
-    """The verdicts of all trials of a split; empty for a method that does not answer what is asked."""
-    verdicts = []
+def score_split(
+    demonstrations: Demonstrations, protocol: str, method: str, index: int, settings: Settings
+) -> list[Scores]:
+    """The scores of all trials of a split; empty for a method that cannot do what the protocol asks."""
+    scores = []
     for trial in PROTOCOLS[protocol].trials(demonstrations, settings, index):
         if trial.reference or not METHODS[method].slow:
-            contender = METHODS[method].make(Wishes(trial.max_angle, settings.seed))
-            verdicts += list(_early(contender, trial) if trial.fractions else _whole(contender, trial))
-    return verdicts
+            contender = METHODS[method].make(Options(trial.max_angle, settings.seed))
+            scores += list(_score_early(contender, trial) if trial.fractions else _score_whole(contender, trial))
+    return scores
 
 
-def answers_early(method: str) -> bool:
-    """Whether a method is made for movements that are not over yet."""
-    return callable(getattr(METHODS[method].make(Wishes()), "answer_partial", None))
+def classifies_partial(method: str) -> bool:
+    """Whether a method can classify movements that are not over yet."""
+    return callable(getattr(METHODS[method].make(Options()), "classify_partial", None))
 
 
-def _whole(contender: Contender, trial: Trial) -> Iterator[Verdict]:
+def _score_whole(contender: Contender, trial: Trial) -> Iterator[Scores]:
     train, test = trial.demonstrations[trial.split.train], trial.demonstrations[trial.split.test]
     began = time.perf_counter()
     contender.fit(train)
-    predicted, familiarity = contender.answer(test)
+    predicted, familiarity = contender.classify(test)
     seconds = time.perf_counter() - began
     labels, known = require_labels(test), trial.split.known
-    judged = accuracy(predicted, labels) if known.all() else open_set(predicted, labels, familiarity, known)
-    yield Verdict(trial.condition, judged, seconds)
+    values = accuracy(predicted, labels) if known.all() else open_set(predicted, labels, familiarity, known)
+    yield Scores(trial.condition, values, seconds)
 
 
-def _early(contender: Any, trial: Trial) -> Iterator[Verdict]:
-    if not callable(getattr(contender, "answer_partial", None)):
+def _score_early(contender: Any, trial: Trial) -> Iterator[Scores]:
+    if not callable(getattr(contender, "classify_partial", None)):
         return
     test = trial.demonstrations[trial.split.test]
     contender.fit(trial.demonstrations[trial.split.train])
     for fraction in trial.fractions:
-        seen = beginnings(test, fraction)
+        partial = cut(test, fraction)
         began = time.perf_counter()
-        judged = accuracy(contender.answer_partial(seen), require_labels(test))
-        condition = Condition(trial.condition.kind, 100 * fraction, f"{100 * fraction:.0f} %")
-        yield Verdict(condition, judged, time.perf_counter() - began)
-
-
-def beginnings(demonstrations: Demonstrations, fraction: float, n_samples: int = 200) -> Demonstrations:
-    """The movements until a fraction of their path's length, at `n_samples` even times of the whole."""
-    n = len(demonstrations)
-    paths = relative_rows(demonstrations, 0, n, n_samples)
-    last = np.maximum((arc_length_phase(paths) <= fraction + 1e-12).sum(axis=1), MIN_SAMPLES)
-    starts = demonstrations.positions[demonstrations.offsets[:-1]]
-    steps = demonstrations.durations / (n_samples - 1)
-    return Demonstrations.from_arrays(
-        [path[:, :end].T + start for path, end, start in zip(paths, last, starts, strict=True)],
-        demonstrations.labels,
-        [step * np.arange(end) for step, end in zip(steps, last, strict=True)],
-    )
+        values = accuracy(contender.classify_partial(partial), require_labels(test))
+        condition = Condition(trial.condition.varied, 100 * fraction, f"{100 * fraction:.0f} %")
+        yield Scores(condition, values, time.perf_counter() - began)

@@ -1,4 +1,4 @@
-"""Which movements train and which test: functions of labels and seed alone, so the same for all methods."""
+"""Training and test movements, chosen by labels and seed alone, so the same for all methods."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def folds(labels: NDArray[Any], n_folds: int, seed: int, index: int) -> list[Spl
     fold = np.empty(len(labels), dtype=np.intp)
     position = 0
     for own in _shuffled(labels, seed, index):
-        fold[own] = (position + np.arange(len(own))) % n_folds  # go on where the last class ended: parts of one size
+        fold[own] = (position + np.arange(len(own))) % n_folds  # continue after the last class: folds of equal size
         position += len(own)
     parts = [np.flatnonzero(fold == k) for k in range(n_folds)]
     return [Split(np.flatnonzero(fold != k), part, np.ones(len(part), bool)) for k, part in enumerate(parts)]

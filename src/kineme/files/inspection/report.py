@@ -1,18 +1,15 @@
-"""An inspection in words for people, and as data for programs."""
+"""An inspection as text for people, and as plain data for programs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
 from kineme.files.parsed_file import Detected
 from kineme.output.table import Table, to_text
-from kineme.output.text import printable
+from kineme.output.text import counted, printable
 
-_SHOWN = 20  # problems, duplicates and kinds of files that are written out
-
-Names = Callable[[Any], str]
+_SHOWN = 20  # lines of a list; the rest is counted
 
 
 def as_data(found: Inspection) -> dict[str, Any]:
@@ -32,30 +29,30 @@ def as_data(found: Inspection) -> dict[str, Any]:
     }
 
 
-def as_words(found: Inspection, printable: Names = printable) -> str:
-    """A table of labels, how files were understood, what is double, what could not be read."""
-    rows = [_row(one, printable) for one in found.labels]
+def as_words(found: Inspection) -> str:
+    """A table of labels, how files were read, duplicates, and what could not be read."""
+    rows = [_row(one) for one in found.labels]
     title = (
-        f"{_count(found.movements, 'movement')} of {_count(found.dimensions, 'dimension')} "
-        f"in {_count(found.files, 'file')}"
+        f"{counted(found.movements, 'movement')} of {counted(found.dimensions, 'dimension')} "
+        f"in {counted(found.files, 'file')}"
     )
     heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
     parts = [to_text(Table(title, heads, rows))]
-    parts += _listed("read as", [f"{_understood(how)} ({_count(n, 'file')})" for how, n in found.detected], printable)
-    parts += _listed("the same movement more than once", [" = ".join(group) for group in found.duplicates], printable)
-    parts += _listed("not read", list(map(str, found.problems)), printable)
-    parts += _listed("note", list(found.notes), printable)
+    parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in found.detected])
+    parts += _listed("the same movement more than once", [" = ".join(group) for group in found.duplicates])
+    parts += _listed("not read", list(map(str, found.problems)))
+    parts += _listed("note", list(found.notes))
     return "\n\n".join(parts)
 
 
-def _listed(head: str, lines: list[str], printable: Names) -> list[str]:
+def _listed(head: str, lines: list[str]) -> list[str]:
     if not lines:
         return []
     more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
     return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
 
 
-def _row(one: LabelSummary, printable: Names) -> tuple[str, ...]:
+def _row(one: LabelSummary) -> tuple[str, ...]:
     gaps = f"{one.gaps} (to {one.longest_gap:.3g} s)" if one.gaps else "-"
     jitter = f"{100 * one.jitter:.2g} %" if one.jitter >= 1e-6 else "-"
     ranges = [_range(values) for values in (one.samples, one.duration, one.rate)]
@@ -64,7 +61,7 @@ def _row(one: LabelSummary, printable: Names) -> tuple[str, ...]:
 
 
 def _range(values: Range) -> str:
-    """The median alone where all are alike, else also the least and the greatest."""
+    """The median alone if minimum and maximum are equal, else all three."""
     least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
     return median if least == greatest else f"{median} ({least} to {greatest})"
 
@@ -76,7 +73,3 @@ def _understood(how: Detected) -> str:
         if columns:
             parts.append(f"{what} {', '.join(columns)}")
     return "; ".join(parts)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'' if number == 1 else 's'}"

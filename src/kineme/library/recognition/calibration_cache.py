@@ -6,15 +6,19 @@ import hashlib
 import io
 import zlib
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.sampling import evenly_spaced
+<<<<<<< HEAD
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored import StoredReferences
+=======
+from kineme.library.recognition.members import Members
+>>>>>>> main
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
@@ -22,9 +26,6 @@ from kineme.recognition.conformal import Calibration
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.library.recognition.recognize import Members
 
 FILE = "calibration.cache"
 
@@ -36,7 +37,7 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 def sample_recognizer(store: Store, members: Members) -> Recognizer:
     """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
     chosen = evenly_spaced(len(members.ids), _SAMPLE)
-    demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
+    demos = read.movements(store, members.ids[chosen])
     recognizer = store.specification.recognizer().set_params(classifier="nearest")
     return recognizer.fit(demos, members.labels[chosen])
 

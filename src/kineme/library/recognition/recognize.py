@@ -8,46 +8,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+<<<<<<< HEAD
 from kineme.comparison.stored import StoredReferences
 from kineme.errors import SpecificationError
+=======
+>>>>>>> main
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
+from kineme.library.recognition.members import Members, members_of
 from kineme.library.storage import read
-from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
+from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
+<<<<<<< HEAD
 from kineme.movements.trajectories.labels import label_array
 from kineme.recognition.answer import Answer, Neighbor, is_one
+=======
+from kineme.recognition.answer import Answer, Neighbor, answers, is_one
+>>>>>>> main
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.two_stage_search import TwoStageSearch
-
-Ids = NDArray[np.int64]
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
 #: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred kinds take 6 s and, with support vectors, 105 ms.
 EXHAUSTIVE = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class Members:
-    """Movements that show a symbol, ordered by the symbol's name, then by id."""
-
-    ids: Ids  # (m,)
-    names: NDArray[Any]  # (C,), sorted
-    first: NDArray[np.intp]  # (C,)
-
-    @property
-    def labels(self) -> NDArray[Any]:
-        """The name of each one's symbol, (m,)."""
-        return np.repeat(self.names, np.diff(self.first, append=len(self.ids)))
-
-
 @dataclass(eq=False)
-class Serving:
-    """Answers of a library to movements, by the state of its last change.
-
-    What an answer needs beyond the database is made when first asked for, and again after a change.
-    """
+class LibraryRecognizer:
+    """What recognizes the movements that a library holds: made when first asked for, and again after a change."""
 
     store: Store
     exhaustive: int = EXHAUSTIVE
@@ -56,7 +45,7 @@ class Serving:
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _model: Recognizer | TwoStageSearch | None = None
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
         demos = Demonstrations.of([X] if is_one(X) else X)
@@ -78,7 +67,7 @@ class Serving:
 
     def _small(self, members: Members) -> Recognizer:
         self._ids = members.ids  # `fit` orders by label, and keeps the order within
-        demos = read.movements(self.store, members.ids, [None] * len(members.ids))
+        demos = read.movements(self.store, members.ids)
         return self.store.specification.recognizer().fit(demos, members.labels)
 
     def _large(self, members: Members) -> TwoStageSearch:
@@ -98,6 +87,7 @@ class Serving:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
+<<<<<<< HEAD
 def members_of(store: Store) -> Members:
     """Movements that show a symbol.
 
@@ -131,6 +121,9 @@ def members_of(store: Store) -> Members:
 
 
 def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
+=======
+def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
+>>>>>>> main
     """The recognizer of a large library."""
     comparison = sample_recognizer(store, members).comparison_
     kept = [store.specification.representations.index(one) for one in comparison.representations]
@@ -145,8 +138,13 @@ def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
         tuple(tuple(block[r] for r in kept) for block in index.blocks),
         index.rows(members.ids),
         members.first,
+<<<<<<< HEAD
         features,
         lambda rows: read.movements(store, index.ids[rows], [None] * len(rows)),
+=======
+        views,
+        lambda rows: read.movements(store, index.ids[rows]),
+>>>>>>> main
     )
     calibration = calibrate(store, members, comparison.similarity, stored)
     return TwoStageSearch(comparison, calibration, members.names, stored)
