@@ -20,12 +20,8 @@ import kineme
 from bench.library_movements import ASKED, N_SAMPLES, SHOWN, copies, kinds
 from bench.movements import SEED, Array
 from bench.rows import Row, save, table
-<<<<<<< HEAD
 from kineme.comparison.describe import describe
-from kineme.library.recognition.recognize import Serving
-=======
 from kineme.library.recognition.recognize import LibraryRecognizer
->>>>>>> main
 
 _BATCH = 50_000  # movements in one call
 _PER_KIND = 200
@@ -107,13 +103,8 @@ def _serve(folder: Path, questions: Path) -> dict[str, Any]:
 
 def _exhaustive(library: Any, asked: Array) -> list[str]:
     """The symbol of the most similar of all movements, by the same averaged kernel."""
-<<<<<<< HEAD
-    comparison = Serving(library.store, exhaustive=0).model().comparison
+    comparison = LibraryRecognizer(library.store, exhaustive=0).model().comparison
     described = describe(asked, comparison)
-=======
-    recognizer = LibraryRecognizer(library.store, exhaustive=0).model().recognizer
-    seen = recognizer.look_at(asked)
->>>>>>> main
     ids = library.ids()
     ends = np.cumsum(library.specification.widths(library.n_dims))[:-1]
     kept = [library.specification.representations.index(one) for one in comparison.representations]

@@ -57,6 +57,11 @@ class References:
     def __len__(self) -> int:
         return len(self.labels)
 
+    def all_movements(self) -> Demonstrations:
+        """The movements as `Demonstrations`; read, if they are not held in memory."""
+        held = self.demonstrations
+        return held if isinstance(held, Demonstrations) else held[np.arange(len(self))]
+
     @cached_property
     def counts(self) -> NDArray[np.intp]:
         """Movements of each class, (C,)."""

@@ -153,7 +153,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     @property
     def demonstrations_(self) -> Demonstrations:
         """The training movements, ordered by class."""
-        return Demonstrations.of(self._fitted[1].demonstrations)
+        return self._fitted[1].all_movements()
 
     @property
     def representations_(self) -> tuple[Representation, ...]:

@@ -18,7 +18,6 @@ from kineme.movements.segmentation.rest import Rest
 from kineme.movements.segmentation.segment import as_recording, moving
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.movements.segmentation.speed_minima import SpeedMinima
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.conformal import Calibration, check_error_rate
@@ -139,7 +138,7 @@ def _recognized(
 
 def _durations(references: References) -> Array | None:
     """Durations of the references; None where their arrays came without time stamps, so that none is known."""
-    demos = Demonstrations.of(references.demonstrations)
+    demos = references.all_movements()
     return None if demos.movements.times is None else demos.durations
 
 

@@ -13,12 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.sampling import evenly_spaced
-<<<<<<< HEAD
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored import StoredReferences
-=======
 from kineme.library.recognition.members import Members
->>>>>>> main
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically

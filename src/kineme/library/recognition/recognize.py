@@ -8,11 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-<<<<<<< HEAD
 from kineme.comparison.stored import StoredReferences
-from kineme.errors import SpecificationError
-=======
->>>>>>> main
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
 from kineme.library.recognition.members import Members, members_of
@@ -20,12 +16,7 @@ from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
-<<<<<<< HEAD
-from kineme.movements.trajectories.labels import label_array
 from kineme.recognition.answer import Answer, Neighbor, is_one
-=======
-from kineme.recognition.answer import Answer, Neighbor, answers, is_one
->>>>>>> main
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.two_stage_search import TwoStageSearch
 
@@ -87,43 +78,7 @@ class LibraryRecognizer:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
-<<<<<<< HEAD
-def members_of(store: Store) -> Members:
-    """Movements that show a symbol.
-
-    Raises
-    ------
-    SpecificationError
-        There is none.
-    """
-    with store.reading() as connection:
-        query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
-        try:
-            pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
-        except (TypeError, ValueError, OverflowError) as error:
-            raise damage(
-                "movements and symbols as whole numbers in table member", f"something else ({error})"
-            ) from error
-        if not len(pairs):
-            raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
-                "learn some with labels, or name a proposal"
-            )
-        keys, which = np.unique(pairs[:, 1], return_inverse=True)
-        query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
-        named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
-    if lost := set(keys.tolist()) - named.keys():
-        raise damaged("symbol", (min(lost),))
-    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
-    owner = place[which]
-    order = np.lexsort((pairs[:, 0], owner))
-    return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
-
-
 def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
-=======
-def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
->>>>>>> main
     """The recognizer of a large library."""
     comparison = sample_recognizer(store, members).comparison_
     kept = [store.specification.representations.index(one) for one in comparison.representations]
@@ -138,13 +93,8 @@ def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
         tuple(tuple(block[r] for r in kept) for block in index.blocks),
         index.rows(members.ids),
         members.first,
-<<<<<<< HEAD
         features,
-        lambda rows: read.movements(store, index.ids[rows], [None] * len(rows)),
-=======
-        views,
         lambda rows: read.movements(store, index.ids[rows]),
->>>>>>> main
     )
     calibration = calibrate(store, members, comparison.similarity, stored)
     return TwoStageSearch(comparison, calibration, members.names, stored)

@@ -12,10 +12,6 @@ from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-<<<<<<< HEAD
-from kineme.comparison.describe import describe_rows
-=======
->>>>>>> main
 from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
 from kineme.library.storage import read
@@ -30,18 +26,10 @@ _MEMBERS = 500  # of a symbol that its prototype is chosen from, at most, evenly
 
 def prototype_of(store: Store, one: Symbol) -> int:
     """Id of the movement that stands for a symbol: the one that was named so, else the medoid."""
-<<<<<<< HEAD
-    if symbol.prototype is not None:
-        return int(symbol.prototype)
-    members = _some(symbol)
-    described = describe_rows(library.features(members), library.n_dims or 0, library.specification.recognizer())
-    return int(members[medoid_of(described, library.specification.recognizer())])
-=======
     if one.prototype is not None:
         return int(one.prototype)
     members = _some_members(one)
     return int(members[medoid_of(described(store, members), store.specification.recognizer())])
->>>>>>> main
 
 
 def primitive_of(store: Store, who: str) -> Primitives:
@@ -76,14 +64,8 @@ def space_of(store: Store) -> ConceptualSpace:
             f"expected two symbols with movements or more, got {len(shown)}; learn recordings with labels, or name "
             "proposals"
         )
-<<<<<<< HEAD
-    like = library.specification.recognizer()
-    rows = library.features([prototype_of(library, symbol) for symbol in symbols])
-    return conceptual_space([one.name for one in symbols], describe_rows(rows, library.n_dims or 0, like), like)
-=======
     prototypes = described(store, [prototype_of(store, one) for one in shown])
     return conceptual_space([one.name for one in shown], prototypes, store.specification.recognizer())
->>>>>>> main
 
 
 def morph_symbols(store: Store, a: str, b: str, shares: ArrayLike) -> Primitives:

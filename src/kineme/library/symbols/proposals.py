@@ -9,13 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.anchoring.proposals.assign import place
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
-<<<<<<< HEAD
-from kineme.anchoring.proposals.propose import propose
-from kineme.comparison.describe import describe_rows
-from kineme.comparison.sampling import evenly_spaced
-=======
 from kineme.anchoring.proposals.propose import propose as propose_clusters
->>>>>>> main
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
@@ -82,12 +76,6 @@ def propose(
         known = recognizer_of_symbols(store)
         found = place(read.movements(store, chosen), known, min_members=min_members).proposals
     else:
-<<<<<<< HEAD
-        like = library.specification.recognizer()
-        described = describe_rows(library.features(chosen), library.n_dims or 0, like)
-        found = propose(described, method or "agglomerative", n_clusters, min_members=min_members, like=like)
-    return LibraryProposals(chosen, _without(found, _rejected_before(library, chosen)) if ids is None else found)
-=======
         found = propose_clusters(
             described(store, chosen),
             method or "agglomerative",
@@ -96,7 +84,6 @@ def propose(
             like=store.specification.recognizer(),
         )
     return LibraryProposals(chosen, _without(found, _rejected_before(store, chosen)) if ids is None else found)
->>>>>>> main
 
 
 def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> None:
@@ -142,45 +129,3 @@ def _without(found: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
         for one in (found.proposals[k] for k in kept)
     )
     return Proposals(proposals, number[found.clusters], found.widths)
-<<<<<<< HEAD
-
-
-@dataclass(frozen=True)
-class Review:
-    """Symbols that could be one, and symbols that are of two kinds.
-
-    Attributes
-    ----------
-    merges : tuple of Merge
-        See `kineme.anchoring.suggest_merges`.
-    splits : tuple of Split
-        See `kineme.anchoring.suggest_splits`; the parts are ids of movements.
-    """
-
-    merges: tuple[Merge, ...]
-    splits: tuple[Split, ...]
-
-
-def review_symbols(library: ActionLibrary) -> Review:
-    """Look at the symbols again, at most 3000 movements of them; see `ActionLibrary.review`."""
-    ids, labels = some_of_each(library)
-    if len(np.unique(labels)) < 2:
-        return Review((), ())
-    like = library.specification.recognizer()
-    described = describe_rows(library.features(ids), library.n_dims or 0, like)
-    splits = suggest_splits(described, labels, like=like)
-    return Review(
-        suggest_merges(described, labels, like=like),
-        tuple(one._replace(parts=(ids[one.parts[0]], ids[one.parts[1]])) for one in splits),
-    )
-
-
-def some_of_each(library: ActionLibrary) -> tuple[Ids, NDArray[Any]]:
-    """At most 3000 movements that show a symbol, evenly many of each, and the names of their symbols."""
-    symbols = [symbol for symbol in library.symbols() if len(symbol)]
-    share = max(1, _KNOWN // max(1, len(symbols)))
-    some = [one.members[evenly_spaced(len(one), share)] for one in symbols]
-    labels = np.repeat(label_array([one.name for one in symbols]), [len(members) for members in some])
-    return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels
-=======
->>>>>>> main

@@ -16,7 +16,6 @@ from kineme.comparison.references import References
 from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.early.prefixes import Prefixes, beginnings, smooth_paths
 from kineme.validation import Array, check_count, check_number
 
@@ -150,7 +149,7 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     if early.max_angle is not None:
         procrustes = Procrustes(comparison.n_dims, early.max_angle)
     progress = np.arange(1, early.n_progress + 1) / early.n_progress
-    demos = Demonstrations.of(references.demonstrations)
+    demos = references.all_movements()
     paths = smooth_paths(demos, comparison.cutoff)
     stored = beginnings(paths, progress)
     described = prepare(procrustes, stored)
