@@ -1,4 +1,4 @@
-"""A primitive under live control: one step at a time, with a moving goal, a measured state, obstacles and any tempo."""
+"""Live control of primitives: one step at a time, with a moving goal, obstacles and any tempo."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

@@ -1,4 +1,4 @@
-"""Orientations as unit quaternions (w, x, y, z), and poses: learn them, move again, describe them."""
+"""Orientations as unit quaternions (w, x, y, z), and poses: primitives and features."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

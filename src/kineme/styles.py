@@ -1,4 +1,4 @@
-"""Many demonstrations of one movement: their average with its spread, and the styles in which they differ."""
+"""Many demonstrations of one movement: average, spread and styles."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

@@ -1,4 +1,4 @@
-"""Real data sets that come inside wheels."""
+"""Data sets of real recordings that are installed with the package."""
 
 from kineme._lazy import lazy_names as _lazy_names
 

@@ -1,4 +1,4 @@
-"""Many files as one set of demonstrations, each movement with where it comes from."""
+"""Merge many files into one set of demonstrations, each movement with its source."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 
 
 class Source(NamedTuple):
-    """Where a movement comes from.
+    """The source of a movement.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """What was read, where it comes from, and what could not be read.
+    """Movements with their sources, and the problems of what could not be read.
 
     A sequence of `Trajectory`, taken wherever movements are expected.
 
@@ -152,7 +152,7 @@ def _joined(arrays: Sequence[Any]) -> Any:
 
 
 def _stamps(block: Block) -> Any:
-    """Times, or an even second where a file has none."""
+    """Time stamps; if a file has none, even ones over one second."""
     if block.times is not None:
         return block.times
     lengths = np.diff(block.offsets)
