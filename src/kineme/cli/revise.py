@@ -43,7 +43,7 @@ def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_j
 @library_option
 @json_option
 def review(folder: Path, as_json: bool) -> None:
-    """Find symbols that could be one, and symbols that are of two kinds."""
+    """Find symbols that could be one, and symbols that could be two."""
     with opened(folder) as actions:
         found = actions.review()
     data = {
@@ -57,11 +57,11 @@ def review(folder: Path, as_json: bool) -> None:
             for one in found.merges
         ]
         lines += [
-            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
+            f"{printable(one.symbol)} could be two: {len(one.parts[0])} movements, and "
             + ", ".join(map(str, one.parts[1].tolist()))
             for one in found.splits
         ]
-        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
+        return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
 
     say(as_json, data, text)
 
