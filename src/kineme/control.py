@@ -1,4 +1,4 @@
-"""Public names of `kineme.primitives.control`."""
+"""Live control of primitives; public names of `kineme.primitives.control`."""
 
 from kineme.primitives.control import Controller, ObstacleAvoidance, State, Status
 

@@ -1,4 +1,4 @@
-"""Orientations as unit quaternions (w, x, y, z), and poses: learn them, move again, describe them."""
+"""Orientations as unit quaternions (w, x, y, z), and poses: primitives and features."""
 
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any

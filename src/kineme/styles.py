@@ -1,4 +1,4 @@
-"""Public names of `kineme.primitives.styles`."""
+"""Many demonstrations: average, spread and styles; public names of `kineme.primitives.styles`."""
 
 from kineme.primitives.styles import (
     AveragePrimitive,

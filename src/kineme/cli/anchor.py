@@ -1,4 +1,4 @@
-"""``kineme anchor``: from movements without a name to symbols, with a person or by a script."""
+"""``kineme anchor``: propose symbols among unlabeled movements, and accept them in a dialogue or by options."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from kineme.cli.options import json_option, library_option, whole
 from kineme.cli.output import say, write
 from kineme.output.text import counted, printable
 
-_SHOWN = 5  # movements left over, written out
+_SHOWN = 5  # remaining movements that are listed
 
 
 class Choice(click.ParamType):  # type: ignore[type-arg]
-    """Numbers of proposals separated by commas, or all."""
+    """Numbers of proposals separated by commas, or "all"."""
 
     name = "1,2,...|all"
 
@@ -31,26 +31,28 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
 
 
-@click.command(short_help="Turn movements without a name into symbols.")
+@click.command(short_help="Turn unlabeled movements into symbols.")
 @library_option
 @click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
-              help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip
-@click.option("--clusters", type=whole(1), help="How many clusters.  [default: as many as fit]")
-@click.option("--min-members", type=whole(2), default=3, show_default=True, help="Of a proposal, at least.")
+              help="Clustering.  [default: members as similar as those of the stored symbols]")  # fmt: skip
+@click.option("--clusters", type=whole(1), help="Number of clusters.  [default: chosen from the data]")
+@click.option(
+    "--min-members", type=whole(2), default=3, show_default=True, help="Smallest number of movements in a proposal."
+)
 @click.option("--join/--no-join", default=True, show_default=True,
-              help="First let movements join the symbols that they are recognized as.")  # fmt: skip
-@click.option("--accept", type=Choice(), help="Name these proposals, without asking.")
-@click.option("--reject", type=Choice(), help="Leave these movements unnamed, and do not propose them again.")
+              help="First add movements to the symbols that they are recognized as.")  # fmt: skip
+@click.option("--accept", type=Choice(), help="Accept these proposals without asking.")
+@click.option("--reject", type=Choice(), help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
 def anchor(folder: Path, **options: Any) -> None:
-    """Propose symbols for the movements without a name, and make them.
+    """Propose symbols among the unlabeled movements, and accept them.
 
-    On a terminal it asks for each; with --accept or --reject it does not; else it changes nothing, and lists them under
-    the numbers that --accept will know them by.
+    On a terminal it asks about each proposal. With --accept or --reject it does not ask. Otherwise it changes nothing
+    and lists the proposals by the numbers that --accept takes.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
@@ -64,7 +66,8 @@ def anchor(folder: Path, **options: Any) -> None:
     names = _names(options["names"])
     writes = scripted or interactive
     with ActionLibrary(folder, read_only=not writes) as library:
-        # What joins is left out whether it is written or not: a number means the same when listed and when accepted.
+        # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
+        # listed and when it is accepted.
         joining = recognized(library.store) if options["join"] else {}
         members = [one for ids in joining.values() for one in ids.tolist()]
         proposals = propose(
@@ -92,7 +95,7 @@ def anchor(folder: Path, **options: Any) -> None:
 
 
 def _named(library: Any, ids: Any) -> str:
-    """The first movements by name, for a person."""
+    """Names of the first movements."""
     if not len(ids):
         return ""
     names = library.movements(ids=ids[:_SHOWN]).names or ()
@@ -122,7 +125,7 @@ def _names(path: Path | None) -> dict[int, str]:
 
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
-    """A sheet of all proposals, then a picture of each."""
+    """Draw an overview of all proposals, then a picture of each."""
     from kineme.anchoring.figures.proposal import draw_proposal
     from kineme.anchoring.figures.proposal_sheet import draw_proposals
     from kineme.output.figures import save_figure

@@ -1,4 +1,4 @@
-"""The dialogue of ``kineme anchor``: one proposal after the other, until all are named or the person stops."""
+"""The dialogue of ``kineme anchor``: one proposal after another, until all are named or the user stops."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HELP = """\
 
 
 class Item(NamedTuple):
-    """A proposal on the list: its members are ids of movements."""
+    """A proposal in the queue; its members are ids of movements."""
 
     title: str
     proposal: Any
@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
 
 class Session:
-    """Ask about each proposal; every answer is committed at once.
+    """Ask about each proposal and commit every answer at once.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Session:
         self.items = deque(Item(str(k + 1), proposals[k], pictures[k]) for k in range(len(proposals)))
 
     def run(self) -> None:
-        """Until the list is empty, /quit, or the end of the input."""
+        """Run until the queue is empty, the user enters /quit, or the input ends."""
         if self.items:
             write("Give each a name; /help says what else there is.")
         while self.items:
@@ -67,7 +67,7 @@ class Session:
         write(f"{counted(len(self.library.symbols()), 'symbol')}, {counted(left, 'movement')} without one")
 
     def _answer(self, item: Item, line: str) -> bool:
-        """Do what the person says; whether to go on."""
+        """Carry out one line of input; return whether to continue."""
         command, _, rest = line.partition(" ")
         if command in {"/quit", "/q"}:
             return False

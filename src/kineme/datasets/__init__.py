@@ -1,4 +1,4 @@
-"""Real data sets that come inside wheels."""
+"""Data sets of real recordings that are installed with the package."""
 
 from kineme.datasets.lasa import LASA_26, LASA_30, PAPER_LETTERS, load_lasa
 

@@ -1,4 +1,4 @@
-"""Writing one generated movement to a file: CSV, NPZ, JSON."""
+"""Write one generated movement to a file: CSV, NPZ, JSON."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def encode_movement(columns: Columns, ending: str) -> bytes:
     Raises
     ------
     DataError
-        An ending that no writer has; the message lists those that do.
+        No writer has that extension; the message lists those that exist.
     """
     if ending not in WRITERS:
         raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
@@ -54,5 +54,5 @@ def _json(columns: Columns) -> bytes:
     return (json.dumps({name: values.tolist() for name, values in columns.items()}) + "\n").encode()
 
 
-#: File ending -> encoder. All of them keep every bit of the numbers.
+#: File extension -> encoder. All of them keep every bit of the numbers.
 WRITERS: dict[str, Callable[[Columns], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}

@@ -14,9 +14,9 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array
 
