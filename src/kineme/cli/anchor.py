@@ -19,7 +19,7 @@ _SHOWN = 5  # remaining movements that are listed
 class Choice(click.ParamType):  # type: ignore[type-arg]
     """Numbers of proposals separated by commas, or "all"."""
 
-    name = "0,1,...|all"
+    name = "1,2,...|all"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> list[int] | str:
         """Text as numbers."""
@@ -44,7 +44,7 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
 @click.option("--accept", type=Choice(), help="Accept these proposals without asking.")
 @click.option("--reject", type=Choice(), help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help='A JSON file of names: {"0": "wave", "1": "nod"}.  [default: kind 1, kind 2, ...]')  # fmt: skip
+              help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
@@ -113,10 +113,13 @@ def _names(path: Path | None) -> dict[int, str]:
         names = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(names, dict):
             raise ValueError("no numbers of proposals")
-        return {int(number): check_name(name) for number, name in names.items()}
+        found = {int(number): check_name(name) for number, name in names.items()}
+        if min(found, default=1) < 1:
+            raise ValueError(f"proposals are counted from 1, got {min(found)}")
+        return found
     except ValueError as error:
         raise DataError(
-            f'expected {path} to hold names by the number of the proposal, as {{"0": "wave"}}, got something else '
+            f'expected {path} to hold names by the number of the proposal, as {{"1": "wave"}}, got something else '
             f"({error})"
         ) from error
 
@@ -133,42 +136,45 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     movements = library.movements(ids=proposals.ids)
     like = library.specification.recognizer()
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
-    for k, one in enumerate(proposals.found.proposals):
-        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"kind-{k}.png"))
-    old = len(proposals)
-    while (stale := folder / f"kind-{old}.png").exists():  # pictures of an earlier run with more proposals
+    for number, one in enumerate(proposals.found.proposals, 1):
+        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))
+    number = len(proposals) + 1
+    while (stale := folder / f"proposal-{number}.png").exists():  # of an earlier run
         stale.unlink()
-        old += 1
+        number += 1
     return paths
 
 
 def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
-    numbers = range(len(proposals)) if choice == "all" else choice or []
+    """Numbers of proposals, from 1."""
+    numbers = range(1, len(proposals) + 1) if choice == "all" else choice or []
     for number in numbers:
-        if not 0 <= number < len(proposals):
+        if not 1 <= number <= len(proposals):
             raise click.BadParameter(
-                f"there are {len(proposals)} proposals, counted from 0, got {number}", param_hint=option
+                f"there are {len(proposals)} proposals, counted from 1, got {number}", param_hint=option
             )
     return list(dict.fromkeys(numbers))
 
 
 def _accept(library: Any, proposals: Any, chosen: list[int], names: dict[int, str]) -> dict[str, int]:
     done = {}
-    for k in chosen:
-        name = names.get(k) or _free_name(library)
-        library.accept(proposals[k], name)
-        done[name] = len(proposals[k])
+    for number in chosen:
+        one = proposals[number - 1]
+        name = names.get(number) or _free_name(library, number)
+        library.accept(one, name)
+        done[name] = len(one)
     return done
 
 
-def _free_name(library: Any) -> str:
+def _free_name(library: Any, number: int) -> str:
+    """The number of the proposal as a name; of one that a symbol has, the next free number."""
     taken = {symbol.name for symbol in library.symbols()}
-    return next(name for k in range(1, len(taken) + 2) if (name := f"kind {k}") not in taken)
+    return next(name for k in range(number, number + len(taken) + 1) if (name := f"cluster {k}") not in taken)
 
 
 def _reject(library: Any, proposals: Any, chosen: list[int]) -> list[int]:
-    for k in chosen:
-        library.reject(proposals[k])
+    for number in chosen:
+        library.reject(proposals[number - 1])
     return chosen
 
 
@@ -176,14 +182,14 @@ def _as_data(proposals: Any) -> dict[str, Any]:
     return {
         "proposals": [
             {
-                "number": k,
+                "number": number,
                 "movements": [int(i) for i in one.members],
                 "medoid": one.medoid,
                 "cohesion": one.cohesion,
                 "stability": one.stability,
-                "nearest": one.nearest,
+                "nearest": None if one.nearest is None else one.nearest + 1,
             }
-            for k, one in enumerate(proposals[i] for i in range(len(proposals)))
+            for number, one in enumerate((proposals[i] for i in range(len(proposals))), 1)
         ],
         "left_over": [int(i) for i in proposals.left_over],
     }

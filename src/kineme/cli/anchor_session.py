@@ -15,7 +15,7 @@ from kineme.output.text import counted, printable
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
   (nothing)      leaves it for later
-  /split         looks for two kinds in it
+  /split         looks for two clusters in it
   /reject        leaves its movements unnamed, and does not propose it again
   /members       lists its movements
   /name TEXT     a name that begins with a slash
@@ -44,7 +44,7 @@ class Session:
 
     def __init__(self, library: Any, proposals: Any, pictures: list[Path]) -> None:
         self.library = library
-        self.items = deque(Item(str(k), proposals[k], pictures[k]) for k in range(len(proposals)))
+        self.items = deque(Item(str(k + 1), proposals[k], pictures[k]) for k in range(len(proposals)))
 
     def run(self) -> None:
         """Run until the queue is empty, the user enters /quit, or the input ends."""
@@ -101,7 +101,7 @@ class Session:
     def _split(self, item: Item) -> None:
         parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
         if len(parts) < 2:
-            write("  no two kinds of two movements or more in it")
+            write("  no two clusters of two movements or more in it")
             return
         self.items.popleft()
         for k in reversed(range(len(parts))):

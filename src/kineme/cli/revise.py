@@ -59,11 +59,11 @@ def review(folder: Path, as_json: bool) -> None:
             for one in found.merges
         ]
         lines += [
-            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
+            f"{printable(one.symbol)} could be two: {len(one.parts[0])} movements, and "
             + ", ".join(map(str, one.parts[1].tolist()))
             for one in found.splits
         ]
-        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
+        return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
 
     say(as_json, data, text)
 

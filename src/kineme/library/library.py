@@ -406,7 +406,7 @@ class ActionLibrary:
         return morph_symbols(self.store, a, b, shares)
 
     def review(self) -> Review:
-        """Symbols whose movements are hard to tell apart, and symbols whose movements are of two kinds.
+        """Symbols whose movements are hard to tell apart, and symbols whose movements form two clusters.
 
         Advice for `merge` and `split`; nothing is changed.
         """

@@ -21,7 +21,7 @@ from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
-#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred kinds take 6 s and, with support vectors, 105 ms.
+#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred classes take 6 s and, with support vectors, 105 ms.
 EXHAUSTIVE = 1000
 
 

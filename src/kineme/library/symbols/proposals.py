@@ -23,7 +23,7 @@ _SAME = 0.8  # of a proposal's members in one that was rejected: it is the same 
 
 @dataclass(frozen=True, eq=False)
 class LibraryProposals:
-    """Proposals of kinds among movements of a library.
+    """Proposals of symbols for movements of a library.
 
     Indexing gives a `Proposal` whose members and medoid are ids of movements.
 
@@ -51,8 +51,8 @@ class LibraryProposals:
         return self.ids[self.found.left_over]
 
     def __repr__(self) -> str:
-        kinds = "1 kind" if len(self) == 1 else f"{len(self)} kinds"
-        return f"LibraryProposals({kinds} of {len(self.ids)} movements, {len(self.left_over)} left over)"
+        clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"
+        return f"LibraryProposals({clusters} among {len(self.ids)} movements, {len(self.left_over)} left over)"
 
 
 def propose(

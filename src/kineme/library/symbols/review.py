@@ -13,7 +13,7 @@ from kineme.library.symbols.described_members import described, evenly_many_memb
 
 @dataclass(frozen=True)
 class Review:
-    """Symbols that could be one, and symbols that are of two kinds.
+    """Symbols that could be one, and symbols that could be two.
 
     Attributes
     ----------
