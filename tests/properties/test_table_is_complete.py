@@ -37,23 +37,31 @@ OTHER_PARTS = {
 
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
+    "primitives.base_rollout.BaseRollout.axis_names": "of columns",
+    "primitives.base_rollout.BaseRollout.plot": "one picture",
+    "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
+    "primitives.rollout_figure.draw_rollout": "one picture",
+    "primitives.pose.pose_rollout.PoseRollout.axis_names": "of columns",
     "primitives.pose.pose_primitives.PosePrimitives.controller": "one movement by contract",
     "primitives.pose.pose_primitives.PosePrimitives.load": "the same file as Primitives.load, which is in the table",
     "primitives.pose.pose_primitives.PosePrimitives.save": "the same file as Primitives.save, which is in the table",
     "primitives.discrete.primitives.Primitives.controller": "one movement by contract",
-    "comparison.bounds.Code.take": "an index into arrays",
+    "comparison.bounds.ReducedFeatures.take": "an index into arrays",
     "recognition.early.early.earliness": "a score of the whole set",
     "recognition.early.live_state.LiveStatus.messages": "of one stream; its length counts problems",
     "movements.preparation.perturbations.Perturbation.apply": "random numbers are drawn for the batch in its order",
     "recognition.recognizer.Recognizer.score": "a score of the whole set",
-    "recognition.two_stage_search.Shortlist.recognize": "of large libraries; see test_two_stage_search.py",
-    "recognition.two_stage_search.Stored.codes_at": "reads stored rows",
+    "recognition.two_stage_search.TwoStageSearch.recognize": "of large libraries; see test_two_stage_search.py",
+    "comparison.stored.StoredReferences.reduced_at": "reads stored rows",
+    "comparison.stored.StoredReferences.described": "reads stored rows",
+    "comparison.similarity.similarities": "of pairs of the batch",
+    "recognition.early.early.PredictsPartial.predict_partial": "a protocol; the recognizer is in the table",
+    "recognition.recognizer.Recognizer.look_at": "the old name of describe",
     "recognition.transform.Transform.apply": "one movement by contract",
     "primitives.styles.average.average": "a mean of the batch; see test_order_of_training.py",
     "primitives.styles.average.average_by_label": "means of the batch, by `average`",
     "primitives.styles.figure.draw_morph": "one picture",
     "primitives.styles.learn.learn_styles": "what differs within the batch; see test_order_of_training.py",
-    "primitives.styles.parameters.shared_label": "one label of the whole batch",
     "movements.trajectories.collect.collect_trajectories": "joins arrays that the table's movements are made of",
     "movements.trajectories.demonstrations.require_labels": "hands out labels, or raises",
     "movements.preparation.preprocess.Step.apply": "a protocol; the steps are in the table",
@@ -99,7 +107,7 @@ def _methods(cls):
             if not inspect.isfunction(function):
                 continue
             takes_many = holds_many or bool(MANY & set(inspect.signature(function).parameters))
-        if takes_many:
+        if takes_many and not getattr(function, "__isabstractmethod__", False):
             codes[key] = inspect.unwrap(function).__code__
     return codes
 

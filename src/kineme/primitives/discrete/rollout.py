@@ -1,9 +1,9 @@
-"""Moving again, in batch: any start, goal, duration and rate, as one matrix product."""
+"""Generated movements in a batch: any start, goal, duration and rate, as one matrix product."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.operators import decoder
 from kineme.runtime.parallel import for_tiles
@@ -31,16 +31,17 @@ if TYPE_CHECKING:
     from kineme.primitives.discrete.primitives import Primitives
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
-_LONGEST = 10.0  # durations after which a movement that has not settled will not
+_LONGEST = 10.0  # durations after which a movement that has not settled is given up
 _SETTLING_SAMPLES = 400
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rollout:
+class Rollout(BaseRollout):
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
 
-    Each of `positions`, `velocities` and `accelerations` is one product of the movements' numbers,
-    ``[W, g - x0, v0, x0]``, with the decode matrix of the specification.
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`. Each of `positions`,
+    `velocities` and `accelerations` is one product of the movements' numbers, ``[W, g - x0, v0, x0]``, with the decode
+    matrix of the specification.
 
     Attributes
     ----------
@@ -84,9 +85,16 @@ class Rollout:
         return self._derivative(2)
 
     @property
-    def trajectories(self) -> Demonstrations:
-        """The movements as `Demonstrations`, with the labels and names of their primitives."""
-        return as_demonstrations(self.primitives, self.times, self.positions)
+    def _batch(self) -> Batch:
+        return self.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> Rollout:
+        rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
+        return replace(
+            self,
+            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
+            **{name: getattr(self, name)[chosen] for name in rows},
+        )
 
     def _derivative(self, order: int) -> Array:
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
@@ -117,15 +125,6 @@ class Rollout:
         return result.transpose(0, 2, 1)
 
 
-def as_demonstrations(primitives: Batch, times: Array, positions: Array) -> Demonstrations:
-    """Generated movements (n, T), (n, T, d) with labels and names of their primitives, one for each or one for all."""
-    labels, names = primitives.labels, primitives.names
-    if len(primitives) < len(positions):
-        labels = None if labels is None else np.repeat(labels, len(positions))
-        names = None if names is None else names * len(positions)
-    return Demonstrations.from_arrays(positions, labels, list(times), names, copy=False)
-
-
 def rollout(
     primitives: Primitives,
     start: ArrayLike | None,
@@ -133,7 +132,7 @@ def rollout(
     duration: ArrayLike | None,
     velocity: ArrayLike | None,
 ) -> Rollout:
-    """Broadcast the wishes over the primitives and check them; see `Primitives.rollout`."""
+    """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
     d = primitives.n_dims
     wishes = {
         "start": per_movement(start, "start", d),
@@ -151,7 +150,7 @@ def rollout(
     durations = fill("duration", primitives.durations)
     check_durations("duration", durations)
     starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
-    # A faster movement starts faster, unless the user says how it starts.
+    # The demonstrated velocity scales with the tempo; a given velocity does not.
     tempo = primitives.durations / durations
     velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if wishes["velocity"] is None else 1.0)
     return Rollout(
@@ -170,7 +169,7 @@ def check_durations(name: str, durations: Array) -> None:
 
 
 def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
-    """A wish as (1, d) or (n, d), durations as (1,) or (n,); a number serves a movement of one dimension."""
+    """An option as (1, d) or (n, d), durations as (1,) or (n,); a number suits a movement of one dimension."""
     if wish is None:
         return None
     try:
@@ -198,13 +197,13 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
 
 
 def _first(value: Array, bad: NDArray[np.bool_]) -> str:
-    """The first bad wish, and whose it is where there are many."""
+    """The first invalid value, with the index of its movement if there are several."""
     k = int(bad.reshape(len(value), -1).any(axis=1).argmax())
     return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
 
 
 def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
-    """How many movements the wishes make, one or equally many of each."""
+    """Number of movements from the lengths of all options, which must be 1 or equal."""
     lengths = {"primitives": n_primitives} | {name: len(value) for name, value in wishes.items() if value is not None}
     n = max(lengths.values())
     if any(length not in (1, n) for length in lengths.values()):
@@ -242,9 +241,9 @@ def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
 
 
 def settled_end(movement: Rollout, tolerance: float) -> float:
-    """How far to go, in durations from 1 on, until every movement stays within `tolerance` of its goal."""
+    """Time, in durations from 1 on, at which every movement stays within `tolerance` of its goal."""
     check_number("settle", tolerance, above=0.0)
-    far = Rollout(**{**movement.__dict__, "n_samples": _SETTLING_SAMPLES, "end": _LONGEST})
+    far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
     outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))
     last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
     if last == _SETTLING_SAMPLES - 1:
