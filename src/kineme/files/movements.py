@@ -10,9 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from kineme.errors import DataError
+from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
 from kineme.validation import Array
+
+_DERIVATIVES = ("velocities", "accelerations")
 
 Columns = dict[str, Array]  # times (T,), positions, velocities and accelerations (T, d)
 
@@ -30,9 +34,38 @@ def encode_movement(columns: Columns, ending: str) -> bytes:
     return WRITERS[ending](columns)
 
 
-def write_movement(path: Path, columns: Columns) -> Path:
-    """Write a movement in the format that the file's ending names, atomically."""
+def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
+    """Write one movement to a CSV, NPZ or JSON file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its ending names the format.
+    movement : MovementsLike or dict
+        One movement, in any way that `Demonstrations.of` takes it; of a rollout velocities and accelerations are
+        written too. Or a dict of ``times`` (T,), ``positions`` and, if you like, ``velocities`` and ``accelerations``
+        (T, d).
+
+    Returns
+    -------
+    Path
+        Where it was written; `read_recording` reads it.
+
+    Raises
+    ------
+    DataError
+        An ending that no writer has, or a file that cannot be written.
+    TrajectoryError
+        Several movements, or what is none.
+    """
+    path, columns = Path(path), movement if isinstance(movement, dict) else _columns_of(movement)
     return write_atomically(path, encode_movement(columns, path.suffix.lower()))
+
+
+def _columns_of(movement: MovementsLike) -> Columns:
+    one = as_recording(movement)
+    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
+    return {"times": one.times, "positions": one.positions, **derivatives}
 
 
 def _csv(columns: Columns) -> bytes:
