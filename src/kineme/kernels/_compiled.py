@@ -30,6 +30,13 @@ def _aligned(n_rows, n_columns, like):  # type: ignore[no-untyped-def]
     return whole[first : first + size].reshape(n_rows, n_columns)
 
 
+@jit
+def _pack(rows, panel):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[1]):
+        for j in range(rows.shape[0]):
+            panel[k, j] = rows[j, k]
+
+
 def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, sums: Rows) -> None:
     """``sums[i, j] = sum_k term(A[i, k], B[j, k], c)`` for C-contiguous arrays.
 
@@ -44,9 +51,7 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
     by_four = len(A) - len(A) % _ROWS
     for start in range(0, B.shape[0], n_columns):
         width = min(n_columns, B.shape[0] - start)
-        for k in range(p):
-            for j in range(width):
-                panel[k, j] = B[start + j, k]
+        _pack(B[start : start + width], panel)
         for i in range(0, by_four, _ROWS):
             a0, a1, a2, a3 = A[i], A[i + 1], A[i + 2], A[i + 3]
             strips[:] = 0
@@ -76,8 +81,8 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
             sums[i, start : start + width] = s0[:width]
 
 
-# Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached. Each of the four
-# rows is summed in the same order, so that a Gram matrix is symmetric to the last bit.
+# Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached. Each of the
+# four rows is summed in the same order, so that a Gram matrix is symmetric to the last bit.
 _sum = jit(_sum_over_coordinates, cache=False, reorder=False)
 
 
