@@ -8,7 +8,16 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import Finite, Numbers, SymbolName, json_option, library_option_of, whole
+from kineme.cli.options import (
+    SPECIFICATION,
+    Finite,
+    Numbers,
+    SymbolName,
+    json_option,
+    library_option_of,
+    specification_options,
+    whole,
+)
 from kineme.cli.output import write_bytes
 from kineme.output.text import printable
 
@@ -23,8 +32,7 @@ from kineme.output.text import printable
 @click.option("--settle", type=Finite(), help="Go on past the duration until this close to the goal.")
 @click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="A point to steer around; repeatable.")
 @click.option("--index", type=whole(0), default=0, show_default=True, help="Which of several saved primitives.")
-@click.option("--formulation", default="bio-inspired", show_default=True, help="For a recording: how to learn it.")
-@click.option("--n-basis", type=int, default=40, show_default=True, help="For a recording: basis functions.")
+@specification_options
 @click.option(
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Keep the primitive in this .kineme file."
 )
@@ -71,7 +79,7 @@ def _primitive(options: dict[str, Any]) -> Any:
             f"expected a recording or a saved primitive, found no file {printable(source)}; "
             "for a symbol, name its --library"
         )
-    dmp = DMP(options["formulation"], n_basis=options["n_basis"], fit="trajectory")
+    dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     primitives = primitives_from(Path(source), dmp)
     if options["index"] >= len(primitives):
         raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")

@@ -25,7 +25,8 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     features : DMPFeatures, optional
-        What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_basis`` and so on.
+        What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_samples``,
+        ``features__dmp__n_basis`` and so on.
     orientation_weight : float, default 0.2
         How much a radian counts beside the positions, in their unit per radian: 0.2 m, about the length of a hand or
         a tool, weighs a turn by how far it moves the tip. Positions in millimeters need 200. Without positions it
@@ -56,8 +57,8 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
         demonstrations = Demonstrations.of(X)
         self.n_columns_ = demonstrations.n_dims
-        self.steps_ = tuple(self.features_.preprocessing)
-        self.features_.set_params(preprocessing=())  # done before the goal is read; see to_tangent
+        self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
+        self.features_.set_params(dmp__preprocessing=())  # done before the goal is read; see to_tangent
         self.features_.fit(self._tangent(demonstrations))
         return self
 

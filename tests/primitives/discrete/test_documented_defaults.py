@@ -9,9 +9,23 @@ import kineme
 from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning
 
 
+def test_the_path_is_fitted_with_forty_functions():
+    """The choice of ``python -m bench --only dmp_defaults``; docs/moving-again.md says what came of the others."""
+    assert DMP() == DMP("bio-inspired", fit="trajectory", n_basis=40)
+    assert PoseDMP().dmp == Specification().dmp == DMPFeatures().fit([np.eye(5)]).dmp_ == DMP()
+    assert (RhythmicDMP().fit, list(SPECIFICATION)) == (DMP().fit, ["formulation", "fit", "n_basis"])
+
+
+def test_the_command_line_takes_the_same(tmp_path):
+    u = np.linspace(0.0, 1.0, 50)
+    np.savetxt(tmp_path / "x.csv", np.column_stack((u, np.sin(u), u**2)), delimiter=",", header="t,x,y", comments="")
+    assert run("generate", tmp_path / "x.csv", "--save", tmp_path / "x.kineme", "-o", tmp_path / "y.csv").exit_code == 0
+    assert kineme.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
+
+
 def test_the_numbers_of_the_paper_are_the_defaults():
-    """80 functions with centers even in time, K = 100, critical damping, s(tau) = 0.01; neighbors overlap by 0.3."""
-    dmp = DMP()
+    """Centers even in time, K = 100, critical damping, s(tau) = 0.01; neighbors overlap by 0.3."""
+    dmp = DMP(fit="forcing", n_basis=80)
     assert (dmp.K, dmp.D, dmp.n_points) == (100.0, 20.0, 200)
     assert dmp.basis.phase(np.ones(1))[0] == pytest.approx(0.01)
     np.testing.assert_allclose(dmp.basis.centers, 0.01 ** np.linspace(0.0, 1.0, 80))
