@@ -62,7 +62,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         **fields_of_dmp: Any,
     ) -> None:
         self.feature = feature
-        self.dmp = dmp
+        self.dmp: Specification | None = dmp
         self.n_samples = n_samples
         self.dtype = dtype
         if isinstance(dmp, str) and dmp in FORMULATIONS:  # the second parameter of earlier versions

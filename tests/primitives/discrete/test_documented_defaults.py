@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kineme
-from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning
+from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning, DMPFeatures, RhythmicDMP
+from kineme.cli import main
+from kineme.library.storage.specification import Specification
+from kineme.orientation import PoseDMP
 
 
 def test_the_path_is_fitted_with_forty_functions():
     """The choice of ``python -m bench --only dmp_defaults``; docs/moving-again.md says what came of the others."""
     assert DMP() == DMP("bio-inspired", fit="trajectory", n_basis=40)
     assert PoseDMP().dmp == Specification().dmp == DMPFeatures().fit([np.eye(5)]).dmp_ == DMP()
-    assert (RhythmicDMP().fit, list(SPECIFICATION)) == (DMP().fit, ["formulation", "fit", "n_basis"])
+    assert RhythmicDMP().fit == DMP().fit
 
 
 def test_the_command_line_takes_the_same(tmp_path):
     u = np.linspace(0.0, 1.0, 50)
     np.savetxt(tmp_path / "x.csv", np.column_stack((u, np.sin(u), u**2)), delimiter=",", header="t,x,y", comments="")
-    assert run("generate", tmp_path / "x.csv", "--save", tmp_path / "x.kineme", "-o", tmp_path / "y.csv").exit_code == 0
+    files = {name: str(tmp_path / name) for name in ("x.csv", "x.kineme", "y.csv")}
+    arguments = ["generate", files["x.csv"], "--save", files["x.kineme"], "-o", files["y.csv"]]
+    assert CliRunner().invoke(main, arguments).exit_code == 0
     assert kineme.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
 
 
