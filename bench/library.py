@@ -20,7 +20,7 @@ import kineme
 from bench.library_movements import ASKED, N_SAMPLES, SHOWN, copies, kinds
 from bench.movements import SEED, Array
 from bench.rows import Row, save, table
-from kineme.library.recognition.recognize import Serving
+from kineme.library.recognition.recognize import LibraryRecognizer
 
 _BATCH = 50_000  # movements in one call
 _PER_KIND = 200
@@ -102,7 +102,7 @@ def _serve(folder: Path, questions: Path) -> dict[str, Any]:
 
 def _exhaustive(library: Any, asked: Array) -> list[str]:
     """The symbol of the most similar of all movements, by the same averaged kernel."""
-    recognizer = Serving(library.store, exhaustive=0).model().recognizer
+    recognizer = LibraryRecognizer(library.store, exhaustive=0).model().recognizer
     seen = recognizer.look_at(asked)
     ids = library.ids()
     ends = np.cumsum(library.specification.widths(library.n_dims))[:-1]

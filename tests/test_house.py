@@ -56,16 +56,19 @@ def test_test_files_have_names_of_their_own():
 
 
 _BRITISH = re.compile(
-    r"\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi)s(?:e[ds]?|ing|ation)\b"
-    r"|neighbour|colour|behaviour|favour|\bcentre[ds]?\b|\bgrey|label(?:led|ling)|modell(?:ed|ing)",
+    r"\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi|reali|speciali|visuali"
+    r"|synchroni|parametri|discreti|randomi|regulari|orthogonali)s(?:e[drs]?|ing|ations?)\b|\banalys(?:e[ds]?|ing)\b"
+    r"|\w*(?:neighbour|colour|behaviour|favour|artefact|catalogue|licence)|\bcentre[ds]?\b|\bmetres?\b|\bgrey|\blearnt\b"
+    r"|label(?:led|ling)|modell(?:ed|ing)|travell(?:ed|ing)|judgement|whilst",
     re.IGNORECASE,
 )
 
 
 def test_spelling_is_american():
-    pages = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "pyproject.toml")]
-    pages += [*(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").glob("*.py"), *SOURCES]
+    texts = {".py", ".pyi", ".md", ".toml", ".json", ".in", ""}
+    pages = [path for path in _tracked() if path.suffix in texts and "results" not in path.parts]
     found = {str(page.relative_to(ROOT)): _BRITISH.findall(page.read_text(encoding="utf-8")) for page in pages}
+    assert {"pyproject.toml", "CHANGELOG.md", "src/kineme/__init__.py", "tests/conftest.py"} < set(found)
     assert not {page: words for page, words in found.items() if words}
 
 

@@ -1,6 +1,6 @@
-"""The only place that turns what a user passes into arrays, and refuses what cannot be used.
+"""Validation of user input: the only place that converts it to arrays and refuses what cannot be used.
 
-Inside the library arrays are trusted. Nothing here writes to an array of the caller.
+Inside the library arrays are trusted. No function here writes to an array of the caller.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from kineme.errors import SpecificationError, TrajectoryError
 Array = NDArray[np.float64]
 
 MIN_SAMPLES = 4  # a not-a-knot cubic spline needs four
-LARGEST = 1e100  # of parameters and wishes: the squares and cubes of larger numbers, and of 1 over them, are no numbers
-MOST_NUMBERS = 50_000_000  # samples times basis functions: what generates a movement then takes some gigabytes
-#: What a movement may measure, in its unit: accelerations, and squares of positions and extents, then stay numbers.
+LARGEST = 1e100  # of parameters and options: cubes of larger numbers, or of 1 over them, may overflow
+MOST_NUMBERS = 50_000_000  # samples times basis functions of one movement: matrices of gigabytes
+#: Range of positions and extents, in the movement's unit: their squares, and accelerations, stay finite.
 LARGEST_POSITION, SMALLEST_EXTENT = LARGEST, 1 / LARGEST
 SHORTEST_STEP, LARGEST_STAMP = 1e-50, 1e50  # seconds
 _EPS = np.finfo(np.float64).eps
-_NEAR_ZERO = 1e4 * SHORTEST_STEP / _EPS  # two different stamps farther from 0 are more than the shortest step apart
-_SMALL_POSITION = SMALLEST_EXTENT / _EPS  # a movement that comes farther from 0 cannot have a smaller extent
+_NEAR_ZERO = 1e4 * SHORTEST_STEP / _EPS  # beyond it, different stamps are always far enough apart
+_SMALL_POSITION = SMALLEST_EXTENT / _EPS  # beyond it, no extent can be too small
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -53,12 +53,12 @@ def refuse_lossy(values: Any, who: str) -> None:
 
 
 def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers") -> Array:
-    """Whatever NumPy takes for numbers, as float64; imaginary parts are refused wherever they hide.
+    """Anything that NumPy converts to numbers, as float64; complex numbers are refused, also inside lists.
 
     Raises
     ------
     TrajectoryError
-        What is no number; complex numbers in an array, a list or an array of objects.
+        Values that are not numbers, or complex numbers in an array, a list or an array of objects.
     """
     if _is_float64(values):
         return values
@@ -148,9 +148,9 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
-    """Movements so small that the squares of their positions are no numbers, with their extents."""
+    """Movements so small that the squares of their positions underflow, with their extents."""
     suspects = np.arange(len(offsets) - 1)
-    for probe in (offsets[1:] - 1, offsets[:-1], (offsets[:-1] + offsets[1:]) // 2):  # the first clears the usual one
+    for probe in (offsets[1:] - 1, offsets[:-1], (offsets[:-1] + offsets[1:]) // 2):
         suspects = suspects[(np.abs(positions[probe[suspects]]) < _SMALL_POSITION).all(axis=1)]
         if not len(suspects):
             return []
@@ -160,7 +160,7 @@ def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, fl
 
 
 def check_extents(positions: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
-    """Refuse a movement whose extent is too small; one that does not move at all is judged later."""
+    """Refuse a movement whose extent is too small; one that does not move at all is handled later."""
     for i, extent in too_small(positions, offsets):
         raise TrajectoryError(
             f"{describe(i, names)}: expected an extent of at least {SMALLEST_EXTENT:g}, got {extent:g}; "
@@ -204,7 +204,7 @@ def check_number(
     bound = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
     try:
         number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-    except OverflowError:  # a whole number beyond all others
+    except OverflowError:  # an integer beyond the range of floats
         number = math.inf
     outside = (above is not None and number <= above) or (least is not None and number < least)
     if not math.isfinite(number) or outside:
@@ -214,7 +214,7 @@ def check_number(
 
 
 def check_count(name: str, value: Any, least: int, most: int | None = None) -> int:
-    """A parameter as a plain number, refused where it is not a whole one from `least` to `most`."""
+    """Return a parameter as an int; refuse it unless it is a whole number from `least` to `most`."""
     try:
         number = least - 1 if isinstance(value, bool) else operator.index(value)
     except TypeError:
@@ -226,20 +226,20 @@ def check_count(name: str, value: Any, least: int, most: int | None = None) -> i
     return number
 
 
-def check_samples(n_samples: float, n_basis: int, wish: str) -> int:
-    """A number of samples, refused where what generates them does not fit into memory; `wish` asked for so many."""
+def check_samples(n_samples: float, n_basis: int, parameter: str) -> int:
+    """Return a number of samples; refuse it where the matrix that generates them is too large for memory."""
     most = MOST_NUMBERS // int(n_basis)
     if not n_samples <= most:
         got = f"{n_samples:.3g}" if n_samples < LARGEST else "far more"
         raise SpecificationError(
-            f"expected {wish} to ask for at most {most:,} samples with {n_basis} basis functions, got {got}; "
+            f"expected {parameter} to ask for at most {most:,} samples with {n_basis} basis functions, got {got}; "
             "lower it, or generate the movement in parts"
         )
     return math.ceil(n_samples)
 
 
 def check_seed(name: str, value: Any) -> None:
-    """Refuse what is not a whole number from 0, or a sequence of such."""
+    """Refuse a seed that is not a whole number from 0, or a sequence of such numbers."""
     several = isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim == 1)
     numbers = value if several and len(value) else [value]
     for number in numbers:
@@ -247,6 +247,6 @@ def check_seed(name: str, value: Any) -> None:
 
 
 def check_switch(name: str, value: Any) -> None:
-    """Refuse what is neither true nor false."""
+    """Refuse a value that is not a bool."""
     if not isinstance(value, bool | np.bool_):
         raise SpecificationError(f"expected {name} to be True or False, got {value!r}")

@@ -55,7 +55,7 @@ def test_a_sheet_counts():
     demos = draw_kinds([5, 4, 6, 1], 2, 3, spread=0.03)
     proposals = propose(demos)
     titles = [axes.get_title() for axes in draw_proposals(demos, proposals).axes if axes.get_title()]
-    assert [title.partition(" ×")[0] for title in titles[:-1]] == ["0:  6", "1:  5", "2:  4"]
+    assert [title.partition(" ×")[0] for title in titles[:-1]] == ["1:  6", "2:  5", "3:  4"]
     assert titles[-1] == "left over: 1"
 
 

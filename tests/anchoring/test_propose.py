@@ -123,7 +123,7 @@ def test_a_strange_movement_is_left_over():
     demos = draw_kinds([5, 6, 1, 7, 1], 2, 3, spread=0.03)
     proposals = propose(demos)
     assert proposals.left_over.tolist() == [11, 19]
-    assert repr(proposals) == "Proposals(3 kinds of 20 movements, 2 left over)"
+    assert repr(proposals) == "Proposals(3 clusters among 20 movements, 2 left over)"
     assert repr(proposals[0]).startswith("Proposal(7 movements, medoid 1")
 
 

@@ -37,6 +37,11 @@ OTHER_PARTS = {
 
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
+    "primitives.base_rollout.BaseRollout.axis_names": "of columns",
+    "primitives.base_rollout.BaseRollout.plot": "one picture",
+    "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
+    "primitives.rollout_figure.draw_rollout": "one picture",
+    "primitives.pose.pose_rollout.PoseRollout.axis_names": "of columns",
     "primitives.pose.pose_primitives.PosePrimitives.controller": "one movement by contract",
     "primitives.pose.pose_primitives.PosePrimitives.load": "the same file as Primitives.load, which is in the table",
     "primitives.pose.pose_primitives.PosePrimitives.save": "the same file as Primitives.save, which is in the table",
@@ -99,7 +104,7 @@ def _methods(cls):
             if not inspect.isfunction(function):
                 continue
             takes_many = holds_many or bool(MANY & set(inspect.signature(function).parameters))
-        if takes_many:
+        if takes_many and not getattr(function, "__isabstractmethod__", False):
             codes[key] = inspect.unwrap(function).__code__
     return codes
 

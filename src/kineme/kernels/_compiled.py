@@ -1,4 +1,4 @@
-"""Compiled sums over coordinates: the twins in ``_sums.py``, fast. Importing this imports Numba."""
+"""Compiled sums over coordinates, twins of those in ``_sums.py``. Importing this module imports Numba."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
     """``sums[i, j] = sum_k term(A[i, k], B[j, k], c)`` for C-contiguous arrays.
 
     The rows of B are packed feature by feature, so that the innermost loop runs over neighboring
-    columns of the Gram matrix: it vectorizes without reordering a sum, hence a pair's value does not
-    depend on its place in the tile. Four features at a time share one load and store of the strip.
+    columns of the Gram matrix: it vectorizes without reordering a sum, so the value of a pair does not
+    depend on its position in the tile. Four features at a time share one load and store of the strip.
     """
     p = A.shape[1]
     panel = np.empty((p, _PANEL), A.dtype)
@@ -47,7 +47,7 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
             sums[i, start : start + width] = strip[:width]
 
 
-# Not cached by itself: its key would hold functions. The loops below, which contain it, are.
+# Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached.
 _sum = jit(_sum_over_coordinates, cache=False)
 
 
@@ -65,13 +65,13 @@ def _squared(x: Any, y: Any, c: Any) -> Any:
 @register_jitable
 def _truncated(x: Any, y: Any, c: Any) -> Any:
     t = abs(x - y)
-    return t if t < c else c  # one instruction, where min() would look for NaN first
+    return t if t < c else c  # one instruction; min() would test for NaN first
 
 
 @register_jitable
 def _canberra(x: Any, y: Any, c: Any) -> Any:
     size = abs(x) + abs(y)
-    return abs(x - y) / (size if size > 0 else np.float32(1))  # float32: 1 would widen float32 to float64
+    return abs(x - y) / (size if size > 0 else np.float32(1))  # an integer 1 would widen float32 to float64
 
 
 @jit
@@ -101,7 +101,7 @@ def canberra_sums(A: Rows, B: Rows, c: Any, sums: Rows) -> None:
 @lru_cache(maxsize=32)
 def user_sums(d: Callable[..., Any], g: Callable[..., Any]) -> Callable[[Rows, Rows, Any, Rows], None]:
     """Sums of g(d(x, y)) for a caller's scalar functions, compiled once per process."""
-    # Builtins such as abs need no compiling, and functions that are compiled already allow none.
+    # Builtins such as abs need no compilation, and compiled functions are used as they are.
     distance, transform = (jit(f, cache=False) if isfunction(f) else f for f in (d, g))
     term = jit(lambda x, y, c: transform(distance(x, y)), cache=False)
 

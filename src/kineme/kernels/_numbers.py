@@ -11,10 +11,10 @@ from kineme.errors import SpecificationError
 
 
 def positive(value: object, name: str, otherwise: str) -> float:
-    """`value` as a plain float, if it is a finite number above zero; the message ends with `otherwise`."""
+    """Return `value` as a float; refuse it unless it is finite and above zero. The message ends with `otherwise`."""
     try:
         number = float(value) if isinstance(value, Real) else math.nan
-    except OverflowError:  # a whole number beyond all others
+    except OverflowError:  # an integer beyond the range of floats
         number = math.inf
     if not math.isfinite(number) or number <= 0:
         raise SpecificationError(f"expected a finite {name} > 0, got {value!r}; {otherwise}")

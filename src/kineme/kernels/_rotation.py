@@ -1,7 +1,7 @@
-"""Compiled best products over rotations in space: the twin of ``rotation.best_products``, pair by pair.
+"""Compiled twin of ``rotation.best_products``, pair by pair.
 
-Every pair goes through the same steps whatever its company. S is diagonalized by rotations of two axes at a time
-(Jacobi), which turn z with it; three sweeps are rarely too few, and each squares the error.
+The result of a pair does not depend on the other pairs. S is diagonalized by Jacobi rotations of two axes at a time,
+which rotate z too; three sweeps nearly always suffice, since each squares the error.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from kineme.kernels.rotation import CLOSE, LEAST_STEP, STEPS
 from kineme.runtime.compiled import jit
 
-_SWEEPS = 8  # at most; off-diagonal entries vanish long before
+_SWEEPS = 8  # at most; three nearly always suffice
 _SMALL = 1e-17  # of the largest entry
 
 

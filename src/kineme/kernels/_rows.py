@@ -1,4 +1,4 @@
-"""The only place that turns a caller's arrays into rows that the kernels trust."""
+"""Validation of feature rows: the only place that converts a caller's arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Rows = NDArray[np.floating]
 def checked_pair(A: ArrayLike, B: ArrayLike | None) -> tuple[Rows, Rows | None]:
     """Check two sets of rows; B becomes None where both are the same object.
 
-    scikit-learn calls ``kernel(X, X)`` with its training rows, which is worth half the work.
+    scikit-learn calls ``kernel(X, X)`` with its training rows; recognizing that saves half of the work.
 
     Returns
     -------
@@ -66,8 +66,8 @@ def largest_value(rows: Rows) -> float:
 def contiguous(rows: Rows, dtype: np.dtype[np.floating]) -> Rows:
     """Read-only C-contiguous view or copy of `rows`.
 
-    Read-only even where the caller's array is not: nothing can then write to it, and the compiled
-    loops need one signature per dtype, not two.
+    Read-only even if the caller's array is writable: no code can write to it by mistake, and the compiled
+    loops need one signature per dtype instead of two.
     """
     view = np.ascontiguousarray(rows, dtype).view()
     view.flags.writeable = False

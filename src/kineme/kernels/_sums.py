@@ -22,18 +22,18 @@ TileSums = Callable[[Rows, Rows, Any, Rows], None]
 
 @dataclass(frozen=True)
 class Term:
-    """What one coordinate adds to the sum: g(d(x, y)), with one constant c.
+    """The term that one coordinate adds to the sum: g(d(x, y)), with one constant c.
 
     Attributes
     ----------
     twin : callable
         The definition, ``twin(x, y, c)`` over arrays.
     load_compiled : callable
-        Gives the compiled loop; called only where it is used, because it imports Numba.
+        Returns the compiled loop; called only if it is used, because it imports Numba.
     cost : int
         Elementary operations of NumPy per evaluation of the twin.
     symmetric : bool
-        Whether term(x, y) equals term(y, x) for certain.
+        Whether term(x, y) always equals term(y, x).
     """
 
     twin: Callable[[Rows, Rows, Any], Any]
@@ -96,7 +96,7 @@ def fill_gram(term: Term, c: float, finish: Callable[[Rows], object], A: Rows, B
 
 
 def tile_sums_of(term: Term, n_terms: int) -> TileSums:
-    """The loop that repays its overhead for a job of `n_terms` evaluations of the term."""
+    """The loop to use for `n_terms` evaluations of the term: compiled if that repays its overhead, else plain."""
     if use_compiled(n_terms * term.cost):
         return term.load_compiled()
 

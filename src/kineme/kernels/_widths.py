@@ -1,4 +1,4 @@
-"""Median heuristics: widths that put a typical pair of training rows on the slope of the kernel."""
+"""Median heuristics for kernel widths: a typical pair of training rows then lies on the slope of the kernel."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _MAX_DIFFERENCES = 2**21
 def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> float:
     """Median over pairs of different rows of finish(sum of `term` over coordinates), in place.
 
-    Large X are represented by 1000 evenly spaced rows, so the answer is deterministic. Pairs of equal
-    rows do not count: copies of a row say nothing about the spread of the others.
+    Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
+    left out: copies of a row say nothing about the distances between different rows.
     """
     rows = _evenly_spaced(X, _MAX_ROWS)
     sums = np.empty((len(rows), len(rows)))
@@ -29,7 +29,7 @@ def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> flo
 def median_difference(X: Rows) -> float:
     """Median over pairs of rows and coordinates of the differences |x_i - y_i| that are not zero.
 
-    As many evenly spaced rows represent X as give about two million differences.
+    Of large X, as many evenly spaced rows are used as give about two million differences.
     """
     rows = _evenly_spaced(X, max(10, min(_MAX_ROWS, int((2 * _MAX_DIFFERENCES / X.shape[1]) ** 0.5))))
     first, second = np.triu_indices(len(rows), 1)

@@ -21,12 +21,12 @@ _MOST_DIMS = 10_000
 
 @dataclass(frozen=True)
 class Averaged(Kernel):
-    """Per-dimension similarities joined by an A-average; made by `averaged`.
+    """An A-average of per-dimension similarities; made by `averaged`.
 
     Parameters
     ----------
     kernel : Kernel or tuple of n_dims kernels
-        One for all dimensions, or one for each. Widths that are None are chosen per dimension.
+        One for all dimensions, or one for each. A width of None is chosen per dimension.
     n_dims : int
         The columns are that many equal blocks, Eq. (9): x_1..x_S, y_1..y_S.
     mean : str
@@ -124,8 +124,8 @@ def averaged(kernel: Kernel | tuple[Kernel, ...], n_dims: int, mean: str = "arit
     Raises
     ------
     SpecificationError
-        An unknown mean, n_dims below 1, something that is no kernel; at the call, columns that
-        n_dims does not divide.
+        An unknown mean, n_dims below 1, something that is not a kernel; when called, a number of columns
+        that n_dims does not divide.
 
     Examples
     --------

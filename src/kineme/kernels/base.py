@@ -1,4 +1,4 @@
-"""What every kernel is: a frozen specification that turns rows into a Gram matrix."""
+"""Base class of the kernels: a frozen specification that maps rows to a Gram matrix."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from kineme.kernels._sums import Term, TileSums, fill_gram
 from kineme.kernels.base import Kernel
 from kineme.runtime.compiled import compiled_module
 
-# One call of a Python function costs about as much as this many operations of NumPy.
+# One call of a Python function costs about as much as this many elementary operations of NumPy.
 _PYTHON_CALL = 100
 
 
@@ -67,7 +67,7 @@ class DistanceKernel(Kernel):
                 )
             tile[...] = similarities
 
-        # A d of the caller's may be asymmetric, so nothing is mirrored.
+        # The caller's d may be asymmetric, so no triangle of the Gram matrix is mirrored.
         term = Term(self._in_python, self._compiled, cost=_PYTHON_CALL, symmetric=False)
         fill_gram(term, 0.0, similarity, A, B, gram)
 

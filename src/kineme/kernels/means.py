@@ -1,4 +1,4 @@
-"""A-averages: joining per-dimension similarities (d, ...) into one, with what is proved of each."""
+"""A-averages of per-dimension similarities (d, ...), with what is proved about each."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ def _harmonic(similarities: Rows) -> Rows:
         return np.reciprocal(mean, out=mean)
 
 
+#: Name of a mean -> how it averages similarities, and what is proved of it.
 MEANS: dict[str, Mean] = {
     "arithmetic": Mean(
         lambda k: k.mean(axis=0),

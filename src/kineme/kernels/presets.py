@@ -9,13 +9,13 @@ from kineme.kernels.truncated import TruncatedEuclidean
 
 
 class PaperKernels(NamedTuple):
-    """The two kernels the paper applies to one representation."""
+    """The two kernels that the paper applies to one feature of one formulation."""
 
     rbf: RBF
     truncated: TruncatedEuclidean
 
 
-# Keys are (feature, formulation) as `DMPFeatures` and `DMP` name them.
+#: (feature, formulation), as `DMPFeatures` and `DMP` name them -> the kernels of the paper, Table 3.
 PAPER_WIDTHS: dict[tuple[str, str], PaperKernels] = {
     ("weights", "original"): PaperKernels(RBF(500), TruncatedEuclidean(750, 1)),
     ("weights", "bio-inspired"): PaperKernels(RBF(3.5e7), TruncatedEuclidean(1e7, 1)),

@@ -1,4 +1,4 @@
-"""Distances after the best rotation within an angle."""
+"""Procrustes distances: after the best rotation by at most a given angle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.validation import Array, check_number
 
 
 class Prepared(NamedTuple):
-    """Rows ready for comparison: complex in the plane, as they are elsewhere; and their squared norms."""
+    """Rows prepared for comparison, complex in two dimensions and real otherwise, with their squared norms."""
 
     rows: NDArray[Any]
     squares: Array
@@ -88,7 +88,7 @@ class Procrustes:
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
-        Where several are equally good, as about the axis of a straight movement, the smallest.
+        Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
@@ -102,7 +102,7 @@ class Procrustes:
         return best_rotations(C, self.max_angle)
 
 
-_MANY = 16  # rows from which on the complex product pays
+_MANY = 16  # rows from which on the complex product is faster
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
@@ -123,9 +123,9 @@ def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
 
 
 def _few_products(few: NDArray[Any], many: NDArray[Any]) -> NDArray[Any]:
-    """``few @ many.T``, which would copy all of `many` first, by reading it once.
+    """``few @ many.T``, reading `many` once; NumPy would copy all of it first.
 
-    In one thread: two that wait for each other take twenty times as long where something else runs on the machine.
+    In one thread: with two, each waits for the other, which on a busy machine takes twenty times as long.
     """
     if use_compiled(few.shape[0] * many.size):
         products = np.empty((len(few), len(many)), few.dtype)
@@ -139,13 +139,13 @@ def _within(product: NDArray[np.complex128], max_angle: float) -> Array:
     size = np.abs(product)
     if max_angle >= math.pi:
         return size
-    # Re(product exp(-i angle)) is largest at the angle of the product, or at the end of the range next to it.
+    # Re(product exp(-i angle)) is largest at the angle of the product, or at the end of the range closest to it.
     c, s = math.cos(max_angle), math.sin(max_angle)
     at_end = c * product.real + s * np.abs(product.imag)
     return np.where(product.real >= c * size, size, at_end)
 
 
-_PAIRS = 20_000  # covariances at a time: what is computed of them stays in a core's cache
+_PAIRS = 20_000  # covariances at a time: their intermediate results fit the cache of one core
 _PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
 
 
@@ -172,7 +172,7 @@ def _aligned_in_space(A: NDArray[Any], B: NDArray[Any], max_angle: float) -> Arr
 
 
 def _filler(n_operations: int) -> Callable[[NDArray[Any], float, Array], None]:
-    """What writes the best products (n, m) of a block of products (3 n, 3 m)."""
+    """The function that writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
     if use_compiled(n_operations):
         fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
         return lambda products, max_angle, best: fill_best_products(products, *half_angle(max_angle), best)

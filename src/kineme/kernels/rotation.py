@@ -1,4 +1,4 @@
-"""The best rotation in space within an angle: of all, not the best free one turned back.
+"""The best rotation in space by at most a given angle: the true optimum, not the best free rotation turned back.
 
 A rotation by an angle ``phi`` about a unit axis u is the unit quaternion ``(w, v) = (cos(phi/2), sin(phi/2) u)``, and
 for a covariance C the inner product ``tr(R^T C)`` is
@@ -31,11 +31,11 @@ from kineme.validation import Array
 
 LEAST_STEP = 1e-14  # of the covariance's largest entry: l - m_1 at least, so that divisions are safe
 STEPS = 60  # at most; two to six in practice
-CLOSE = 1e-10  # relative step after which quadratic convergence has reached the rounding
-_LEAST_SINE = 1e-50  # below it, a limit is none to double precision
-_TIE = 1e-9  # of the largest entry: rotations that are as good but for this are equal, and the smallest is taken
-_STRAIGHT = 1e-4  # second singular value, of the first: a movement that keeps to a line but for 0.3 % of its length
-_STRAIGHT_TIE = 1e-3  # outweighs what such a movement gains by turning about itself, and bends its turn by 0.03 degrees
+CLOSE = 1e-10  # relative step after which quadratic convergence has reached rounding errors
+_LEAST_SINE = 1e-50  # below it, a limit of the angle is zero in double precision
+_TIE = 1e-9  # of the largest entry: rotations closer than this count as equally good, and the smallest is taken
+_STRAIGHT = 1e-4  # second singular value as a share of the first: a movement within 0.3 % of its length of a line
+_STRAIGHT_TIE = 1e-3  # more than such a movement gains by rotating about its axis; changes its angle by 0.03 degrees
 
 
 class _Form(NamedTuple):
@@ -66,8 +66,8 @@ def best_products(C: Array, max_angle: float) -> Array:
 def best_rotations(C: Array, max_angle: float) -> Array:
     """Rotations R (n, 3, 3) by at most `max_angle` that make ``tr(R^T C)`` largest; of equal ones the smallest.
 
-    How far a straight movement is turned about itself, only its noise says: it is not turned. What that costs of
-    ``tr(R^T C)`` is below 4e-4 of it, and nothing in all other movements.
+    The rotation of a straight movement about its own axis is determined by noise alone, so it is left out. That lowers
+    ``tr(R^T C)`` by less than 4e-4 of it, and not at all for other movements.
     """
     form = _form(C)
     c, s = half_angle(max_angle)
@@ -76,7 +76,7 @@ def best_rotations(C: Array, max_angle: float) -> Array:
     v = form.z / (step + form.gaps)
     within = np.vstack((np.ones(len(C)), v)) / np.sqrt(1.0 + (v * v).sum(axis=0))
     axis = (c / s) * v
-    # In the hard case nothing but the length of the axis says how much of it lies along the first eigenvector.
+    # In the hard case the component along the first eigenvector follows from the length of the axis alone.
     left = np.sqrt(np.maximum(1.0 - axis[1] ** 2 - axis[2] ** 2, 0.0))
     axis[0] = np.where(np.abs(axis[0]) < left, np.copysign(left, axis[0]), axis[0])
     axis *= s / np.sqrt((axis * axis).sum(axis=0))

@@ -1,1 +1,1 @@
-"""Movements: what they are, how they are prepared, cut and inspected."""
+"""Movements: trajectories, their preparation, and the segmentation of long recordings."""

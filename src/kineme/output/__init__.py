@@ -1,1 +1,1 @@
-"""How results are shown: text, tables, figures, pages; one look for all."""
+"""How results are shown and written: text, tables, figures, HTML pages, whole files."""

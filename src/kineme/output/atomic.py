@@ -7,44 +7,90 @@ import re
 import secrets
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_IDLE = 3600.0  # seconds since the last write, after which a file whose writer is gone from this machine is nobody's
+_IDLE = 3600.0  # seconds since the last write after which the file of a process that no longer runs is a leftover
 
 
 def write_atomically(path: Path, data: bytes) -> Path:
-    """Write `data` beside `path`, bring it to the disk, and rename it into place.
+    """Write `data` to a hidden file beside `path`, flush it to the disk, and rename it to `path`.
 
     Raises
     ------
     OSError
-        The folder is missing, read-only or full; what was at `path` is as it was.
+        The folder is missing, read-only or full; an existing file at `path` is unchanged.
     """
     if not path.name or path.is_dir():  # an empty text is the current folder
         raise IsADirectoryError(f"expected the name of a file to write, got the folder {str(path)!r}; add a name")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, there is none; create it")
-    with replaced(path) as beside:
+    with whole_file(path) as beside:
         beside.write_bytes(data)
     return path
 
 
 @contextmanager
-def replaced(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write to; if all goes well, that file is brought to the disk and takes its place.
+def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = ()) -> Iterator[Path]:
+    """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
-    What killed processes left of earlier tries is removed.
+    Leftovers of killed processes are removed.
+
+    Parameters
+    ----------
+    path : Path
+    replace : bool, default True
+        Whether the new file takes the place of one that is there.
+    companions : sequence of str
+        Ends of the names of other files that may be made beside the new one, as "-wal" by SQLite; they are deleted.
+
+    Raises
+    ------
+    FileExistsError
+        `replace` is False and there is a file of that name, or another process was faster; it stays as it is.
+    OSError
+        The folder is missing, read-only or full; what was at `path` is as it was.
     """
+    if not replace and path.exists():
+        raise FileExistsError(path)
     remove_leftovers(path)
     beside = name_beside(path)
     try:
         yield beside
         bring_to_disk(beside)
-        beside.replace(path)
+        if replace:
+            beside.replace(path)
+        else:
+            _name_new(beside, path)
+            _bring_folder_to_disk(path.parent)
     finally:
-        beside.unlink(missing_ok=True)
+        for end in ("", *companions):
+            beside.with_name(beside.name + end).unlink(missing_ok=True)
+
+
+def _name_new(beside: Path, path: Path) -> None:
+    """Give a file its name, which no other file may have."""
+    try:
+        os.link(beside, path)  # unlike a rename, it refuses to replace
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links
+        if path.exists():
+            raise FileExistsError(path) from None
+        beside.rename(path)
+
+
+def _bring_folder_to_disk(folder: Path) -> None:
+    """Bring a new name to the disk, where folders can be opened."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def bring_to_disk(path: Path) -> None:
@@ -54,15 +100,15 @@ def bring_to_disk(path: Path) -> None:
 
 
 def name_beside(path: Path) -> Path:
-    """A hidden name beside `path` that no other writer has, and from which `remove_leftovers` tells the process."""
+    """A unique hidden name beside `path`; it contains the process id, which `remove_leftovers` reads."""
     return path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove files of `name_beside` that killed processes left beside `path`, companions of databases included.
+    """Remove files of `name_beside` that killed processes left beside `path`, with SQLite's files beside them.
 
-    A file goes if it is this user's, its process is gone, and nobody wrote to it for an hour: in a folder that several
-    machines share, the process may be at work on another one. What cannot be removed stays.
+    A file is removed if it belongs to this user, its process does not run, and nobody wrote to it for an hour: in a
+    folder that several machines share, the process may run on another one. Files that cannot be removed stay.
     """
     pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
     with suppress(OSError):
@@ -80,13 +126,13 @@ def _remove_if_idle(path: Path) -> None:
 
 
 def _is_at_work(process: int) -> bool:
-    """Whether a process of that number runs on this machine; where nobody can tell, yes."""
-    if os.name != "posix":  # elsewhere the signal 0 is one that ends processes
+    """Whether a process of that id runs on this machine; True where that cannot be found out."""
+    if os.name != "posix":  # on Windows, signal 0 would end the process
         return True
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # another user's, or no number of a process
+    except (OSError, OverflowError):  # another user's process, or a number too large for a process id
         return True
     return True

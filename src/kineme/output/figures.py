@@ -1,4 +1,4 @@
-"""One look for all figures: colors that color-blind readers tell apart, sizes of a printed column."""
+"""The style of all figures: colors that color-blind readers can tell apart, sizes of a printed column."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ FORMATS: dict[str, dict[str, Any]] = {
 def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
     """The figure as the bytes of a file of that kind, see `FORMATS`.
 
-    Names that came from files are written out like those on a terminal, if `drawable` has not done it: SVG keeps them
-    in comments, where XML allows no control characters.
+    Control characters in names from files are escaped here if `drawable` has not done it: SVG repeats the names in
+    comments, where XML allows no control characters.
     """
     from matplotlib.text import Text
 
@@ -64,7 +64,7 @@ def encode_figure(figure: Figure, kind: str, dpi: int = 150) -> bytes:
         if (shown := printable_lines(text.get_text())) != text.get_text():
             text.set_text(shown)
     buffer = io.BytesIO()
-    with warnings.catch_warnings():  # a box stands for a letter that the font lacks
+    with warnings.catch_warnings():  # a character that the font lacks is drawn as a box
         warnings.filterwarnings("ignore", r"Glyph \d+", UserWarning)
         figure.savefig(buffer, format=kind, dpi=dpi, **FORMATS[kind])
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""One look for all reports: a page that needs no other file."""
+"""The style of all HTML reports: one page that needs no other file."""
 
 from __future__ import annotations
 

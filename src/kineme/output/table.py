@@ -11,7 +11,7 @@ from kineme.output.text import LONGEST_CELL, in_markup, printable, printable_lin
 
 
 class Table(NamedTuple):
-    """A title, column heads, rows of text with the row's name first, and what to read in it."""
+    """A title, column heads, rows of text with the row's name first, and the text below the table."""
 
     title: str
     columns: tuple[str, ...]
@@ -36,7 +36,7 @@ def to_text(table: Table, width: int = 160) -> str:
 
 
 def _cell(text: str) -> str:
-    """All rows are as wide as the widest: one long name must not push every other column off the screen."""
+    """A cell, shortened: a column is as wide as its widest cell, and one long name would hide the other columns."""
     return shortened(printable(text), LONGEST_CELL)
 
 

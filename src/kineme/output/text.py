@@ -1,8 +1,7 @@
-r"""Names from files and libraries, made fit to be shown: on a terminal, in a drawing, in HTML.
+r"""Escape names from files and libraries before they are shown on a terminal, in a figure or in HTML.
 
-A terminal obeys control characters, a reader is misled by characters that turn the direction of writing or cannot be
-seen, and XML allows no control characters at all. All are written out, as ``\x1b`` or ``\u202e``. A file may also hold
-a name of a million characters: of those that are longer than anybody reads, beginning and end are shown.
+Control characters steer a terminal, bidirectional and invisible characters mislead readers, and XML allows no control
+characters at all. All of them are escaped, as ``\x1b`` or ``\u202e``. Very long names are shortened in the middle.
 """
 
 from __future__ import annotations
@@ -10,40 +9,40 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-#: Letters and marks of no ink and no width, or as wide as a blank, which Unicode does not count as such.
-_UNSEEN = frozenset("\u034f\u115f\u1160\u17b4\u17b5\u2800\u3164\uffa0")
+#: Characters that are invisible or look like a blank, although `str.isprintable` is true of them.
+_INVISIBLE = frozenset("\u034f\u115f\u1160\u17b4\u17b5\u2800\u3164\uffa0")
 
 
-#: Characters of a name, and of one in a column of a table, that are shown.
+#: Longest text that is shown whole: anywhere, and in a column of a table.
 _LONGEST, LONGEST_CELL = 4000, 120
 
 
 def printable(name: Any) -> str:
-    """A name on one line, with everything that does not show itself written out; a blank stays a blank."""
-    return _shown(shortened(str(name), _LONGEST))
+    """A name on one line, with control and invisible characters escaped; blanks stay."""
+    return _escape(shortened(str(name), _LONGEST))
 
 
 def shortened(text: str, longest: int) -> str:
-    """Two thirds of it from the beginning and one third from the end, where it is longer than `longest`."""
+    """The text; of one longer than `longest`, two thirds from the beginning and one third from the end."""
     if len(text) <= longest:
         return text
     end = longest // 3
     return f"{text[: longest - end - 1]}…{text[-end:]}"
 
 
-def _shown(text: str) -> str:
-    if text.isprintable() and _UNSEEN.isdisjoint(text):
+def _escape(text: str) -> str:
+    if text.isprintable() and _INVISIBLE.isdisjoint(text):
         return text
-    return "".join(mark if mark.isprintable() and mark not in _UNSEEN else _written_out(mark) for mark in text)
+    return "".join(mark if mark.isprintable() and mark not in _INVISIBLE else _escape_character(mark) for mark in text)
 
 
 def printable_lines(text: Any) -> str:
     """As `printable`, for text of several lines."""
-    return "\n".join(map(_shown, str(text).split("\n")))
+    return "\n".join(map(_escape, str(text).split("\n")))
 
 
 def drawable(name: Any) -> str:
-    """As `printable`, for Matplotlib, which takes what stands between dollars for a formula."""
+    """As `printable`, for Matplotlib: dollar signs are escaped, since they would start a formula."""
     return printable(name).replace("$", r"\$")
 
 
@@ -57,5 +56,5 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
-def _written_out(mark: str) -> str:
+def _escape_character(mark: str) -> str:
     return mark.encode("unicode_escape").decode("ascii")

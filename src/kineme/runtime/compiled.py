@@ -33,32 +33,32 @@ CHOICES = ("auto", "always", "never")
 _REPAYS_IMPORT = 100_000_000
 _REPAYS_CALL = 10_000
 
-# Should other threads get in the way of Numba's import: how often it is tried, and how long they are waited for [s].
+# Another thread may disturb the import of Numba: number of tries, and how long to wait for that thread [s].
 _ATTEMPTS, _PATIENCE = 4, 10.0
 
 _spent = 0  # elementary operations of jobs that ran plain so far
 _loading = RLock()
-_modules: dict[str, Any] = {}  # Numba and the modules with compiled functions, each once it is there as a whole
-_failure = ""  # why Numba cannot be imported
+_modules: dict[str, Any] = {}  # Numba and the modules with compiled functions that are completely imported
+_failure = ""  # why Numba cannot be imported; "" if it can, or has not been tried
 
 
 def use_compiled(n_operations: int, now: int | None = None) -> bool:
     """Whether a job of about `n_operations` elementary operations should run compiled; if so, Numba has been loaded.
 
-    Numba is imported for a job that repays it, and also once as much time went into small jobs: whoever comes again
-    and again waits at most twice as long as if that had been known. `now` is the part of the job that this call does.
-    Where Numba cannot be imported, a warning says so once, and everything runs plain.
+    Numba is imported for a job that is large enough to repay the import, and also once small jobs together have cost as
+    much: many small calls then take at most twice the time that compiling at once would have taken. `now` is the part
+    of the job that this call does. Where Numba cannot be imported, a warning says so once, and everything runs plain.
 
     Raises
     ------
     SpecificationError
         ``KINEME_COMPILED`` is none of `CHOICES`, or it is "always" and Numba cannot be imported.
     """
-    global _spent  # noqa: PLW0603 - the history of the process is what decides
+    global _spent  # noqa: PLW0603 - counted over the whole process
     choice = _choice()
     if choice != "auto":
         return choice == "always" and _load(required=True)
-    if "numba" in sys.modules:  # also while another thread imports it: the rest of that is worth waiting for
+    if "numba" in sys.modules:  # also while another thread is importing it
         return n_operations >= _REPAYS_CALL and _load()
     _spent += n_operations if now is None else now
     return max(n_operations, _spent) >= _REPAYS_IMPORT and _load()
@@ -106,7 +106,7 @@ def _choice() -> str:
 
 
 def _load(required: bool = False) -> bool:
-    """Import Numba, unless that has been done or has failed; whether it is there."""
+    """Import Numba, unless that was done or failed before; return whether it is imported."""
     if "numba" not in _modules and not _failure:
         with _loading:
             if "numba" not in _modules and not _failure:
@@ -123,9 +123,9 @@ def _import_numba(required: bool) -> None:
     global _failure  # noqa: PLW0603 - an import that failed is not tried again at every call
     for attempt in range(_ATTEMPTS):
         try:
-            _modules["numba"] = _whole_numba()
+            _modules["numba"] = _import_completely()
             return
-        except Exception as error:  # whatever an installation may raise
+        except Exception as error:  # a broken installation can raise anything
             failure = f"{type(error).__name__}: {error}"
         _let_others_finish(attempt)
         _remove_parts()
@@ -139,8 +139,8 @@ def _import_numba(required: bool) -> None:
         )
 
 
-def _whole_numba() -> Any:
-    """Numba, imported from beginning to end."""
+def _import_completely() -> Any:
+    """Import Numba completely, or raise."""
     try:
         numba = import_module("numba")
     except BaseException as error:
@@ -153,17 +153,17 @@ def _whole_numba() -> Any:
 
 
 def _remove_parts() -> None:
-    """Remove what an import that failed or was interrupted leaves behind, so that the next one starts afresh.
+    """Remove the modules that a failed or interrupted import leaves behind, so that the next import loads all again.
 
-    It would take the modules that are there for whole ones, and build a Numba without some of its parts.
+    Otherwise that import would reuse half-imported modules, and Numba would lack some of its parts.
     """
     for name in _parts_of_numba():
         sys.modules.pop(name, None)
 
 
 def _let_others_finish(attempt: int) -> None:
-    """Wait while another thread, which got in the way, imports a part of Numba: it marks what it has begun."""
-    time.sleep(0.05 * attempt)  # it may only be about to begin
+    """Wait until no other thread imports a part of Numba; modules whose import is under way are marked."""
+    time.sleep(0.05 * attempt)  # the other thread may be just before its import
     late = time.monotonic() + _PATIENCE
     while time.monotonic() < late:
         parts = (sys.modules.get(name) for name in _parts_of_numba())
@@ -178,12 +178,12 @@ def _parts_of_numba() -> list[str]:
 
 
 @contextmanager
-def _nobody_compiles() -> Iterator[None]:
-    """Before a fork: the child could not end what another thread had begun."""
+def _compiler_held() -> Iterator[None]:
+    """Hold off other threads' compilations over a fork: the child could not finish them."""
     with _loading:
         compiler = sys.modules.get("numba.core.compiler_lock")
         with getattr(compiler, "global_compiler_lock", nullcontext()):
             yield
 
 
-at_fork(_nobody_compiles)
+at_fork(_compiler_held)

@@ -1,10 +1,10 @@
-"""The one place that prepares this process for forks.
+"""Fork handlers: the one place that prepares this process for forks.
 
-A fork copies the memory of a process and one of its threads. What another thread was in the middle of stays so for
-ever in the copy: a lock that it held, Numba's compiler half way, a connection to a database within a transaction.
-Whoever keeps such things between calls says here how to bring them to rest before a fork, and what to make anew in the
-child. Forks that Python does not start itself, as those of some servers written in C, cannot be prepared; for them only
-the second is done.
+A fork copies the memory of a process but only one of its threads. What another thread was doing is never finished in
+the child: a lock stays locked, Numba's compiler stays half way, a database connection stays within a transaction.
+Modules that keep such state between calls register here how to bring it into a consistent state before a fork, and what
+to create again in the child. Forks that Python does not start itself, as in some servers written in C, cannot be
+prepared; for them only the second part is done.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ def at_fork(
     Parameters
     ----------
     hold : callable
-        Gives a context manager, entered before a fork and left after it, in the parent and in the child: a lock, say.
+        Returns a context manager that is entered before a fork and left after it, in the parent and in the child: for
+        example a lock.
     renew : callable
-        Called in the child before it is left there: makes anew what another thread may have held for a moment.
+        Called in the child before the context manager is left: creates again what another thread may have held.
     first : bool
-        Enter it before the others: for what waits for work that may need their locks.
+        Enter it before the others. Needed where `hold` waits for work that may need the other locks.
     """
     _guards.insert(0 if first else len(_guards), (hold, renew))
 
@@ -61,7 +62,7 @@ def _in_child() -> None:
     for _, renew in _guards:
         renew()
     held.close()
-    if sys.version_info < (3, 12):  # there, all instances compute a cached property under one lock
+    if sys.version_info < (3, 12):  # before 3.12, all instances share one lock per cached property
         _renew_cached_properties()
 
 

@@ -10,10 +10,10 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
 def keep(dispatcher: Callable[..., Any]) -> None:
-    """Cache a function's machine code on disk, where there is a writable place for it."""
-    function = getattr(dispatcher, "py_func", None)  # none where NUMBA_DISABLE_JIT leaves functions as they are
+    """Cache a function's machine code on disk, if there is a writable folder for it."""
+    function = getattr(dispatcher, "py_func", None)  # missing with NUMBA_DISABLE_JIT, which returns plain functions
     if function is not None:
-        with suppress(RuntimeError):  # no place for the cache, as in a read-only installation
+        with suppress(RuntimeError):  # no writable folder, as in a read-only installation
             dispatcher._cache = _Cache(function)  # type: ignore[attr-defined]
 
 
@@ -29,12 +29,13 @@ class _Cache(FunctionCache):
 
 
 class _Files(IndexDataCacheFile):
-    """Numba's files, each with what it holds written into it.
+    """Numba's cache files, each with its own key inside.
 
-    Numba numbers the files of a function and names them in an index. Two processes that compile it at the same time for
-    different arguments take the same number: the index names one of them, the file holds the other, and every later
-    process fails on it. A file that does not say that it is the right one, or cannot be read, counts as none: it
-    is compiled and written again. What cannot be written, as on a full disk, is not kept.
+    Numba numbers the files of a function and lists them in an index. Two processes that compile a function at the same
+    time for different arguments take the same number: the index then names one version and the file holds the other,
+    and every later process fails. Here a file whose key does not match, or that cannot be read, counts as missing: the
+    function is compiled and the file is written again. If a file cannot be written, as on a full disk, nothing is
+    cached.
     """
 
     def save(self, key: Any, data: Any) -> None:
@@ -44,7 +45,7 @@ class _Files(IndexDataCacheFile):
     def load(self, key: Any) -> Any:
         try:
             *said, data = super().load(key)
-        except Exception:  # nothing there, or damaged bytes, on which unpickling may raise anything
+        except Exception:  # a missing file, or damaged bytes, on which unpickling may raise anything
             return None
         return data if said == [key, self._source_stamp] else None
 

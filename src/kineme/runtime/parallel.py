@@ -47,8 +47,8 @@ def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -
     """
     tiles = [(start, min(start + tile_rows, n_rows)) for start in range(0, n_rows, tile_rows)]
     threads = min(n_threads(), len(tiles))
-    # One tile too: split between threads that wait for each other, its small products take longer, and a fork
-    # meanwhile, which ends the threads of OpenBLAS, would wait for them for ever.
+    # Also for a single tile: its small products are slower when BLAS splits them, and a fork in the meantime, which
+    # ends the threads of OpenBLAS, would wait for them for ever.
     with single_threaded_blas():
         if threads <= 1:
             for start, stop in tiles:
@@ -79,7 +79,7 @@ def single_threaded_blas() -> Iterator[None]:
 
 
 def _limit() -> Any:
-    """Set BLAS to one thread; what restores it."""
+    """Set BLAS to one thread; return the limiter that restores the former number."""
     controller = _blas_controller()
     with _control(controller):
         return controller.limit(limits=1, user_api="blas")
@@ -92,7 +92,7 @@ def _restore(limiter: Any) -> None:
 
 @contextmanager
 def _control(controller: Any) -> Iterator[None]:
-    """Let the calling thread set limits: from release 3.7 of threadpoolctl on, all but the first do nothing."""
+    """Let the calling thread set limits; from threadpoolctl 3.7 on, only the first thread that tries may."""
     libraries = [one for one in controller.lib_controllers if hasattr(one, "clear_controlling_thread")]
     for library in libraries:
         library.clear_controlling_thread(force=True)
@@ -109,21 +109,22 @@ def _blas_controller() -> Any:
 
 @cache
 def _controller(scipy_is_loaded: bool) -> Any:
-    """Of the BLAS libraries that are loaded; SciPy brings one of its own, which comes later than NumPy's."""
+    """Controller of the loaded BLAS libraries; SciPy brings its own, which is loaded later than NumPy's."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Over a fork, hold BLAS to one thread if another thread may be within it.
+def _held_over_fork() -> Iterator[None]:
+    """Over a fork, hold BLAS to one thread if another thread may be calling it.
 
-    OpenBLAS takes locks for work in several threads, and to change their number; those of a thread that is not there
-    in the child are never given back. With one thread it takes none, so the child stays with one. The limit is set
-    here and now, whoever holds one already: other libraries restore theirs without asking.
+    OpenBLAS takes locks to work in several threads and to change their number; a lock held by a thread that does not
+    exist in the child is never released. With one thread OpenBLAS takes no locks, so the child stays with one. The
+    limit is set here even if another caller holds one already, since other libraries may have restored theirs
+    meanwhile.
     """
-    global _limited  # noqa: PLW0603 - told to the child
+    global _limited  # noqa: PLW0603 - read in the child
     parent = os.getpid()
     with _blas_lock:
         _limited = active_count() > 1
@@ -134,11 +135,11 @@ def _quiet() -> Iterator[None]:
 
 
 def _in_child() -> None:
-    """One more hold, which is never left: no call changes the number of threads in the child."""
-    global _blas_lock  # noqa: PLW0603 - of another thread, perhaps
+    """Add a hold that is never released, so that no call changes the number of threads in the child."""
+    global _blas_lock  # noqa: PLW0603 - another thread may have held it
     _blas_lock = Lock()
     if _limited or _blas_holds:
         _blas_holds.append(None)
 
 
-at_fork(_quiet, _in_child)
+at_fork(_held_over_fork, _in_child)

@@ -24,7 +24,7 @@ _LEFT_OVER = 24  # of those left over, drawn at most
 def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None = None) -> Figure:
     """One small drawing for each proposal, with its number, size and stability; last, what is left over.
 
-    The number is the index into `proposals`; members, medoid and start are drawn as by `draw_proposal`.
+    Number k is ``proposals[k - 1]``; members, medoid and start are drawn as by `draw_proposal`.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None
     for k, proposal in enumerate(proposals.proposals):
         check_members(proposal, len(demos))
         overlay(cells[k], *shown_paths(demos, proposal, like), like, thin=0.6)
-        cells[k].set_title(f"{k}:  {len(proposal)} ×, stable {proposal.stability:.2f}", fontsize=7, pad=2)
+        cells[k].set_title(f"{k + 1}:  {len(proposal)} ×, stable {proposal.stability:.2f}", fontsize=7, pad=2)
     if len(alone):
         _side_by_side(cells[n - 1], paths_of(demos[alone[:_LEFT_OVER]], like))
         cells[n - 1].set_title(f"left over: {len(alone)}", fontsize=7, color=GRAY, pad=2)
     for empty in cells[n:]:
         empty.set_axis_off()
-    head = f"{len(proposals)} kinds of {len(demos)} movements"
+    head = f"{len(proposals)} clusters among {len(demos)} movements"
     key = "number: size, stability; bold: most typical; dot: start"
     figure.suptitle(f"{head} ({key})" if columns > 4 else f"{head}\n{key}", fontsize=8 if columns > 4 else 7)
     return figure

@@ -6,13 +6,14 @@ import hashlib
 import io
 import zlib
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.sampling import evenly_spaced
+from kineme.library.recognition.members import Members
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
@@ -21,9 +22,6 @@ from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.recognition.two_stage_search import Stored
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.library.recognition.recognize import Members
 
 FILE = "calibration.cache"
 
@@ -35,7 +33,7 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 def sample_recognizer(store: Store, members: Members) -> Recognizer:
     """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
     chosen = evenly_spaced(len(members.ids), _SAMPLE)
-    demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
+    demos = read.movements(store, members.ids[chosen])
     recognizer = store.specification.recognizer().set_params(classifier="nearest")
     return recognizer.fit(demos, members.labels[chosen])
 

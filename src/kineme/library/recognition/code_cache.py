@@ -23,7 +23,7 @@ from kineme.comparison.bounds import N_CODES, Code, encode, fit_bases
 from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
-from kineme.output.atomic import replaced
+from kineme.output.atomic import whole_file
 from kineme.validation import Array
 
 FILE = "codes.cache"
@@ -142,7 +142,7 @@ def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
 
 
 def _write(store: Store, path: Path, ids: Ids) -> None:
-    with replaced(path) as beside:
+    with whole_file(path) as beside:
         size = _HEADER + _layout(store, len(ids))[1]
         with beside.open("wb") as file:
             os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)

@@ -8,45 +8,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
+from kineme.library.recognition.members import Members, members_of
 from kineme.library.storage import read
-from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
+from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.labels import label_array
 from kineme.recognition.answer import Answer, Neighbor, answers, is_one
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.two_stage_search import Shortlist, Stored
 
-Ids = NDArray[np.int64]
-
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
-#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred kinds take 6 s and, with support vectors, 105 ms.
+#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred classes take 6 s and, with support vectors, 105 ms.
 EXHAUSTIVE = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class Members:
-    """Movements that show a symbol, ordered by the symbol's name, then by id."""
-
-    ids: Ids  # (m,)
-    names: NDArray[Any]  # (C,), sorted
-    first: NDArray[np.intp]  # (C,)
-
-    @property
-    def labels(self) -> NDArray[Any]:
-        """The name of each one's symbol, (m,)."""
-        return np.repeat(self.names, np.diff(self.first, append=len(self.ids)))
-
-
 @dataclass(eq=False)
-class Serving:
-    """Answers of a library to movements, by the state of its last change.
-
-    What an answer needs beyond the database is made when first asked for, and again after a change.
-    """
+class LibraryRecognizer:
+    """What recognizes the movements that a library holds: made when first asked for, and again after a change."""
 
     store: Store
     exhaustive: int = EXHAUSTIVE
@@ -55,7 +35,7 @@ class Serving:
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _model: Recognizer | Shortlist | None = None
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
         demos = Demonstrations.of([X] if is_one(X) else X)
@@ -77,7 +57,7 @@ class Serving:
 
     def _small(self, members: Members) -> Recognizer:
         self._ids = members.ids  # `fit` orders by label, and keeps the order within
-        demos = read.movements(self.store, members.ids, [None] * len(members.ids))
+        demos = read.movements(self.store, members.ids)
         return self.store.specification.recognizer().fit(demos, members.labels)
 
     def _large(self, members: Members) -> Shortlist:
@@ -97,38 +77,6 @@ class Serving:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
-def members_of(store: Store) -> Members:
-    """Movements that show a symbol.
-
-    Raises
-    ------
-    SpecificationError
-        There is none.
-    """
-    with store.reading() as connection:
-        query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
-        try:
-            pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
-        except (TypeError, ValueError, OverflowError) as error:
-            raise damage(
-                "movements and symbols as whole numbers in table member", f"something else ({error})"
-            ) from error
-        if not len(pairs):
-            raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
-                "learn some with labels, or name a proposal"
-            )
-        keys, which = np.unique(pairs[:, 1], return_inverse=True)
-        query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
-        named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
-    if lost := set(keys.tolist()) - named.keys():
-        raise damaged("symbol", (min(lost),))
-    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
-    owner = place[which]
-    order = np.lexsort((pairs[:, 0], owner))
-    return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
-
-
 def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
     """The recognizer of a large library."""
     recognizer = sample_recognizer(store, members)
@@ -146,7 +94,7 @@ def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
         index.rows(members.ids),
         members.first,
         views,
-        lambda rows: read.movements(store, index.ids[rows], [None] * len(rows)),
+        lambda rows: read.movements(store, index.ids[rows]),
     )
     recognizer.calibration_ = calibrate(store, members, recognizer, stored)
     return Shortlist(recognizer, members.names, stored)

@@ -38,7 +38,7 @@ HOW = ("label", "anchored", "recognized")
 
 @dataclass(frozen=True, eq=False)
 class Symbol:
-    """A name for movements of one kind.
+    """A name for movements of one class.
 
     Attributes
     ----------

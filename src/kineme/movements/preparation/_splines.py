@@ -1,9 +1,9 @@
-"""Compiled cubic splines of ragged movements: many rows in step, each in a lane of its own.
+"""Compiled cubic splines of movements of unequal length: many rows at once, each in its own vector lane.
 
-Elimination along a banded matrix waits at every knot for the division before it. A row is one dimension of one
-movement; rows eliminated in step fill the waiting. A knot is a record with one number per lane and quantity: all
-distances in memory are known, so that the compiler turns the loops over lanes into vector instructions. Rows of unequal
-length are continued by gaps so long that nothing behind them matters.
+Elimination along a banded matrix waits at every knot for the previous division. A row is one dimension of one
+movement; several rows are eliminated together, so that the processor works on one while another waits. A knot is a
+record with one number per lane and quantity: all strides in memory are constants, so that the compiler vectorizes the
+loops over lanes. Shorter rows are continued by a gap so long that what follows has no influence.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from kineme.movements.trajectories._locate import locate
 from kineme.runtime.compiled import jit
 
-_LANES = 32  # fewer leave the processor waiting, more do not fit its cache
+_LANES = 32  # with fewer the processor waits, more do not fit its cache
 _FAR = 1e200  # gap behind the last sample
 _BEFORE, _BEHIND = 1, 3  # empty knots that the equations of the outer ones refer to
 
@@ -62,7 +62,7 @@ def _fill_rows(parameter, positions, offsets, scales, smooth, rows):  # type: ig
         for lane in range(min(_LANES, n * n_dims - first)):
             i, k = divmod(first + lane, n_dims)
             if lane == 0 or k == 0:
-                # Written to memory: stamps count seconds since 1970 here and there, and sums must not be reordered.
+                # Written to memory, so that sums are not reordered: stamps may be seconds since 1970.
                 u = parameter[offsets[i] : offsets[i + 1]] - parameter[offsets[i]]
                 locate(u, interval, local)
                 local *= scales[i]
@@ -71,7 +71,7 @@ def _fill_rows(parameter, positions, offsets, scales, smooth, rows):  # type: ig
 
 @jit
 def _empty_knots(offsets):  # type: ignore[no-untyped-def]
-    """Room for the longest movement; lanes that are never filled must divide by something too."""
+    """Knots for the longest movement; gaps are 1, since divisions run over unused lanes too."""
     longest = 0
     for i in range(len(offsets) - 1):
         longest = max(longest, offsets[i + 1] - offsets[i])
@@ -83,7 +83,7 @@ def _empty_knots(offsets):  # type: ignore[no-untyped-def]
 
 @jit
 def _load(parameter, positions, offsets, scales, first, knots):  # type: ignore[no-untyped-def]
-    """Rows from `first` on into the lanes, minus their start, gaps scaled; the length of the longest of them."""
+    """Copy rows from `first` on into the lanes, minus their start, with scaled gaps; return the longest length."""
     n_dims, longest = positions.shape[1], 0
     n_lanes = min(_LANES, (len(offsets) - 1) * n_dims - first)
     for lane in range(n_lanes):
@@ -147,7 +147,7 @@ def _interpolate(knots, length, offsets, first, n_dims):  # type: ignore[no-unty
 
     Continuity of the slope at the inner knots is ``h[j-1] m[j-1] + 2 (h[j-1] + h[j]) m[j] + h[j] m[j+1] =
     6 (slope[j] - slope[j-1])``. The not-a-knot conditions put the outer second derivatives into the first and last of
-    these rows; the last one is another in every lane, and done again where the elimination has passed it.
+    these rows; the last row has another index in every lane, so it is eliminated again after the common loop.
     """
     for lane in range(_LANES):
         knots[1].inverse[lane], knots[2].inverse[lane] = 1.0 / knots[1].gap[lane], 1.0 / knots[2].gap[lane]
@@ -166,7 +166,7 @@ def _interpolate(knots, length, offsets, first, n_dims):  # type: ignore[no-unty
             right = (knots[j + 4].x[lane] - knots[j + 3].x[lane]) * knots[j + 3].inverse[lane]
             knots[j + 3].m[lane] = (6.0 * (right - left) - before * knots[j + 2].m[lane]) * pivot
     for lane in range(_LANES):
-        knots[length + 2].m[lane] = 0.0  # the rows before these may have been longer and left a number here
+        knots[length + 2].m[lane] = 0.0  # longer rows of the previous block may have left a number here
         _close(knots, _last(offsets, first + lane, n_dims), lane)
     for j in range(length - 1, -1, -1):
         for lane in range(_LANES):
@@ -184,14 +184,14 @@ def _last(offsets, row, n_dims):  # type: ignore[no-untyped-def]
 
 @jit
 def _bend(before, knot, behind, lane):  # type: ignore[no-untyped-def]
-    """Right-hand side at one knot of one lane."""
+    """Right-hand side at one knot of one lane: six times the difference of the slopes."""
     left, right = (knot.x[lane] - before.x[lane]) / before.gap[lane], (behind.x[lane] - knot.x[lane]) / knot.gap[lane]
     return 6.0 * (right - left)
 
 
 @jit
 def _close(knots, last, lane):  # type: ignore[no-untyped-def]
-    """The last row of one lane, which contains the not-a-knot condition of its end."""
+    """Eliminate the last row of one lane, which contains the not-a-knot condition at its end."""
     before, h = knots[last - 1].gap[lane], knots[last].gap[lane]
     q = h * h * knots[last - 1].inverse[lane]
     below = before - q
@@ -202,7 +202,7 @@ def _close(knots, last, lane):  # type: ignore[no-untyped-def]
 
 @jit
 def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
-    """Second derivatives at both ends of one lane: the outer two cubics are one."""
+    """Second derivatives at both ends of one lane, where not-a-knot makes the outer two cubics one."""
     step = knots[3].m[lane] - knots[2].m[lane]
     knots[1].m[lane] = knots[2].m[lane] - knots[1].gap[lane] * knots[2].inverse[lane] * step
     step = knots[last].m[lane] - knots[last - 1].m[lane]
@@ -211,7 +211,7 @@ def _extend(knots, last, lane):  # type: ignore[no-untyped-def]
 
 @jit
 def _expand(knots, length):  # type: ignore[no-untyped-def]
-    """The cubic behind each knot by its Taylor coefficients: x, slope in `above`, half of m in m, third in `pivot`."""
+    """Taylor coefficients of the cubic after each knot: x, the slope in `above`, m / 2 in m, the third in `pivot`."""
     for j in range(length):
         for lane in range(_LANES):
             m, behind, inverse = knots[j + 1].m[lane], knots[j + 2].m[lane], knots[j + 1].inverse[lane]

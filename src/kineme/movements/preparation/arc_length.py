@@ -1,4 +1,4 @@
-"""The arc-length phase: where along its path a movement is, whatever its timing."""
+"""The arc-length phase: the share of its path that a movement has covered, independent of its timing."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def arc_length_phase(paths: Array, share: float = 1.0) -> Array:
     Parameters
     ----------
     paths : ndarray of shape (n, d, T)
-        Smooth the paths before: noise has length too, and at 3 % of the extent would drown the movement's.
+        Smooth the paths first: noise adds length, and at 3 % of the extent it is longer than the movement itself.
     share : float, default 1.0
-        1 is arc length, 0 is time, between them a blend.
+        Weight of the arc length: 1 is arc length, 0 is time.
 
     Returns
     -------
@@ -42,8 +42,8 @@ def arc_length_phase(paths: Array, share: float = 1.0) -> Array:
 def resample_by_arc_length(paths: Array, n_points: int, share: float = 1.0) -> Array:
     """Linear interpolation of paths (n, d, T) at `n_points` even values of `arc_length_phase`, (n, d, n_points).
 
-    Linear, because the phase is the length of the polygon through the samples; a spline through knots as
-    uneven as these can swing.
+    Linear, because the phase is the length of the polygon through the samples, and a spline through such uneven
+    knots can overshoot.
     """
     if use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
         compiled = compiled_module("kineme.movements.trajectories._compiled")

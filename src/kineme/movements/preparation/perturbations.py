@@ -1,4 +1,4 @@
-"""What may come between two recordings of one movement: place, size, direction, timing, noise."""
+"""Random perturbations of movements: translation, scale, rotation, timing and noise."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_phase
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards
 _FINE = 1000  # samples between which the warp interpolates linearly, so that it leaves no kinks
 _SPEED_KNOTS = 4
-_STRONGEST = 100.0  # already beyond all sense; powers of much stronger ones are no numbers
-_STREAMS = ("shift", "scale", "rotation", "warp", "noise")  # each has random numbers of its own
+_STRONGEST = 100.0  # far beyond any use; powers of much larger strengths overflow
+_STREAMS = ("shift", "scale", "rotation", "warp", "noise")  # each has its own random numbers
 
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Random changes of a movement that do not change what it shows.
+    """Random perturbations of movements that keep their class.
 
-    Each movement gets changes of its own; a strength of 0 leaves that kind out. Each kind draws from a stream of its
-    own, so a strength can grow, or another kind be added, while everything else stays as it was.
+    Each movement gets its own random values; a strength of 0 leaves a perturbation out. Each perturbation has its own
+    stream of random numbers, so changing the strength of one does not change the others.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Perturbation:
             check_number(name, getattr(self, name), least=0.0, most=_STRONGEST)
 
     def in_dimensions(self, n_dims: int) -> Perturbation:
-        """The same, without the rotation that movements of neither two nor three dimensions cannot have."""
+        """The same perturbation, without rotation unless `n_dims` is 2 or 3."""
         return self if n_dims in (2, 3) else replace(self, rotation=0.0)
 
     def apply(self, demonstrations: Demonstrations, seed: int | Sequence[int]) -> Demonstrations:
@@ -92,7 +92,7 @@ class Perturbation:
         return _with_paths(demonstrations, paths)
 
     def _warped(self, demonstrations: Demonstrations, random: np.random.Generator) -> Array:
-        """Paths (n, d, 200) from their start, at even times of the warped clock."""
+        """Paths (n, d, 200) relative to their start, at even values of the warped time."""
         n = len(demonstrations)
         if self.warp == 0:
             return relative_rows(demonstrations, 0, n, N_POINTS)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Protocol
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements_like import MovementsLike
 
 
 class Step(Protocol):
@@ -19,7 +20,7 @@ class Step(Protocol):
 
 
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
-    """Refuse what is not an iterable of steps; a step's class without parentheses is not a step."""
+    """Refuse anything but an iterable of steps; the class of a step, without parentheses, is not a step."""
     try:
         found = tuple(steps)
     except TypeError:
@@ -34,8 +35,8 @@ def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     return found
 
 
-def preprocess(movements: Any, steps: Iterable[Step]) -> Demonstrations:
-    """Apply steps in order to movements in any form; the result's ``steps`` records them after earlier ones."""
+def preprocess(movements: MovementsLike, steps: Iterable[Step]) -> Demonstrations:
+    """Apply steps in order to movements; they are appended to the ``steps`` of the result."""
     demonstrations = Demonstrations.of(movements)
     for step in check_steps(steps):
         demonstrations = Demonstrations.of_movements(step.apply(demonstrations), (*demonstrations.steps, step))

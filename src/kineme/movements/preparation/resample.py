@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kineme.movements.preparation.spline import spline_matrix, spline_rows
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import MIN_SAMPLES, Array, check_count
 
-_MOST = 1_000_000  # samples of a movement
+_MOST = 1_000_000  # samples per movement
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Resample:
     -----
     Cubic splines on the true time stamps, so irregular sampling costs accuracy, not correctness. Samples less than a
     tenth of the usual step apart are averaged first: a spline would magnify the noise between them (see
-    `kineme.movements.trajectories.close_stamps`). Resampling far below the recorded rate folds high frequencies into
-    low ones: `Smooth` first.
+    `kineme.movements.trajectories.close_stamps`). Resampling far below the recorded rate causes aliasing: `Smooth`
+    first.
     """
 
     n_points: int = 200

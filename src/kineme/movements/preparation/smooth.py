@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kineme.movements.preparation.smoothing_spline import even_rows_of_spline, smoothing_spline
 from kineme.movements.preparation.spline import fits_lanes
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, check_number
@@ -58,8 +58,9 @@ class Smooth:
 def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, n_points: int) -> Array:
     """Smoothing splines of movements start:stop, see `Smooth`, at `n_points` even times: (stop - start, d, n_points).
 
-    The splines themselves are evaluated, with their own second derivatives; `Smooth` and then `Resample` would fit
-    second ones through their values. Minus the first recorded position, so that a large offset costs no digits.
+    The smoothing splines themselves are evaluated, from their second derivatives; `Smooth` followed by `Resample`
+    would fit other splines through their values. The first recorded position is subtracted, so that a large offset
+    costs no digits.
     """
     offsets, scales = _tile(demonstrations, start, stop, cutoff)
     times, positions = demonstrations.movements.spread, demonstrations.positions
@@ -86,7 +87,7 @@ def _fill_smoothed(demonstrations: Demonstrations, start: int, stop: int, cutoff
 
 
 def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool:
-    """Decided for all movements, though they come tile by tile."""
+    """Whether to run compiled, decided for all movements together although they are smoothed in tiles."""
     whole, now = demonstrations.positions.size, demonstrations.n_dims * int(offsets[-1] - offsets[0])
     return fits_lanes(demonstrations.offsets) and use_compiled(
         _OPERATIONS_PER_SAMPLE * whole, _OPERATIONS_PER_SAMPLE * now
@@ -94,7 +95,7 @@ def _compiled(demonstrations: Demonstrations, offsets: NDArray[np.intp]) -> bool
 
 
 def _tile(demonstrations: Demonstrations, start: int, stop: int, cutoff: float) -> tuple[NDArray[np.intp], Array]:
-    """Offsets of movements start:stop, and what to multiply their times with so that the penalty is 1."""
+    """Offsets of movements start:stop, and the factor on their times that makes the penalty 1."""
     offsets = demonstrations.offsets[start : stop + 1]
     penalties = (np.diff(offsets) - 1) / (2.0 * np.pi * cutoff) ** 4
     return offsets, 1.0 / (np.cbrt(penalties) * demonstrations.durations[start:stop])

@@ -1,4 +1,4 @@
-"""The smoothing spline of many movements as one banded system: plain definition of the compiled loops."""
+"""The smoothing splines of many movements as one banded system; the plain twin of the compiled loops."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from kineme.validation import Array
 
-_FAR = 1e200  # gap from one movement to the next: nothing behind it matters
+_FAR = 1e200  # gap between movements, so large that they do not influence each other
 
 
 def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], scales: Array) -> tuple[Array, Array]:
@@ -49,7 +49,7 @@ def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], 
     bands[3, :-1], bands[4, :-2] = bands[1, 1:], bands[0, 2:]
     m = np.zeros_like(x)
     slopes = np.diff(x, axis=0) * inverse[:, None]
-    # LU, not Cholesky: of nearly duplicate stamps the matrix is positive definite only before rounding.
+    # LU, not Cholesky: with nearly equal stamps the rounded matrix may not be positive definite.
     m[1:-1] = solve_banded((2, 2), bands, np.diff(slopes, axis=0), overwrite_ab=True, check_finite=False)
     bends = np.diff(m, axis=0) * inverse[:, None]
     x[:-1] -= bends

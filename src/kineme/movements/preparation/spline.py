@@ -15,15 +15,15 @@ from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
 _OPERATIONS_PER_SAMPLE = 100  # elementary operations that SciPy's spline costs per sample and dimension
-_LONGEST = 20_000  # samples; compiled, each takes two kilobytes while it is worked on
+_LONGEST = 20_000  # samples; the compiled splines need two kilobytes for each
 
 
 @lru_cache(maxsize=64)
 def spline_matrix(n_in: int, n_out: int) -> Array:
     """The linear map (n_out, n_in) from `n_in` even samples to `n_out` even samples.
 
-    With B-splines B at the samples and C at the points it is ``C B^-1``; solving with the transposed, banded B
-    needs no more memory than the result, however long the recording.
+    With the B-spline values B at the samples and C at the points, the map is ``C B^-1``; solving with the transposed,
+    banded B needs no more memory than the result.
     """
     from scipy.interpolate import BSpline
     from scipy.sparse.linalg import splu
@@ -32,7 +32,7 @@ def spline_matrix(n_in: int, n_out: int) -> Array:
     if n_in == n_out:
         matrix = np.eye(n_in)
     else:
-        knots = np.concatenate((np.zeros(4), u[2:-2], np.ones(4)))  # not-a-knot: none at the samples next to the ends
+        knots = np.concatenate((np.zeros(4), u[2:-2], np.ones(4)))  # not-a-knot: none next to the ends
         at_samples, at_points = (BSpline.design_matrix(points, knots, 3) for points in (u, v))
         matrix = np.ascontiguousarray(splu(at_samples.T.tocsc()).solve(at_points.T.toarray()).T)
     matrix.setflags(write=False)
@@ -60,7 +60,7 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
     """
     n, n_dims = len(offsets) - 1, positions.shape[1]
     rows = np.empty((n, n_dims, n_points))
-    # Decided for the whole block, though callers come tile by tile.
+    # Decided for the whole block, although callers pass one tile at a time.
     whole, now = (
         _OPERATIONS_PER_SAMPLE * n_dims * n_samples for n_samples in (len(positions), offsets[-1] - offsets[0])
     )
@@ -72,7 +72,7 @@ def spline_rows(parameter: Array, positions: Array, offsets: NDArray[np.intp], n
 
 
 def fits_lanes(offsets: NDArray[np.intp]) -> bool:
-    """Whether no movement is so long that the compiled splines, made for many short ones, would waste memory."""
+    """Whether all movements are short enough for the compiled splines, which need much memory per sample."""
     return bool(np.diff(offsets).max() <= _LONGEST)
 
 

@@ -1,4 +1,4 @@
-"""Cut the rest before and after a movement."""
+"""Drop the samples at rest before and after a movement."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.validation import MIN_SAMPLES, Array, check_number
 
 
@@ -16,9 +16,9 @@ from kineme.validation import MIN_SAMPLES, Array, check_number
 class TrimRest:
     """Drop leading and trailing samples that stay near the first and the last position.
 
-    A recording that is cropped badly rests before and after the movement; a tenth of its duration at rest
-    changes the forcing term by a third. Rest is judged by distance, not by speed: that needs no derivative of
-    noisy data, and a slow movement is not taken for rest.
+    A badly cropped recording contains rest before and after the movement; a tenth of its duration at rest
+    changes the forcing term by a third. Rest is detected by distance, not by speed: that needs no derivative of
+    noisy data, and a slow movement is not mistaken for rest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Runs of samples in motion, with hysteresis, and what counts as long for them."""
+"""Bouts: runs of samples in motion, found with hysteresis, and their typical duration."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def moving_bouts(speed: Array, low: float, high: float) -> Rows:
 
 
 def typical_duration(durations: Array) -> float:
-    """Half of all moving time is spent in bouts of at least this duration: many short twitches do not change it."""
+    """The duration such that half of the moving time lies in bouts at least as long; twitches hardly change it."""
     ordered = np.sort(durations)
     return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
 
 
 def join_across(bouts: Rows, times: Array, gap: float) -> Rows:
-    """Bouts with no more than `gap` seconds between them become one."""
+    """Merge bouts that are at most `gap` seconds apart."""
     starts, ends = times[bouts[:, 0]], times[bouts[:, 1] - 1]
     apart = np.flatnonzero(starts[1:] - ends[:-1] > gap)
     return np.column_stack((bouts[np.append(0, apart + 1), 0], bouts[np.append(apart, len(bouts) - 1), 1]))

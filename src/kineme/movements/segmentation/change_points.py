@@ -1,4 +1,4 @@
-"""Cut where the way of moving changes, with the library ruptures."""
+"""Segmentation at change points of the velocity, with the library ruptures."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class ChangePoints:
     """Cut at change points of the velocity: kernel change-point detection, PELT or dynamic programming.
 
     The velocity, in peak speeds, is taken at ``n_points`` even times and cut so that the sum of squared distances to
-    each piece's mean, in the feature space of a Gaussian kernel, is smallest. Rest, to and fro are three regimes;
-    within a bend the velocity changes all along, and the cuts there mean little.
+    each piece's mean, in the feature space of a Gaussian kernel, is smallest. Rest, motion there and motion back are
+    three regimes; within a bend the velocity changes continuously, and cuts there mean little.
 
     Parameters
     ----------
     penalty : float, default 0.1
-        Cost of one more cut: larger means fewer cuts. In multiples of what a characteristic time costs, the root of
-        mean squared speed over mean squared acceleration, when it is unlike the rest of its piece; so neither the
-        tempo nor the length of the recording matters. Not used with ``n_pieces``.
+        Cost of one more cut: larger means fewer cuts. Its unit is the cost of one characteristic time, ``sqrt(mean
+        squared speed / mean squared acceleration)``, spent unlike the rest of the piece; so neither the tempo nor the
+        length of the recording matters. Not used with ``n_pieces``.
     n_pieces : int, optional
-        The number of pieces, where you know it; resting pieces count.
+        The number of pieces, if it is known; pieces at rest count.
     n_points : int, default 1000
         Time resolution; the cost grows with its square. At most 10,000.
 
@@ -58,11 +58,11 @@ class ChangePoints:
 
     @property
     def resolution(self) -> float:
-        """Share of the peak speed that has to be told from rest."""
+        """Share of the peak speed that must be distinguished from rest."""
         return 0.05
 
     def inner_cuts(self, motion: Motion) -> Rows:
-        """Rows at which one movement ends and the next begins, increasing, none at the ends."""
+        """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
         t = motion.times - motion.times[0]
         even = np.linspace(0.0, t[-1], self.n_points)
         velocity = np.gradient(motion.positions, t, axis=0) / motion.peak

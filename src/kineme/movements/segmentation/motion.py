@@ -1,4 +1,4 @@
-"""One recording as segmenters see it: speed over time, and how much of it is noise."""
+"""The motion of one recording: smoothed positions, speed over time, and the share of noise in it."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array
 
-_ROUNDS = 6  # the peak speed depends on the smoothing and the smoothing on the peak speed; five are one too many
-_SLOWEST = 2.0  # cycles per recording: never smooth more than this
+_ROUNDS = 6  # at most: peak speed and smoothing depend on each other, and are found by iteration
+_SLOWEST = 2.0  # cycles per recording: the lowest cutoff
 _PEAK_PATH = 0.9  # of the path is covered below the peak speed
-_MIN_SAMPLES = 8  # two movements of the four that a trajectory needs
-_NOISE_EXTENTS = 4.0  # a smoothed recording that moves less than this many standard deviations of noise rests
+_MIN_SAMPLES = 8  # two movements of four samples
+_NOISE_EXTENTS = 4.0  # a smoothed recording rests if its extent is less than this many standard deviations of noise
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A recording, smoothed just as much as its noise requires.
+    """A recording, smoothed as much as its noise requires.
 
     Attributes
     ----------
@@ -31,12 +31,12 @@ class Motion:
     speed : ndarray of shape (T,)
         Norm of the derivative of the smoothed positions [unit/s].
     peak : float
-        Robust peak speed: nine tenths of the path are covered more slowly. Weighted by path, not by time, so that a
-        recording that mostly rests has the peak speed of its movements.
+        Robust peak speed: nine tenths of the path are covered at lower speed. Weighted by path, not by time, so that
+        long rests do not lower it.
     noise : float
-        Root mean square speed that is left of the noise [unit/s].
+        Root mean square speed of the noise that remains after smoothing [unit/s].
     cutoff : float
-        Of the smoothing [Hz].
+        Cutoff frequency of the smoothing [Hz].
     """
 
     times: Array
@@ -48,23 +48,23 @@ class Motion:
 
 
 def observe(recording: Trajectory, resolution: float) -> Motion:
-    """Smooth a recording until its noise moves at a quarter of ``resolution * peak``, and measure its speed.
+    """Smooth a recording until the speed of its noise is a quarter of ``resolution * peak``; return its motion.
 
     White noise of variance sigma^2 per dimension, sampled at rate r, passes the smoothing spline (see `Smooth`) of
     cutoff c [Hz] with a speed of variance ``(pi^3 / sqrt 2) sigma^2 c^3 / r`` per dimension: the integral of
-    ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the aim is taken, so a
-    clean recording loses nothing and no cutoff in hertz presumes how fast people or robots move.
+    ``(2 pi nu)^2 (2 sigma^2 / r) / (1 + (nu / c)^4)^2``. The largest c that keeps this below the limit is taken, so a
+    clean recording is hardly smoothed, and no cutoff in hertz assumes how fast people or robots move.
 
     Parameters
     ----------
     recording : Trajectory
     resolution : float
-        Speed that is to be told from rest, as a share of the peak speed.
+        Speed that must be distinguished from rest, as a share of the peak speed.
 
     Raises
     ------
     TrajectoryError
-        Fewer than eight samples, or a recording that rests all along.
+        Fewer than eight samples, or a recording without motion.
     """
     who = f"recording {recording.name!r}" if recording.name else "recording"
     if len(recording) < _MIN_SAMPLES:
@@ -95,8 +95,8 @@ def observe(recording: Trajectory, resolution: float) -> Motion:
 def noise_variance(positions: Array) -> float:
     """Variance of white noise on (T, d) positions, summed over dimensions.
 
-    From the median size of third differences, which a smooth path hardly has: for Gaussian noise it is
-    ``0.6745 sqrt(20) sigma``. A median, so that jumps do not count.
+    Estimated from the median size of third differences, to which a smooth path hardly contributes: for Gaussian noise
+    it is ``0.6745 sqrt(20) sigma``. A median, so that single jumps have no influence.
     """
     sizes = np.median(np.abs(np.diff(positions, n=3, axis=0)), axis=0)
     return float(((sizes / (0.6745 * np.sqrt(20.0))) ** 2).sum())

@@ -1,4 +1,4 @@
-"""Cut where the recording rests."""
+"""Segmentation at rests."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ class Rest:
     """Cut in the middle of every rest.
 
     The recording rests where its speed stays below a share of the robust peak speed; a movement is a run above that
-    share which reaches twice the share somewhere (hysteresis, so that noise at the threshold does not flicker).
+    share which reaches twice the share somewhere (hysteresis, so that noise near the threshold does not cut it).
 
     Parameters
     ----------
     speed : float, default 0.05
         Share of the recording's peak speed below which it rests. A movement that never exceeds twice this share is
-        not seen: lower it where slow and fast movements share a recording.
+        missed: lower it for recordings with both slow and fast movements.
     min_rest : float, optional
         A shorter rest is a pause within a movement [s]; by default a fiftieth of the typical movement. Measured
-        between extrapolated ends, so that to stop and turn back smoothly is not a rest, however slow.
+        between extrapolated ends, so that a smooth reversal is not a rest, however slow it is.
     min_movement : float, optional
         A shorter movement is a twitch within a rest [s]; by default a tenth of the typical movement.
 
@@ -61,17 +61,17 @@ class Rest:
 
     @property
     def resolution(self) -> float:
-        """Share of the peak speed that has to be told from rest."""
+        """Share of the peak speed that must be distinguished from rest."""
         return self.speed
 
     def inner_cuts(self, motion: Motion) -> Rows:
-        """Rows at which one movement ends and the next begins, increasing, none at the ends."""
+        """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
         bouts, last_enough = self._bouts(motion)
         bouts = bouts[last_enough]
         return (bouts[:-1, 1] + bouts[1:, 0]) // 2
 
     def pieces(self, motion: Motion) -> Rows:
-        """Where each movement lies: to the middle of the rests beside it, or of those between it and a twitch."""
+        """The piece of each movement: it ends in the middle of the rests beside it, or between it and a twitch."""
         bouts, last_enough = self._bouts(motion)
         middles = (bouts[:-1, 1] + bouts[1:, 0]) // 2
         edges = np.concatenate(([0], middles, [len(motion.times)]))
@@ -81,10 +81,9 @@ class Rest:
         """Runs of motion, rows (n, 2), and which of them are movements."""
         low = max(self.speed * motion.peak, 2.0 * motion.noise)
         bouts = moving_bouts(motion.speed, low, 2.0 * low)
-        if not len(bouts):  # motion so even and slow that nothing stands out
+        if not len(bouts):  # motion so slow and even that no bout reaches the upper threshold
             return np.array([[0, len(motion.times)]]), np.array([True])
-        # How long it rests is judged between extrapolated ends: to stop and turn back smoothly is no rest at all,
-        # however long it is slow.
+        # A rest is measured between extrapolated ends: a smooth reversal is no rest, however long it is slow.
         bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
         typical = typical_duration(durations_of(bouts, motion.times))
         bouts = join_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)

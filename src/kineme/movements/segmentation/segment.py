@@ -1,4 +1,4 @@
-"""One long recording in, movements out."""
+"""`segment`: cut one long recording into movements."""
 
 from __future__ import annotations
 
@@ -14,20 +14,23 @@ from kineme.movements.segmentation.onset import onset_rows
 from kineme.movements.segmentation.segmentation import Segmentation
 from kineme.movements.segmentation.table import SEGMENTERS, Segmenter
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import MIN_SAMPLES, check_choice, check_switch
 
 
-def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any) -> Segmentation:
+def segment(
+    recording: MovementsLike, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any
+) -> Segmentation:
     """Cut a continuous recording into movements.
 
     Parameters
     ----------
-    recording : Trajectory or array_like of shape (T, d)
-        An array is taken as evenly sampled over one second; pass a `Trajectory` with its time stamps, so that
-        parameters in seconds mean something.
+    recording : MovementsLike
+        One movement, in any way that `Demonstrations.of` takes it. An array (T, d) is taken as evenly sampled over one
+        second; pass a `Trajectory` with its time stamps, so that parameters in seconds mean something.
     by : {"rest", "speed", "change-points"} or Segmenter, default "rest"
-        Where to cut: where it rests, where it slows down, where its velocity changes regime (needs
+        Where to cut: at rests, at minima of speed, or at change points of the velocity (needs
         ``pip install kineme[segmentation]``). See `Rest`, `SpeedMinima` and `ChangePoints`.
     cover : bool, default False
         Whether every sample belongs to exactly one movement. By default rests belong to none.
@@ -37,12 +40,13 @@ def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False
     Returns
     -------
     Segmentation
-        ``cuts`` (n, 2) in seconds, ``trajectories``, the method and the rows.
+        ``cuts`` (n, 2) in seconds, the movements as ``demonstrations``, the method and the rows. It is taken wherever
+        movements are expected.
 
     Raises
     ------
     TrajectoryError
-        A recording that rests all along, of fewer than eight samples, or with values that are not finite.
+        A recording without motion, with fewer than eight samples, or with values that are not finite.
     SpecificationError
         An unknown method or parameter, a parameter out of range, or the library of "change-points" is missing.
 
@@ -66,7 +70,7 @@ def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False
 
 
 def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
-    """The method of that name with these parameters; a method itself takes none."""
+    """The method of that name with these parameters; a method that is passed itself takes no parameters."""
     if not isinstance(by, str):
         if isinstance(by, type) or not callable(getattr(by, "inner_cuts", None)) or parameters:
             raise SpecificationError(
@@ -83,12 +87,16 @@ def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
     return chosen
 
 
-def as_recording(recording: Any) -> Trajectory:
-    """One recording, whatever way it is held."""
+def as_recording(recording: MovementsLike) -> Trajectory:
+    """One recording as a `Trajectory`.
+
+    Raises
+    ------
+    TrajectoryError
+        Several movements, or what `Demonstrations.of` refuses.
+    """
     if isinstance(recording, Trajectory):
         return recording
-    if isinstance(recording, np.ndarray) and recording.ndim <= 2 and recording.dtype != object:
-        return Demonstrations.from_arrays([recording])[0]
     several = Demonstrations.of(recording)
     if len(several) != 1:
         raise TrajectoryError(f"expected one recording, got {len(several)} movements; pass them one by one")
@@ -96,7 +104,7 @@ def as_recording(recording: Any) -> Trajectory:
 
 
 def enough_samples(pieces: Rows) -> Rows:
-    """Pieces of fewer samples than a trajectory needs join the one before, the first one the one after."""
+    """Merge pieces of fewer samples than a trajectory needs with the piece before, the first with the one after."""
     starts = [0]
     for start in pieces[1:, 0].tolist():
         if start - starts[-1] >= MIN_SAMPLES and pieces[-1, 1] - start >= MIN_SAMPLES:
@@ -105,7 +113,7 @@ def enough_samples(pieces: Rows) -> Rows:
 
 
 def moving(motion: Motion, pieces: Rows, resolution: float) -> Rows:
-    """Those pieces that move, narrowed to their motion."""
+    """The pieces with motion, narrowed to it."""
     padded = np.append(motion.speed, 0.0)
     fastest = np.maximum.reduceat(padded, pieces.ravel())[::2]
     pieces = pieces[fastest > 2.0 * max(resolution * motion.peak, 2.0 * motion.noise)]

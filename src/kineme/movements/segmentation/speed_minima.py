@@ -1,4 +1,4 @@
-"""Cut where the movement slows down or turns sharply."""
+"""Segmentation at minima of speed and, optionally, at sharp turns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kineme.movements.segmentation.bouts import Rows, consecutive, typical_durat
 from kineme.movements.segmentation.motion import Motion
 from kineme.validation import Array, check_number
 
-_FLOOR = 0.02  # of the peak speed: how much slower than this is rest, and no deeper
+_FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
 _MIN_MOVEMENT = 0.1  # of the typical piece
 
 
@@ -55,11 +55,11 @@ class SpeedMinima:
 
     @property
     def resolution(self) -> float:
-        """Share of the peak speed that has to be told from rest."""
+        """Share of the peak speed that must be distinguished from rest."""
         return 2.0 * _FLOOR
 
     def inner_cuts(self, motion: Motion) -> Rows:
-        """Rows at which one movement ends and the next begins, increasing, none at the ends."""
+        """Rows at which one movement ends and the next begins, increasing, without the ends of the recording."""
         t = motion.times - motion.times[0]
         even = np.linspace(0.0, t[-1], len(t))
         slowness = np.interp(even, t, -np.log(motion.speed + max(_FLOOR * motion.peak, 2.0 * motion.noise)))
@@ -102,7 +102,7 @@ def turning(motion: Motion, span: float) -> Array:
 
 
 def _apart(cuts: Rows, strength: Array, distance: float) -> Rows:
-    """The strongest cuts, none closer than `distance` samples to a stronger one."""
+    """Keep the strongest cuts, none closer than `distance` samples to a stronger one."""
     kept = np.zeros(len(cuts), dtype=bool)
     for i in np.argsort(-strength, kind="stable"):
         kept[i] = not (np.abs(cuts[kept] - cuts[i]) < distance).any()

@@ -1,4 +1,4 @@
-"""The one table of segmentation methods."""
+"""The table of segmentation methods."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kineme.movements.segmentation.speed_minima import SpeedMinima
 
 
 class Segmenter(Protocol):
-    """A frozen record of parameters that says where to cut."""
+    """A segmentation method: a frozen record of its parameters."""
 
     @property
     def resolution(self) -> float:
@@ -24,7 +24,7 @@ class Segmenter(Protocol):
         ...
 
     def pieces(self, motion: Motion) -> Rows:
-        """Where each movement lies, rows (n, 2), disjoint and in order; `segment` narrows them to their motion."""
+        """The piece of each movement, rows (n, 2), disjoint and in order; `segment` narrows them to their motion."""
         ...
 
 

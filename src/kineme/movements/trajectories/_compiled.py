@@ -38,7 +38,7 @@ def fill_usual_steps(times, offsets, share, quantile, steps):  # type: ignore[no
     for i in range(len(steps)):
         longest = max(longest, offsets[i + 1] - offsets[i])
     gaps, range_bits = np.empty(longest), np.empty(2, np.int64)
-    gap_bits, ends = gaps.view(np.int64), range_bits.view(np.float64)  # bits order positive numbers, and are quicker
+    gap_bits, ends = gaps.view(np.int64), range_bits.view(np.float64)  # bits of positive floats have their order
     for i in range(len(steps)):
         own = times[offsets[i] : offsets[i + 1]]
         n_gaps = len(own) - 1

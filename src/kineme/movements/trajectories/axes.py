@@ -1,4 +1,4 @@
-"""What the dimensions of a movement are called, in features, files and figures."""
+"""Names of the dimensions in features, files and figures."""
 
 from __future__ import annotations
 

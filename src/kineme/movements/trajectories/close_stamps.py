@@ -1,9 +1,9 @@
-"""Samples that were taken at nearly the same time, made one before a spline goes through them.
+"""Merge samples with nearly equal time stamps before a spline interpolates them.
 
 An interpolating spline turns the noise between two samples into a slope, by dividing it by the time between
 them: the closer they are, the wilder the path between their neighbors. With 0.2 % of noise and one gap in twenty
 200 times shorter than the others, the learned path is off by 0.20 % of the extent (median of 60 movements; 0.96 % at
-worst). With such samples made one it is off by 0.077 % (0.098 %), as on even stamps.
+worst). With such samples merged it is off by 0.077 % (0.098 %), as on even stamps.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kineme.validation import MIN_SAMPLES, Array
 #: the largest that leaves stamps with a jitter of up to 80 % of a step as they are, however few. At random stamps, with
 #: 10 % of noise, it is enough for rhythms: none of 100 is refused, against 76 (300 samples, 3.3 periods).
 SHARE = 0.1
-_QUANTILE = 0.75  # of a movement's gaps: its usual step, even where every stamp comes twice or gaps are missing samples
+_QUANTILE = 0.75  # of a movement's gaps: its usual step, also where every stamp occurs twice or samples are missing
 
 #: Share of a movement's mean step below which a smoothing spline, whose equations divide by squares of the gaps, loses
 #: more digits than a gap of that length costs: the path is off by 4e-6 of its extent, and by all of it at 1e-7.
@@ -33,8 +33,8 @@ def merge_close(
     """Replace each group of close samples by its mean time and mean position.
 
     A group is shorter than `SHARE` of the usual step, the upper quartile of the movement's gaps. First and last
-    samples stay where they are, and no movement keeps fewer than four. Where close samples follow each other for
-    longer than a usual step, the recording is denser there on purpose, and is left as it is.
+    samples are not moved, and every movement keeps at least four. A stretch of close samples that is longer than a
+    usual step is a denser part of the recording and is left as it is.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def merge_close(
     Returns
     -------
     times, positions, offsets
-        Of the samples that are left; None where no samples are close, the usual case.
+        The merged samples; None if no samples are close, the usual case.
     """
     steps = _usual_steps(times, offsets)
     if not steps.any():
@@ -56,7 +56,7 @@ def merge_close(
         return None
     heads = np.flatnonzero(~joined)
     counts = np.diff(np.append(heads, len(times)))
-    # Means of differences: they lie within their group after rounding too.
+    # The mean of differences lies within its group after rounding too.
     merged_times = times[heads] + np.add.reduceat(times - np.repeat(times[heads], counts), heads) / counts
     away = np.add.reduceat(positions - np.repeat(positions[heads], counts, axis=0), heads)
     merged_positions = positions[heads] + away / counts[:, None]
@@ -67,9 +67,9 @@ def merge_close(
 
 
 def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
-    """Stamps (total,) of which no two follow each other by less than `CLOSEST`; later ones give way.
+    """Stamps (total,) of which consecutive ones are at least `CLOSEST` apart; later stamps are moved.
 
-    Movement by movement, so that none depends on the others; the usual case is that none has such stamps.
+    Each movement is treated alone, so that none depends on the others; usually no movement has such stamps.
     """
     if use_compiled(len(times)):
         any_closer = compiled_module("kineme.movements.trajectories._compiled").any_closer
@@ -90,7 +90,7 @@ def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
 
 
 def _joined(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
-    """Whether each sample belongs to the group of the one before; `steps` are 0 where nothing is to be joined."""
+    """Whether each sample belongs to the group of the one before; `steps` are 0 for movements without close samples."""
     lengths, total = np.diff(offsets), len(times)
     step = np.repeat(steps, lengths)
     joined = np.zeros(total, dtype=bool)
@@ -99,7 +99,7 @@ def _joined(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np
     heads = np.flatnonzero(~joined)
     counts = np.diff(np.append(heads, total))
     spans = times[heads + counts - 1] - times[heads]
-    joined &= np.repeat(spans <= step[heads], counts)  # longer: a dense stretch
+    joined &= np.repeat(spans <= step[heads], counts)  # a longer group is a dense stretch
     since = times - np.repeat(times[heads], counts)
     part = np.floor(np.divide(since, SHARE * step, out=np.zeros(total), where=joined))
     joined[1:] &= part[1:] == part[:-1]
@@ -108,7 +108,7 @@ def _joined(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np
 
 
 def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:
-    """Upper quartile of the gaps of each movement, shape (n,); 0 where none can be close, the usual case."""
+    """Upper quartile of the gaps of each movement, shape (n,); 0 for movements without close samples."""
     steps = np.zeros(len(offsets) - 1)
     if use_compiled(_OPERATIONS_PER_SAMPLE * len(times)):
         fill = compiled_module("kineme.movements.trajectories._compiled").fill_usual_steps

@@ -1,4 +1,4 @@
-"""What names the action of each movement: texts as objects, numbers as numbers, never both."""
+"""Labels of movements: an array of str objects or of numbers, never both."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _ADVICE = "name the action, or leave the movement out"
 def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] | None = None) -> NDArray[Any]:
     """One label per movement as an array of shape (n,).
 
-    Texts, and whatever else is no number, become an array of objects, texts as plain `str`. An array of fixed width
-    would make every label as large as the longest, and would merge labels that differ in trailing NULs. Numbers stay
-    an array of numbers.
+    Texts, and anything else that is not a number, become an array of objects, texts as plain `str`. A NumPy array of
+    fixed-width texts would make every label as large as the longest, and would merge labels that differ in trailing
+    NULs. Numbers stay an array of numbers.
 
     Parameters
     ----------
     labels : array_like of shape (n,)
     n : int, optional
-        How many there should be; by default as many as there are.
+        Expected number of labels; by default any.
     names : sequence of n str or None, optional
         Names of the movements, for messages.
 
@@ -39,22 +39,25 @@ def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] |
     """
     array = labels if isinstance(labels, np.ndarray) else _as_objects(labels)
     if array.ndim != 1 or (n is not None and len(array) != n):
-        many = f"each of the {n} movements" if n is not None else "each movement"
-        raise TrajectoryError(f"expected one label for {many}, got labels of shape {array.shape}")
-    known = array.tolist() if array.dtype.kind in "USTOfc" else []  # of the others every one is a label
+        many = "each movement" if n is None else "the one movement" if n == 1 else f"each of the {n} movements"
+        raise TrajectoryError(
+            f"expected one label for {many}, got labels of shape {array.shape}"
+            + ("; one array (T, d) is one movement: pass many as a list or as one array (n, T, d)" if n == 1 else "")
+        )
+    known = array.tolist() if array.dtype.kind in "USTOfc" else []  # other dtypes have no missing values
     kinds = set(map(type, known))
     if kinds == {str}:
         return _objects(known)
     _check_each(known, names)
     if kinds and issubclass(next(iter(kinds)), str):
-        return _objects([str.__str__(label) for label in known])  # plain, also where they are of a subclass
+        return _objects([str.__str__(label) for label in known])  # str itself, not a subclass
     if array.dtype != object:
         return array.copy()
     return np.array(known) if known and isinstance(known[0], _NUMBERS) else _objects(known)
 
 
 def _as_objects(labels: Any) -> NDArray[Any]:
-    """Not `np.asarray`, which turns numbers beside texts into texts; a frame's column becomes an array by itself."""
+    """Labels as an array of objects; `np.asarray` would convert numbers beside texts to texts."""
     return np.asarray(labels) if hasattr(labels, "__array__") else np.array(labels, dtype=object)
 
 

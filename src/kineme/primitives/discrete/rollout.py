@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.operators import decoder
 from kineme.runtime.parallel import for_tiles
@@ -36,11 +36,12 @@ _SETTLING_SAMPLES = 400
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rollout:
+class Rollout(BaseRollout):
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
 
-    Each of `positions`, `velocities` and `accelerations` is one product of the movements' numbers,
-    ``[W, g - x0, v0, x0]``, with the decode matrix of the specification.
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`. Each of `positions`,
+    `velocities` and `accelerations` is one product of the movements' numbers, ``[W, g - x0, v0, x0]``, with the decode
+    matrix of the specification.
 
     Attributes
     ----------
@@ -84,9 +85,16 @@ class Rollout:
         return self._derivative(2)
 
     @property
-    def trajectories(self) -> Demonstrations:
-        """The movements as `Demonstrations`, with the labels and names of their primitives."""
-        return as_demonstrations(self.primitives, self.times, self.positions)
+    def _batch(self) -> Batch:
+        return self.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> Rollout:
+        rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
+        return replace(
+            self,
+            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
+            **{name: getattr(self, name)[chosen] for name in rows},
+        )
 
     def _derivative(self, order: int) -> Array:
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
@@ -115,15 +123,6 @@ class Rollout:
 
         for_tiles(tile, len(self), max(1, _TILE_SAMPLES // (d * self.n_samples)))
         return result.transpose(0, 2, 1)
-
-
-def as_demonstrations(primitives: Batch, times: Array, positions: Array) -> Demonstrations:
-    """Generated movements (n, T), (n, T, d) with labels and names of their primitives, one for each or one for all."""
-    labels, names = primitives.labels, primitives.names
-    if len(primitives) < len(positions):
-        labels = None if labels is None else np.repeat(labels, len(positions))
-        names = None if names is None else names * len(positions)
-    return Demonstrations.from_arrays(positions, labels, list(times), names, copy=False)
 
 
 def rollout(
@@ -244,7 +243,7 @@ def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
 def settled_end(movement: Rollout, tolerance: float) -> float:
     """How far to go, in durations from 1 on, until every movement stays within `tolerance` of its goal."""
     check_number("settle", tolerance, above=0.0)
-    far = Rollout(**{**movement.__dict__, "n_samples": _SETTLING_SAMPLES, "end": _LONGEST})
+    far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
     outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))
     last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
     if last == _SETTLING_SAMPLES - 1:

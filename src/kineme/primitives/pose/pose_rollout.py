@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.base_rollout import BaseRollout
+from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.pose.quaternions import product
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity
 from kineme.primitives.pose.rotation_vectors import exp
-from kineme.primitives.pose.tangent import from_tangent
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
@@ -21,8 +22,10 @@ _TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it 
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoseRollout:
+class PoseRollout(BaseRollout):
     """n generated movements of T samples; computed when asked for.
+
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`.
 
     Attributes
     ----------
@@ -53,6 +56,11 @@ class PoseRollout:
 
     @property
     def poses(self) -> Array:
+        """The same as `positions`."""
+        return self.positions
+
+    @property
+    def positions(self) -> Array:
         """What was demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
         return np.concatenate((self.tangent.positions[..., :-3], self.orientations), axis=-1)
 
@@ -77,9 +85,16 @@ class PoseRollout:
         return np.concatenate((self.tangent.accelerations[..., :-3], self.angular_accelerations), axis=-1)
 
     @property
-    def trajectories(self) -> Demonstrations:
-        """The movements as `Demonstrations` of 4 or 7 columns, with the labels and names of their primitives."""
-        return from_tangent(self.tangent.trajectories, self.references)
+    def axis_names(self) -> list[str]:
+        """What the columns of `positions` are called: x, y, z and qw, qx, qy, qz."""
+        return [*"xyz"[: self.tangent.starts.shape[1] - 3], "qw", "qx", "qy", "qz"]
+
+    @property
+    def _batch(self) -> Batch:
+        return self.tangent.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> PoseRollout:
+        return PoseRollout(self.tangent[chosen], self.references[chosen])
 
     def _vectors(self, order: int) -> Array:
         """The rotation vectors (n, T, 3), or their first or second derivative in time."""

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.base_rollout import BaseRollout
+from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.response import transition
-from kineme.primitives.discrete.rollout import as_demonstrations, broadcast_length, check_durations, per_movement
+from kineme.primitives.discrete.rollout import broadcast_length, check_durations, per_movement
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import limit_cycle
 from kineme.primitives.rhythmic.periods import SAMPLES_PER_PERIOD
@@ -24,8 +25,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RhythmicRollout:
+class RhythmicRollout(BaseRollout):
     """n generated movements of T samples each; positions and derivatives are computed when asked for.
+
+    A sequence of `Trajectory`, taken wherever movements are expected; see `BaseRollout`.
 
     The equation is linear, so a movement is its limit cycle, a Fourier series, plus the free motion of the
     spring-damper from the state off the cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
@@ -68,9 +71,20 @@ class RhythmicRollout:
         return (self._derivative(2) / self.periods[:, None, None] ** 2).transpose(0, 2, 1)
 
     @property
-    def trajectories(self) -> Demonstrations:
-        """The movements as `Demonstrations`, with the labels and names of their primitives."""
-        return as_demonstrations(self.primitives, self.times, self.positions)
+    def _batch(self) -> Batch:
+        return self.primitives
+
+    def _take(self, chosen: NDArray[np.intp]) -> RhythmicRollout:
+        def of(rows: Array | None) -> Array | None:
+            return rows if rows is None or len(rows) == 1 else rows[chosen]
+
+        return replace(
+            self,
+            primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
+            **{name: getattr(self, name)[chosen] for name in ("ratio", "baselines", "periods", "phases")},
+            start=of(self.start),
+            velocity=of(self.velocity),
+        )
 
     @property
     def _u(self) -> Array:

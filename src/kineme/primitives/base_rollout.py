@@ -1,0 +1,153 @@
+"""What all generated movements share, be they discrete, rhythmic or poses."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.primitives.batch import Batch
+from kineme.validation import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class BaseRollout(ABC):
+    """n generated movements of T samples each: a sequence of `Trajectory`, taken wherever movements are expected.
+
+    ``len(rollout)`` is n, iterating gives one `Trajectory` each, ``rollout[i]`` is one `Trajectory` and
+    ``rollout[2:5]``, as any slice, mask or list of indices, a rollout of the chosen movements. `numpy.asarray` gives
+    `positions`.
+    """
+
+    @property
+    @abstractmethod
+    def times(self) -> Array:
+        """Times of the samples (n, T), from 0 [s]."""
+
+    @property
+    @abstractmethod
+    def positions(self) -> Array:
+        """What was demonstrated, generated: (n, T, d)."""
+
+    @property
+    @abstractmethod
+    def velocities(self) -> Array:
+        """Velocities, per second."""
+
+    @property
+    @abstractmethod
+    def accelerations(self) -> Array:
+        """Accelerations, per second squared."""
+
+    @property
+    @abstractmethod
+    def _batch(self) -> Batch:
+        """The primitives that move, one for each movement or one for all."""
+
+    @abstractmethod
+    def _take(self, chosen: NDArray[np.intp]) -> Self:
+        """The rollout of the chosen movements."""
+
+    @abstractmethod
+    def __len__(self) -> int: ...
+
+    @property
+    def axis_names(self) -> list[str]:
+        """What the d columns of `positions` are called, in tables and figures."""
+        return axis_names(self.positions.shape[2])
+
+    @property
+    def labels(self) -> NDArray[Any] | None:
+        """Labels of the movements (n,), those of their primitives, or None."""
+        labels = self._batch.labels
+        return labels if labels is None or len(labels) == len(self) else np.repeat(labels, len(self))
+
+    @property
+    def names(self) -> tuple[str | None, ...] | None:
+        """Names of the movements, those of their primitives, or None."""
+        names = self._batch.names
+        return names if names is None or len(names) == len(self) else names * len(self)
+
+    @cached_property
+    def demonstrations(self) -> Demonstrations:
+        """The movements as `Demonstrations`, with the labels and names of their primitives.
+
+        Raises
+        ------
+        TrajectoryError
+            Movements that are none, as of fewer than four samples.
+        """
+        return Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+
+    @property
+    def trajectories(self) -> Demonstrations:
+        """The same as `demonstrations`."""
+        return self.demonstrations
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return iter(self.demonstrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Self: ...
+    def __getitem__(self, index: Any) -> Trajectory | Self:
+        """One `Trajectory` for an integer; a rollout for a slice, a mask or a list of indices."""
+        if isinstance(index, (int, np.integer)):
+            return self.demonstrations[int(index)]
+        return self._take(np.arange(len(self))[index])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.positions, dtype=dtype, copy=copy)
+
+    def plot(self) -> Figure:
+        """A picture: each dimension over time, and the path where it has two or three dimensions.
+
+        Of more than 50 movements, some are drawn; the title says how many.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Shown at once in a notebook; ``figure.savefig("movements.png")`` writes it to a file.
+        """
+        from kineme.primitives.rollout_figure import draw_rollout
+
+        return draw_rollout(self.times, self.positions, self.axis_names, self.labels)
+
+    def to_dataframe(self) -> Any:
+        """All samples in one long table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per sample, with the columns ``movement`` (its number), ``label`` (None without one), ``time`` [s]
+            and one per dimension, named as `axis_names`.
+
+        Raises
+        ------
+        DataError
+            The package pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise DataError("expected the package pandas for a data frame; pip install pandas") from error
+        n, n_samples, d = self.positions.shape
+        labels = np.full(n, None) if self.labels is None else self.labels
+        columns = {
+            "movement": np.repeat(np.arange(n), n_samples),
+            "label": np.repeat(labels, n_samples),
+            "time": self.times.ravel(),
+        }
+        flat = self.positions.reshape(-1, d)
+        return pd.DataFrame(columns | {name: flat[:, k] for k, name in enumerate(self.axis_names)})

@@ -1,0 +1,90 @@
+"""Generated movements in a picture."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure, SubFigure
+from numpy.typing import NDArray
+
+from kineme.output.figures import BLUE, GREEN, ORANGE, PURPLE, new_figure
+from kineme.output.text import drawable
+from kineme.validation import Array
+
+_MOST = 50  # movements in one picture; more would be a blot
+_ROWS = 8  # dimensions below each other, before a second column begins
+_COLORS = (BLUE, ORANGE, GREEN, PURPLE)
+
+
+def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: NDArray[Any] | None) -> Figure:
+    """Each dimension over time, and the path where it has two or three dimensions.
+
+    Parameters
+    ----------
+    times : ndarray of shape (n, T)
+    positions : ndarray of shape (n, T, d)
+    axis_names : list of d str
+    labels : ndarray of shape (n,) or None
+        Each label has its color, as far as there are colors.
+    """
+    n, _, d = positions.shape
+    drawn = np.arange(0, n, math.ceil(n / _MOST))
+    kinds = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
+    colors = [_COLORS[0 if labels is None else kinds.index(label) % len(_COLORS)] for label in _labels(labels, drawn)]
+    n_rows = min(d, _ROWS)
+    figure = new_figure(7.2, max(3.2, 1.0 + 0.95 * n_rows))
+    over_time: Figure | SubFigure = figure
+    if d in (2, 3):
+        left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
+        _draw_paths(left, positions[drawn], axis_names, colors)
+    alpha = 1.0 if len(drawn) < 10 else 0.5
+    columns = math.ceil(d / n_rows)
+    grid = over_time.subplots(n_rows, columns, sharex=True, squeeze=False).T.ravel()
+    for k, axes in enumerate(grid[:d]):
+        for i, color in zip(drawn, colors, strict=True):
+            axes.plot(times[i], positions[i, :, k], color=color, alpha=alpha)
+        axes.set_ylabel(axis_names[k])
+        axes.margins(x=0.01)
+    over_time.align_ylabels()
+    for axes in grid[d:]:
+        axes.set_visible(False)
+    for axes in (grid[n_rows - 1], grid[d - 1]):
+        axes.set_xlabel("time [s]")
+    if len(drawn) < n:
+        figure.suptitle(f"{len(drawn)} of {n:,} movements", fontsize=9)
+    if 1 < len(kinds) <= len(_COLORS):
+        _add_legend(figure, kinds)
+    return figure
+
+
+def _labels(labels: NDArray[Any] | None, drawn: NDArray[np.intp]) -> list[Any]:
+    return [None] * len(drawn) if labels is None else labels[drawn].tolist()
+
+
+def _draw_paths(figure: SubFigure, paths: Array, axis_names: list[str], colors: list[str]) -> None:
+    """The paths in the plane or in space: a circle where each starts, a star where it ends."""
+    flat = paths.shape[2] == 2
+    axes: Any = figure.subplots(subplot_kw=None if flat else {"projection": "3d"})
+    for path, color in zip(paths, colors, strict=True):
+        axes.plot(*path.T, color=color, alpha=1.0 if len(paths) < 10 else 0.5)
+        axes.plot(*path[:1].T, "o", color=color, markersize=4)
+        axes.plot(*path[-1:].T, "*", color=color, markersize=8)
+    names = dict(zip(("xlabel", "ylabel", "zlabel"), axis_names, strict=False))
+    axes.set(**names)
+    if flat:
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.08)
+    else:
+        axes.set_box_aspect(np.maximum(np.ptp(paths, axis=(0, 1)), 0.2 * np.ptp(paths, axis=(0, 1)).max()), zoom=0.8)
+        axes.locator_params(nbins=4)
+
+
+def _add_legend(figure: Figure, kinds: list[Any]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=color, label=drawable(str(kind))) for kind, color in zip(kinds, _COLORS, strict=False)
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
