@@ -1,4 +1,4 @@
-"""From trajectories to the feature vector of Eq. (9), as a scikit-learn transformer."""
+"""DMP features of movements, Eq. (9), as a scikit-learn transformer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class DMPFeatures(MovementFeatures[DMP]):
     n_samples : int, default 100
         Samples S of the shape-attractor and of f. Weights have ``dmp.n_basis`` instead.
     dtype : {"float64", "float32"}, default "float64"
-        Of the result; kernels compute in the type they are given.
+        Type of the result; kernels compute in the type of their input.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class DMPFeatures(MovementFeatures[DMP]):
     _kind: ClassVar[type] = DMP
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Check the parameters and remember the dimensions of the movements; nothing is learned from y."""
+        """Check the parameters and store the number of dimensions; y is ignored."""
         self.dmp_ = self._checked()
         self.n_dims_ = Demonstrations.of(X).n_dims
         return self

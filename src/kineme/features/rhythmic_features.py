@@ -1,4 +1,4 @@
-"""From rhythmic recordings to feature rows, as a scikit-learn transformer."""
+"""Features of rhythmic recordings, as a scikit-learn transformer."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
 class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
-    """Describe each recording by its rhythmic DMP: one cycle, whatever part of it came first, rows as in Eq. (9).
+    """Describe each recording by its rhythmic DMP: features of one cycle, wherever it started, rows as in Eq. (9).
 
     Parameters
     ----------
     feature : {"shape-attractor", "forcing", "weights"}, default "shape-attractor"
-        ``r f``, which depends on the amplitude; f or w, which do not. None of them depends on position and tempo.
+        ``r f``, which depends on the amplitude; f or w, which do not. None of them depends on translation and tempo.
     dmp : RhythmicDMP, default RhythmicDMP()
         How the recordings are learned. Its fields are searched as ``dmp__n_basis`` and so on.
     n_samples : int, default 100
         Samples S of a cycle. Weights have ``dmp.n_basis`` instead.
     dtype : {"float64", "float32"}, default "float64"
-        Of the result.
+        Type of the result.
 
     Attributes
     ----------
     dmp_ : RhythmicDMP
-        The specification in force. Unless `align_on` is given, it names the dimension with the largest first harmonic
-        in most training recordings: two dimensions that are nearly alike must not take turns.
+        The specification in force. Unless `align_on` is given, it is the dimension with the largest first harmonic in
+        most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
     n_dims_ : int
         Dimensions d of the training movements.
     """
@@ -38,7 +38,7 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     _kind: ClassVar[type] = RhythmicDMP
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Check the parameters and choose the dimension to align on; nothing is learned from y.
+        """Check the parameters and choose the dimension to align on; y is ignored.
 
         Raises
         ------

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import view
+from kineme.comparison.describe import feature_rows
 from kineme.errors import TrajectoryError
 from kineme.library.storage.specification import Specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -135,8 +135,8 @@ def _primitives(demos: Demonstrations, specification: Specification) -> list[tup
 
 
 def _features(demos: Demonstrations, specification: Specification) -> list[bytes]:
-    seen = view(demos, specification.representations, specification.normalization, specification.cutoff)
-    return _cut(np.concatenate(seen, axis=1, dtype=np.float32))
+    rows = feature_rows(demos, specification.comparison)
+    return _cut(np.concatenate(rows, axis=1, dtype=np.float32))
 
 
 def _cut(block: NDArray[np.floating]) -> list[bytes]:
