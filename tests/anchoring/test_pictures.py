@@ -9,13 +9,13 @@ from unlabeled_samples import draw_kinds
 
 import kineme
 import kineme.anchoring
-from kineme.anchoring.align import paths_of
 from kineme.anchoring.figures.drawing import flat, principal_axes
 from kineme.anchoring.figures.proposal import draw_proposal
 from kineme.anchoring.figures.proposal_sheet import draw_proposals
 from kineme.anchoring.figures.symbol_map import draw_map
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals.propose import propose
+from kineme.comparison.alignment import paths_of
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.output.figures import save_figure
 

@@ -1,4 +1,4 @@
-"""What every specification shares: a spring, a damper, and how strongly the fit is regularized."""
+"""Base class of the specifications: spring, damper, and ridge penalty of the fit."""
 
 from __future__ import annotations
 

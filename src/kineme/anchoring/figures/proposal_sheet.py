@@ -7,21 +7,21 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from kineme.anchoring.align import paths_of
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.figures.proposal import overlay, shown_paths
 from kineme.anchoring.proposals.proposals import Proposals, check_members
+from kineme.comparison.alignment import paths_of
+from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import GRAY, ORANGE, new_figure
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
 _CELL = 1.35  # inches
 _LEFT_OVER = 24  # of those left over, drawn at most
 
 
-def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None = None) -> Figure:
+def draw_proposals(movements: Any, proposals: Proposals, like: Compares | None = None) -> Figure:
     """One small drawing for each proposal, with its number, size and stability; last, what is left over.
 
     Number k is ``proposals[k - 1]``; members, medoid and start are drawn as by `draw_proposal`.

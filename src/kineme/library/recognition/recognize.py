@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.stored import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
 from kineme.library.recognition.members import Members, members_of
@@ -15,9 +16,9 @@ from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.answer import Answer, Neighbor, answers, is_one
+from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.two_stage_search import Shortlist, Stored
+from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
 #: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred classes take 6 s and, with support vectors, 105 ms.
@@ -33,20 +34,20 @@ class LibraryRecognizer:
     _version: int | None = None
     _index: Index | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: Recognizer | Shortlist | None = None
+    _model: Recognizer | TwoStageSearch | None = None
 
     def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
         demos = Demonstrations.of([X] if is_one(X) else X)
-        if isinstance(model, Shortlist):
+        if isinstance(model, TwoStageSearch):
             found = model.recognize(demos, error_rate)
         else:
-            found = answers(model, demos, error_rate)
+            found = model.recognize(demos, error_rate)
         found = self._named(found)
         return found[0] if is_one(X) else found
 
-    def model(self) -> Recognizer | Shortlist:
+    def model(self) -> Recognizer | TwoStageSearch:
         """The recognizer of the library as it is now: an ordinary one, or one in two stages."""
         version = self.store.version
         if self._model is None or version != self._version:
@@ -60,7 +61,7 @@ class LibraryRecognizer:
         demos = read.movements(self.store, members.ids)
         return self.store.specification.recognizer().fit(demos, members.labels)
 
-    def _large(self, members: Members) -> Shortlist:
+    def _large(self, members: Members) -> TwoStageSearch:
         self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
         self._ids = self._index.ids
         return two_stages(self.store, self._index, members)
@@ -77,24 +78,23 @@ class LibraryRecognizer:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
-def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
+def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
-    recognizer = sample_recognizer(store, members)
-    looks = store.specification.representations
-    kept = [looks.index(one) for one in recognizer.looks()]
+    comparison = sample_recognizer(store, members).comparison_
+    kept = [store.specification.representations.index(one) for one in comparison.representations]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
-    def views(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
+    def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
         blocks = np.split(read.features(store, index.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in kept)
 
-    stored = Stored(
+    stored = StoredReferences(
         tuple(index.bases[r] for r in kept),
         tuple(tuple(block[r] for r in kept) for block in index.blocks),
         index.rows(members.ids),
         members.first,
-        views,
+        features,
         lambda rows: read.movements(store, index.ids[rows]),
     )
-    recognizer.calibration_ = calibrate(store, members, recognizer, stored)
-    return Shortlist(recognizer, members.names, stored)
+    calibration = calibrate(store, members, comparison.similarity, stored)
+    return TwoStageSearch(comparison, calibration, members.names, stored)

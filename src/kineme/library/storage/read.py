@@ -165,7 +165,7 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
     found = np.empty((len(wanted), width), dtype=np.float32)
     for rows in _chunks(store, "feature", "movement", wanted):
         block = found[done : done + len(rows)]
-        block[:] = _joined("feature", rows, 1, np.float32, width)
+        block[:] = _concatenated("feature", rows, 1, np.float32, width)
         _check_finite("feature", rows, block)
         done += len(rows)
     return found if np.array_equal(wanted, ids) else found[order]
@@ -177,8 +177,8 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
     dmp, d = store.specification.dmp, store.n_dims or 0
     about = records(store, ids)
     rows = [row for chunk in _chunks(store, "primitive", "movement", wanted) for row in chunk]
-    boundary = _joined("primitive", rows, 1, np.float64, 4 * d)
-    weights = _joined("primitive", rows, 2, np.float32, d * dmp.n_basis)
+    boundary = _concatenated("primitive", rows, 1, np.float64, 4 * d)
+    weights = _concatenated("primitive", rows, 2, np.float32, d * dmp.n_basis)
     for block in (boundary, weights):
         _check_finite("primitive", rows, block)
     boundary, weights = boundary.reshape(-1, 4, d)[order], weights.reshape(-1, d, dmp.n_basis)[order]
@@ -195,7 +195,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
     )
 
 
-def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
+def _concatenated(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
     """The bytes of a column, (rows, width)."""
     size = np.dtype(kind).itemsize * width
     for row in rows:

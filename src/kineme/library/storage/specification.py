@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.library.storage.rows import parsed
 from kineme.movements.preparation.smooth import Smooth
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
 _MOST = 100_000  # dimensions
-
-#: The primitives of a library: a fit of the path itself, which replays what was shown.
-DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class Specification:
     mean: str = "arithmetic"
     classifier: str = "auto"
     weights: str | tuple[float, ...] = "auto"
-    dmp: DMP = DEFAULT_DMP
+    dmp: DMP = field(default_factory=DMP)
 
     @classmethod
     def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
@@ -57,7 +55,7 @@ class Specification:
         chosen["representations"] = DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
         if not isinstance(weights := chosen.get("weights", "auto"), str):
             chosen["weights"] = tuple(map(float, weights))
-        made = cls(**chosen, dmp=dmp or DEFAULT_DMP)
+        made = cls(**chosen, dmp=dmp or DMP())
         made.check()
         return made
 
@@ -65,6 +63,11 @@ class Specification:
     def normalization(self) -> Normalization:
         """What is taken out of place and size."""
         return Normalization(self.translation, self.scale)
+
+    @property
+    def comparison(self) -> ComparisonSpecification:
+        """How movements are described and compared."""
+        return ComparisonSpecification(self.representations, self.normalization, self.cutoff, self.max_angle, self.mean)
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
         """Numbers per movement in the rows of each representation."""
@@ -111,7 +114,7 @@ class Specification:
         self._check_choices()
 
     def _check_choices(self) -> None:
-        from kineme.comparison.similarity import LOG_MEANS
+        from kineme.comparison.averages import LOG_MEANS
         from kineme.recognition.classifiers import CLASSIFIERS
 
         check_choice("mean", self.mean, list(LOG_MEANS))

@@ -198,7 +198,7 @@ def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
     return key
 
 
-def join(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
+def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
     """Movements, which show no symbol, become members: pairs (movement, key of the symbol)."""
     first = next_key(change.connection, "member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.seen import Seen, see_rows
+from kineme.comparison.describe import Described, describe_rows
 from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
@@ -18,10 +18,10 @@ from kineme.movements.trajectories.labels import label_array
 _MOST = 3000  # movements of symbols that are compared, evenly many of each symbol
 
 
-def described(store: Store, ids: ArrayLike) -> Seen:
+def described(store: Store, ids: ArrayLike) -> Described:
     """Movements in the representations of the library, from their stored features."""
     rows = read.features(store, np.asarray(ids, dtype=np.int64))
-    return see_rows(rows, store.n_dims or 0, store.specification.recognizer())
+    return describe_rows(rows, store.n_dims or 0, store.specification.comparison)
 
 
 def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
+from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.validation import Array
+from kineme.validation import Array, describe
 
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
@@ -214,3 +215,27 @@ def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
             "pass labels= to Demonstrations.from_arrays or label= to each Trajectory"
         )
     return demonstrations.labels
+
+
+def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
+    """Labels `y`, or those of the demonstrations: one per movement, texts or numbers, none of them empty.
+
+    Raises
+    ------
+    TrajectoryError
+        No labels, another number of them, an empty or missing one; the message names the movement.
+    """
+    labels = require_labels(demos) if y is None else label_array(y, len(demos), demos.names)
+    for i, label in enumerate(labels.tolist()):
+        if isinstance(label, (list, tuple, dict)) or (isinstance(label, str) and not label.strip()):
+            raise TrajectoryError(
+                f"{describe(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
+                "name the action, or leave the movement out"
+            )
+    try:
+        np.sort(labels)
+    except TypeError as error:
+        raise TrajectoryError(
+            f"expected labels that are texts or numbers, as classes have an order, got {error}"
+        ) from None
+    return labels

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.validation import describe
 
+#: What names the action of a movement.
+Label = str | int | float
+
 _NUMBERS = (Number, np.bool_)
 _ADVICE = "name the action, or leave the movement out"
 
