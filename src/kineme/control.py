@@ -1,5 +1,14 @@
-"""Public names of `kineme.primitives.control`."""
+"""Public names of `kineme.primitives.control`, and the controllers of rhythms."""
 
-from kineme.primitives.control import Controller, ObstacleAvoidance, State, Status
+from kineme.primitives.control import Controller, ObstacleAvoidance, Options, State, Status
+from kineme.primitives.rhythmic.controller import RhythmicController, RhythmicState
 
-__all__ = ["Controller", "ObstacleAvoidance", "State", "Status"]
+__all__ = [
+    "Controller",
+    "ObstacleAvoidance",
+    "Options",
+    "RhythmicController",
+    "RhythmicState",
+    "State",
+    "Status",
+]

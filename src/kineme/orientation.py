@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
+from kineme.primitives.pose.pose_controller import PoseController, PoseState
 from kineme.primitives.pose.pose_dmp import PoseDMP
 from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.primitives.pose.pose_rollout import PoseRollout
@@ -13,7 +14,6 @@ from kineme.primitives.pose.tangent import from_tangent, to_tangent
 
 if _TYPE_CHECKING:
     from kineme.features.pose_features import PoseFeatures
-    from kineme.primitives.pose.pose_controller import PoseController, PoseState
 
 __all__ = [
     "PoseController",
@@ -43,8 +43,4 @@ def __getattr__(name: str) -> _Any:
         from kineme.features.pose_features import PoseFeatures
 
         return PoseFeatures
-    if name in {"PoseController", "PoseState"}:
-        from kineme.primitives.pose import pose_controller
-
-        return getattr(pose_controller, name)
     raise AttributeError(f"module 'kineme.orientation' has no attribute {name!r}; it has {', '.join(__all__)}")
