@@ -7,6 +7,7 @@
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
+# make reference  docs/reference.md, from the stubs that list the public names
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
@@ -14,7 +15,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures lock clean
+.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures reference lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -90,6 +91,9 @@ evaluate: .venv-rivals/ready
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
+
+reference: $(DEV)/ready
+	$(DEV)/bin/python docs/make_reference.py
 
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt

@@ -11,7 +11,7 @@ import numpy as np
 
 import kineme
 from bench.rows import Row
-from kineme.comparison import similarity
+from kineme.comparison import widths
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS as THREE
 from kineme.experiments.evaluation.conditions import TOGETHER
 from kineme.experiments.evaluation.splits import few_shot
@@ -70,7 +70,7 @@ def accuracy(options: dict[str, Any], changes: Any, splits: int) -> float:
     for index in range(splits):
         split = few_shot(demos.labels, 1, SEED, index)
         perturbed = changes.apply(demos, [SEED, index])
-        with patch.object(similarity, "_WIDTH", options.get("width", similarity._WIDTH)):
+        with patch.object(widths, "SHARE", options.get("width", widths.SHARE)):
             given = {name: value for name, value in options.items() if name != "width"}
             recognizer = kineme.Recognizer(**given).fit(perturbed[split.train])
         found.append(recognizer.score(perturbed[split.test], demos.labels[split.test]))

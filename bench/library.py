@@ -20,7 +20,8 @@ import kineme
 from bench.library_movements import ASKED, N_SAMPLES, SHOWN, copies, kinds
 from bench.movements import SEED, Array
 from bench.rows import Row, save, table
-from kineme.library.recognition.recognize import Serving
+from kineme.comparison.describe import describe
+from kineme.library.recognition.recognize import LibraryRecognizer
 
 _BATCH = 50_000  # movements in one call
 _PER_KIND = 200
@@ -102,16 +103,16 @@ def _serve(folder: Path, questions: Path) -> dict[str, Any]:
 
 def _exhaustive(library: Any, asked: Array) -> list[str]:
     """The symbol of the most similar of all movements, by the same averaged kernel."""
-    recognizer = Serving(library.store, exhaustive=0).model().recognizer
-    seen = recognizer.look_at(asked)
+    comparison = LibraryRecognizer(library.store, exhaustive=0).model().comparison
+    described = describe(asked, comparison)
     ids = library.ids()
     ends = np.cumsum(library.specification.widths(library.n_dims))[:-1]
-    kept = [library.specification.representations.index(one) for one in recognizer.looks()]
+    kept = [library.specification.representations.index(one) for one in comparison.representations]
     top, best = np.full(len(asked), -np.inf), np.zeros(len(asked), dtype=np.int64)
     for start in range(0, len(ids), 4096):
         blocks = np.split(library.features(ids[start : start + 4096]), ends, axis=1)
-        views = tuple(recognizer.procrustes_.prepare(blocks[r]) for r in kept)
-        logs = recognizer.similarity_.log_average(seen, views)
+        stored = comparison.prepared(tuple(blocks[r] for r in kept))
+        logs = comparison.similarity.log_average(described, stored)
         nearest = logs.max(axis=1)
         better = nearest > top
         top[better], best[better] = nearest[better], ids[start + logs.argmax(axis=1)[better]]

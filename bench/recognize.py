@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from bench.movements import SEED, Array
 from bench.peers import dtw_nearest
 from bench.rows import Row
 from bench.timing import medians
+from kineme.comparison.compared import Compared
 from kineme.movements.preparation.perturbations import Perturbation
 
 SHORTEST, LONGEST = 120, 200
@@ -33,7 +35,7 @@ def measure(quick: bool) -> list[Row]:
     demos = kineme.Demonstrations.from_arrays(arrays, labels, times)
     stored, asked = _paths(lasa[train]), _paths(demos[:n_peer])  # resampled beforehand: DTW pays for comparing alone
     recognizer = kineme.Recognizer().fit(lasa[train])
-    seen = recognizer.look_at(demos)
+    compared = Compared(recognizer.comparison_, recognizer.references_, recognizer.describe(demos))
     smoothed = kineme.preprocess(demos, [kineme.Smooth(10.0)])
     seconds = medians(
         {
@@ -41,9 +43,9 @@ def measure(quick: bool) -> list[Row]:
             "collect": lambda: kineme.Demonstrations.from_arrays(arrays, times=times),
             "fit": lambda: kineme.Recognizer().fit(lasa[train]),
             "smooth": lambda: kineme.preprocess(demos, [kineme.Smooth(10.0)]),
-            "look": lambda: recognizer.look_at(demos),
-            "look without smoothing": lambda: recognizer.__class__(cutoff=None).fit(lasa[train]).look_at(smoothed),
-            "compare": lambda: recognizer.classifier_.scores(recognizer, seen),
+            "look": lambda: recognizer.describe(demos),
+            "look without smoothing": lambda: recognizer.__class__(cutoff=None).fit(lasa[train]).describe(smoothed),
+            "compare": lambda: recognizer.classifier_.scores(replace(compared)),
             "DTW": lambda: dtw_nearest(asked, stored, N_POINTS // 10),
         },
         repeats,

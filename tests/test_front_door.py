@@ -2,31 +2,72 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import kineme
+from kineme._lazy import lazy_names, names_in
+
+STUBS = sorted(Path(kineme.__file__).parent.rglob("*.pyi"))
+MODULES = [
+    ".".join(["kineme", *path.relative_to(STUBS[0].parent).with_suffix("").parts]).removesuffix(".__init__")
+    for path in STUBS
+]
+NAMES = [(module, name) for module in MODULES for name in import_module(module).__all__]
 
 
-@pytest.mark.parametrize("name", kineme.__all__)
-def test_every_name_leads_somewhere_and_is_documented(name):
-    assert getattr(kineme, name).__doc__.strip()
+@pytest.mark.parametrize(("module", "name"), NAMES)
+def test_every_name_leads_somewhere(module, name):
+    assert getattr(import_module(module), name) is not None  # that it is documented: tests/test_reference.py
 
 
-def test_names_are_listed_once_and_each_has_a_home():
-    assert len(kineme.__all__) == len(set(kineme.__all__))
-    assert set(kineme.__all__) == set(kineme._HOME)
+@pytest.mark.parametrize("stub", STUBS, ids=MODULES)
+def test_names_are_read_as_a_type_checker_reads_them(stub):
+    tree = ast.parse(stub.read_text())
+    imported = [(one.asname, node.module, one.name) for node in tree.body if isinstance(node, ast.ImportFrom)
+                for one in node.names]  # fmt: skip
+    assert imported == [(public, *home) for public, home in names_in(stub.read_text()).items()]
 
 
-def test_dir_shows_the_names():
-    assert set(kineme.__all__) <= set(dir(kineme))
+@pytest.mark.parametrize("module", MODULES)
+def test_names_are_listed_once_and_hide_no_module(module):
+    module = import_module(module)
+    assert len(module.__all__) == len(set(module.__all__))
+    assert set(module.__all__) <= set(dir(module))
+    for name in module.__all__:
+        if getattr(module, "__path__", None) and not isinstance(getattr(module, name), ModuleType):
+            assert find_spec(f"{module.__name__}.{name}") is None, f"{name} is a module, too: which one comes first?"
+
+
+@pytest.mark.parametrize("chapter", [path.parent.name for path in sorted(STUBS[0].parent.glob("*/__init__.py"))])
+def test_chapters_are_attributes_before_anybody_imports_them(chapter):
+    code = f"import kineme; print(kineme.{chapter}.__name__)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"kineme.{chapter}"
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():
-    with pytest.raises(AttributeError, match=r"module 'kineme' has no attribute 'DPM'; it has .*DMP, .*DMPFeatures"):
+    with pytest.raises(
+        AttributeError, match=r"module 'kineme' has no attribute 'DPM' \(did you mean 'DMP'\?\); it has .*DMP, "
+    ):
         _ = kineme.DPM
+    with pytest.raises(AttributeError, match=r"module 'kineme.kernels' has no attribute 'rfb'; it has Kernel, RBF"):
+        _ = kineme.kernels.rfb
+    assert not hasattr(kineme, "__wrapped__")
+
+
+def test_a_former_name_warns_and_leads_to_the_name_of_today(monkeypatch):
+    load, listed, names = lazy_names("kineme.datasets", {"load_handwriting": "load_lasa"})
+    with pytest.warns(DeprecationWarning, match=r"kineme.datasets.load_handwriting is now called load_lasa"):
+        assert load("load_handwriting") is kineme.load_lasa
+    assert "load_handwriting" not in {*listed(), *names}
 
 
 def _loaded_by(statement):

@@ -1,14 +1,5 @@
-"""Public names of `kineme.primitives.control`, and the controllers of rhythms."""
+"""Live control of primitives: one step at a time, with a moving goal, obstacles and any tempo."""
 
-from kineme.primitives.control import Controller, ObstacleAvoidance, Options, State, Status
-from kineme.primitives.rhythmic.controller import RhythmicController, RhythmicState
+from kineme._lazy import lazy_names as _lazy_names
 
-__all__ = [
-    "Controller",
-    "ObstacleAvoidance",
-    "Options",
-    "RhythmicController",
-    "RhythmicState",
-    "State",
-    "Status",
-]
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

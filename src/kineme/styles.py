@@ -1,12 +1,5 @@
-"""Public names of `kineme.primitives.styles`."""
+"""Many demonstrations of one movement: average, spread and styles."""
 
-from kineme.primitives.styles import (
-    AveragePrimitive,
-    StyleEstimate,
-    StyleModel,
-    average,
-    average_by_label,
-    learn_styles,
-)
+from kineme._lazy import lazy_names as _lazy_names
 
-__all__ = ["AveragePrimitive", "StyleEstimate", "StyleModel", "average", "average_by_label", "learn_styles"]
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 from unlabeled_samples import draw_kinds
 
 import kineme
-from kineme.anchoring.align import maps_onto, moved, paths_of
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.prototypes import medoid_of, prototype
-from kineme.anchoring.similarities import similarities
+from kineme.comparison.alignment import maps_onto, moved, paths_of
 from kineme.comparison.describe import N_POINTS
+from kineme.comparison.similarity import similarities
 from kineme.recognition.recognizer import Recognizer
 
 quick = settings(max_examples=10, deadline=None, derandomize=True)

@@ -15,7 +15,7 @@ from kineme.anchoring.proposals import merge_split
 from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import Split, suggest_splits
 from kineme.anchoring.proposals.subsample import radii, spread_sample
-from kineme.anchoring.seen import see
+from kineme.comparison.describe import describe
 
 
 def _space(ab, ac, cb):
@@ -78,20 +78,20 @@ def test_half_way_to_a_moved_turned_and_larger_copy_is_half_of_each(share, make_
 def test_distances_of_symbols_go_on_growing():
     """``sqrt(mean_r d_r^2 / sigma_r^2)``, sigma_r the median distance in each representation."""
     demos = draw_kinds([1] * 6)
-    seen = see(demos)
-    squares = np.stack([seen.procrustes.squared_distances(one, one) for one in seen.views])
+    described = describe(demos)
+    squares = np.stack([described.procrustes.squared_distances(one, one) for one in described.blocks])
     pairs = ~np.eye(6, dtype=bool)
     sigmas = np.sqrt([np.median(one[pairs]) for one in squares])
     expected = np.sqrt(np.mean(squares / sigmas[:, None, None] ** 2, axis=0))
-    space = conceptual_space(list("abcdef"), seen)
+    space = conceptual_space(list("abcdef"), described)
     np.testing.assert_allclose(space.distances[pairs], expected[pairs], rtol=1e-4)
 
 
 def test_a_sample_leaves_out_no_rare_kind():
     """Four movements of 604, in a sample of 80: drawn evenly, they would be missed every other time."""
-    seen = see(draw_kinds([60] * 10 + [4], spread=0.02))
+    described = describe(draw_kinds([60] * 10 + [4], spread=0.02))
     for seed in range(8):
-        sample, _ = spread_sample(seen, 80, seed)
+        sample, _ = spread_sample(described, 80, seed)
         assert len(sample) == 80
         assert (sample >= 600).any(), seed
 
@@ -108,7 +108,7 @@ def test_of_numbers_of_kinds_as_stable_as_the_most_stable_the_best_fit_is_taken(
 
 @pytest.mark.parametrize(("stability", "n"), [(0.74, 0), (0.76, 1)])
 def test_a_symbol_is_split_into_parts_with_a_stability_of_three_quarters(stability, n, monkeypatch):
-    def in_two(name, seen, places, widths):
+    def in_two(name, described, places, widths):
         return Split(name, (places[:2], places[2:]), 0.1, stability)
 
     monkeypatch.setattr(merge_split, "_in_two", in_two)

@@ -9,13 +9,13 @@ from unlabeled_samples import draw_kinds
 
 import kineme
 import kineme.anchoring
-from kineme.anchoring.align import paths_of
 from kineme.anchoring.figures.drawing import flat, principal_axes
 from kineme.anchoring.figures.proposal import draw_proposal
 from kineme.anchoring.figures.proposal_sheet import draw_proposals
 from kineme.anchoring.figures.symbol_map import draw_map
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals.propose import propose
+from kineme.comparison.alignment import paths_of
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.output.figures import save_figure
 
@@ -55,7 +55,7 @@ def test_a_sheet_counts():
     demos = draw_kinds([5, 4, 6, 1], 2, 3, spread=0.03)
     proposals = propose(demos)
     titles = [axes.get_title() for axes in draw_proposals(demos, proposals).axes if axes.get_title()]
-    assert [title.partition(" ×")[0] for title in titles[:-1]] == ["0:  6", "1:  5", "2:  4"]
+    assert [title.partition(" ×")[0] for title in titles[:-1]] == ["1:  6", "2:  5", "3:  4"]
     assert titles[-1] == "left over: 1"
 
 

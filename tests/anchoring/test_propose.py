@@ -15,11 +15,9 @@ import kineme
 from kineme.anchoring.proposals.proposals import describe_clusters
 from kineme.anchoring.proposals.propose import propose
 from kineme.anchoring.proposals.subsample import assign
-from kineme.anchoring.seen import see, see_rows
-from kineme.anchoring.similarities import averaged, similarities
-from kineme.comparison.describe import view
-from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.describe import describe, describe_rows, feature_rows
+from kineme.comparison.similarity import averaged, similarities
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
 
@@ -123,15 +121,15 @@ def test_a_strange_movement_is_left_over():
     demos = draw_kinds([5, 6, 1, 7, 1], 2, 3, spread=0.03)
     proposals = propose(demos)
     assert proposals.left_over.tolist() == [11, 19]
-    assert repr(proposals) == "Proposals(3 kinds of 20 movements, 2 left over)"
+    assert repr(proposals) == "Proposals(3 clusters among 20 movements, 2 left over)"
     assert repr(proposals[0]).startswith("Proposal(7 movements, medoid 1")
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_stored_feature_rows_say_the_same(d):
     demos = draw_kinds([4, 5, 3], d, 0)
-    blocks = view(demos, DEFAULT_REPRESENTATIONS, Normalization(), 10.0)
-    rows = see_rows(np.concatenate(blocks, axis=1).astype(np.float32), d)
+    blocks = feature_rows(demos, ComparisonSpecification())
+    rows = describe_rows(np.concatenate(blocks, axis=1).astype(np.float32), d)
     np.testing.assert_array_equal(similarities(rows), similarities(demos))
     assert partition(propose(rows)) == partition(propose(demos))
 
@@ -151,13 +149,13 @@ def test_more_movements_than_are_compared_at_once(d):
 
 def test_what_was_not_sampled_joins_its_kind_or_none():
     demos = draw_kinds([12, 10, 1, 1], 2, 3, spread=0.03)
-    seen, sample = see(demos), np.r_[0:8, 12:19]
-    some = seen.take(sample)
+    described, sample = describe(demos), np.r_[0:8, 12:19]
+    some = described.take(sample)
     similarity = averaged(some)
     K = similarities(some, widths=similarity.widths)
     clusters = np.repeat([0, 1], [8, 7])
     found = describe_clusters(K, clusters, np.ones(2), similarity.widths)
-    joined = assign(seen, sample, K, found, similarity)
+    joined = assign(described, sample, K, found, similarity)
     assert joined.clusters.tolist() == [0] * 12 + [1] * 10 + [-1, -1]
     assert [len(one) for one in joined.proposals] == [12, 10]
     assert [one.nearest for one in joined.proposals] == [1, 0]
@@ -167,7 +165,7 @@ def test_the_averaged_kernel_is_the_recognizers():
     """At the recognizer's widths it is the recognizer's, entry by entry."""
     demos = draw_kinds([4, 4, 4], 2, 0)
     fitted = Recognizer().fit(demos)
-    ours = similarities(see(demos), widths=fitted.widths_)
+    ours = similarities(describe(demos), widths=fitted.widths_)
     np.testing.assert_allclose(ours, np.exp(fitted.log_similarity(fitted.demonstrations_)), atol=1e-5)
 
 
@@ -202,6 +200,6 @@ def test_movements_that_cannot_be_told_apart():
     with pytest.raises(kineme.SpecificationError, match=r"expected widths to be 3 numbers above 0.* got \[1.0, -1.0\]"):
         similarities(demos, widths=[1.0, -1.0])
     with pytest.raises(kineme.TrajectoryError, match=r"expected feature rows of shape \(n, 600\).* got shape \(8, 5\)"):
-        see_rows(np.zeros((8, 5)), 2)
+        describe_rows(np.zeros((8, 5)), 2)
     with pytest.raises(IndexError, match="one of 2 proposals, got 2"):
         propose(demos)[2]

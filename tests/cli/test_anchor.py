@@ -31,16 +31,16 @@ def test_without_a_choice_it_only_lists(folder, tmp_path):
     assert sorted(len(one["movements"]) for one in data["proposals"]) == [7] * 4
     assert (data["left_over"], data["accepted"], data["rejected"]) == ([], {}, [])
     drawn = sorted(path.name for path in (tmp_path / "pictures").iterdir())
-    assert drawn == ["all.png", "kind-0.png", "kind-1.png", "kind-2.png", "kind-3.png"]
+    assert drawn == ["all.png", *(f"proposal-{k}.png" for k in (1, 2, 3, 4))]
     assert [os.path.basename(path) for path in data["pictures"]] == drawn
     assert len(answer("library", "history", "-l", folder)) == 1
 
 
 def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
-    (tmp_path / "names.json").write_text('{"0": "first/../kind", "2": "third"}')
+    (tmp_path / "names.json").write_text('{"1": "first/../kind", "3": "third"}')
     options = ("--accept", "all", "--names", tmp_path / "names.json", "--pictures", tmp_path / "p")
     data = answer("anchor", "-l", folder, *options, by=start)
-    assert sorted(data["accepted"]) == ["first/../kind", "kind 1", "kind 2", "third"]
+    assert sorted(data["accepted"]) == ["cluster 2", "cluster 4", "first/../kind", "third"]
     listed = answer("library", "list", "-l", folder)
     assert listed["unlabeled"] == 0
     truth = {i + 1: label for i, label in enumerate(kineme.load_lasa(KINDS).labels.tolist())}
@@ -51,12 +51,12 @@ def test_accepted_proposals_become_symbols_with_a_prototype(folder, tmp_path):
 
 
 def test_what_is_rejected_is_not_proposed_again(folder, tmp_path):
-    first = answer("anchor", "-l", folder, "--reject", "1", "--pictures", tmp_path / "p")
+    first = answer("anchor", "-l", folder, "--reject", "2", "--pictures", tmp_path / "p")
     gone = first["proposals"][1]["movements"]
     again = answer("anchor", "-l", folder, "--pictures", tmp_path / "p")
     assert len(again["proposals"]) == 3
     assert set(gone) <= set(again["left_over"])
-    assert not (tmp_path / "p" / "kind-3.png").exists()  # a picture of a number that there is no more
+    assert not (tmp_path / "p" / "proposal-4.png").exists()  # a picture of a number that there is no more
 
 
 def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
@@ -79,16 +79,19 @@ def test_new_movements_join_what_they_are_recognized_as(folder, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
-        (["--accept", "9"], 2, "there are 4 proposals, counted from 0, got 9"),
+        (["--accept", "9"], 2, "there are 4 proposals, counted from 1, got 9"),
+        (["--reject", "0"], 2, "there are 4 proposals, counted from 1, got 0"),
         (["--accept", "x"], 2, "expected numbers of proposals separated by commas, or all, got 'x'"),
-        (["--accept", "0,1", "--reject", "1"], 2, "expected each proposal accepted or rejected, got both for 1"),
+        (["--accept", "2,1", "--reject", "1"], 2, "expected each proposal accepted or rejected, got both for 1"),
         (["--accept", "all", "--names", "worse.json"], 1, "expected a name without the character U+0000"),
-        (["--accept", "0", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
+        (["--accept", "all", "--names", "old.json"], 1, "proposals are counted from 1, got 0"),
+        (["--accept", "1", "--names", "bad.json"], 1, "expected bad.json to hold names by the number"),
         (["--clusters", "3", "--method", "hdbscan"], 1, "expected no n_clusters with method='hdbscan'"),
     ],
 )
 def test_wrong_choices_change_nothing(folder, tmp_path, arguments, status, message):
     (tmp_path / "bad.json").write_text("[1, 2]")
+    (tmp_path / "old.json").write_text('{"0": "wave", "1": "nod"}')
     (tmp_path / "worse.json").write_text('{"0": "wave", "1": "a\\u0000"}')
     done = run("anchor", "-l", folder, *arguments, cwd=tmp_path)
     assert done.returncode == status
@@ -135,7 +138,7 @@ def test_a_person_names_splits_rejects_and_quits(folder, tmp_path):
     person = Terminal("anchor", "-l", folder, "--clusters", 2, "--pictures", "pictures", cwd=tmp_path)
     shown = person.until("name:")
     assert "2 proposals" in shown
-    assert "kind-0.png" in shown
+    assert "proposal-1.png" in shown
     assert "/reject" in person.answer("/help", "name:")
     assert "CShape" in person.answer("/members", "name:") + person.answer("", "name:") + person.answer(
         "/members", "name:"
@@ -149,8 +152,8 @@ def test_a_person_names_splits_rejects_and_quits(folder, tmp_path):
     first = person.until("name:")
     assert "movements" in first
     parts = person.answer("/split", "name:")
-    assert "0a:" in parts
-    assert "0b:" in person.answer("wave 'em; rm -rf /", "0b:")
+    assert "1a:" in parts
+    assert "1b:" in person.answer("wave 'em; rm -rf /", "1b:")
     person.answer("wave 'em; rm -rf /", "join")  # the same name again: asked whether to join
     person.answer("n", "name:")
     person.answer("/name /etc/passwd", "name:")

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from kineme.output.atomic import name_beside, remove_leftovers, replaced, write_atomically
+from kineme.output.atomic import name_beside, remove_leftovers, whole_file, write_atomically
 
 KILLED = """
 import os, sys
 from pathlib import Path
-from kineme.output.atomic import replaced
-with replaced(Path(sys.argv[1])) as beside:
+from kineme.output.atomic import whole_file
+with whole_file(Path(sys.argv[1])) as beside:
     beside.write_bytes(b"half")
     os.kill(os.getpid(), 9)
 """
@@ -93,9 +93,9 @@ def test_files_of_other_users_stay(tmp_path, monkeypatch):
 def test_writers_of_one_process_do_not_share_a_name(tmp_path):
     path = tmp_path / "x"
     assert len({name_beside(path) for _ in range(100)}) == 100
-    with replaced(path) as one:
+    with whole_file(path) as one:
         one.write_bytes(b"one")
-        with replaced(path) as two:
+        with whole_file(path) as two:
             two.write_bytes(b"two")
         assert path.read_bytes() == b"two"
     assert path.read_bytes() == b"one"

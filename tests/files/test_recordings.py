@@ -51,6 +51,18 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path, ending):
     np.testing.assert_array_equal(one.positions, PATH / 3)
 
 
+def test_whatever_holds_one_movement_is_written(tmp_path):
+    movement = kineme.Trajectory(TIMES, PATH)
+    rollout = kineme.DMP().learn(movement).rollout(n_samples=50)
+    for held in (movement, [movement], kineme.Demonstrations([movement])):
+        np.testing.assert_array_equal(read_recording(write_movement(str(tmp_path / "x.csv"), held)).positions, PATH)
+    text = write_movement(tmp_path / "x.csv", rollout).read_text()
+    assert text.splitlines()[0] == "time,x,y,v_x,v_y,a_x,a_y"
+    np.testing.assert_array_equal(read_recording(tmp_path / "x.csv").positions, rollout.positions[0])
+    with pytest.raises(kineme.TrajectoryError, match="expected one recording, got 2 movements"):
+        write_movement(tmp_path / "x.csv", [movement, movement])
+
+
 def test_columns_are_named(tmp_path):
     columns = {"times": TIMES, "positions": PATH, "velocities": PATH, "accelerations": PATH}
     text = write_movement(tmp_path / "x.csv", columns).read_text()

@@ -13,14 +13,15 @@ from library_samples import draw_movements
 
 from kineme import ActionLibrary
 from kineme.library.recognition import calibration_cache, code_cache
-from kineme.library.recognition.recognize import Serving, members_of
+from kineme.library.recognition.members import members_of
+from kineme.library.recognition.recognize import LibraryRecognizer
 
 CODES, CALIBRATION = code_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
 
 
 def _answers(library):
-    found = Serving(library.store, exhaustive=0).recognize(library.movements())
+    found = LibraryRecognizer(library.store, exhaustive=0).recognize(library.movements())
     return [(a.label, a.ranked, a.confidence, dict(a.p_values), [n.index for n in a.nearest]) for a in found]
 
 

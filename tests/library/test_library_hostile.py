@@ -15,8 +15,9 @@ from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, ma
 from library_samples import contents
 
 from kineme import ActionLibrary, DataError, KinemeError
-from kineme.library.storage import guard
-from kineme.library.storage.connection import FILE, connect
+from kineme.library.storage import defense
+from kineme.library.storage.connection import connect
+from kineme.library.storage.folder import FILE
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +201,7 @@ def test_pages_that_lead_to_each_other_do_not_hang(export, tmp_path, monkeypatch
     make_endless(export)
     start = time.monotonic()
     _is_refused(export, tmp_path, r"damaged bytes")
-    monkeypatch.setattr(guard, "_SECONDS", 0.2)
+    monkeypatch.setattr(defense, "_SECONDS", 0.2)
     with ActionLibrary(_opened(export, tmp_path), read_only=True) as library:
         assert any("interrupted" in str(one) for one in library.verify())
     assert time.monotonic() - start < 30
@@ -214,8 +215,8 @@ def test_what_a_file_defines_is_never_trusted(victim, tmp_path, mode):
         assert connection.execute("PRAGMA trusted_schema").fetchone() == (0,)
         assert connection.execute("PRAGMA cell_size_check").fetchone() == (1,)
         if hasattr(connection, "getconfig"):  # from Python 3.12 on
-            assert not any(connection.getconfig(getattr(sqlite3, name)) for name in guard._OFF)
-        guard.defend_foreign(connection, path)
+            assert not any(connection.getconfig(getattr(sqlite3, name)) for name in defense._OFF)
+        defense.defend_foreign(connection, path)
         assert connection.execute("PRAGMA query_only").fetchone() == (1,)
         assert connection.getlimit(sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH) == 0
         assert connection.getlimit(sqlite3.SQLITE_LIMIT_LENGTH) == max(1 << 20, path.stat().st_size)

@@ -12,7 +12,7 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Demonstrations, SpecificationError, Trajectory, TrajectoryError
-from kineme.comparison.describe import view
+from kineme.comparison.describe import feature_rows
 from kineme.library.learning import learn as learning
 from kineme.library.storage.source import Source
 
@@ -60,7 +60,7 @@ def test_features_are_what_a_recognizer_sees(library, ragged):
     demos = draw_movements(20, ragged=ragged)
     library.learn(demos)
     how = library.specification
-    expected = np.concatenate(view(demos, how.representations, how.normalization, how.cutoff), axis=1)
+    expected = np.concatenate(feature_rows(demos, how.comparison), axis=1)
     assert library.features().dtype == np.float32
     np.testing.assert_allclose(library.features(), expected, rtol=1e-6, atol=1e-6)
     np.testing.assert_array_equal(library.features([4, 2]), library.features()[[3, 1]])
@@ -86,7 +86,7 @@ def test_a_short_movement_does_not_change_how_others_are_seen(library):
     short = np.array([[0.0, 0], [1, 0], [1, 1], [0, 2]])
     library.learn([*noisy, short])
     how = library.specification
-    expected = np.concatenate(view(noisy, how.representations, how.normalization, how.cutoff), axis=1)
+    expected = np.concatenate(feature_rows(noisy, how.comparison), axis=1)
     np.testing.assert_allclose(library.features()[:3], expected, rtol=1e-5, atol=1e-5)
 
 

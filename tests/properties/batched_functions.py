@@ -34,9 +34,14 @@ from kineme import (
     preprocess,
     styles,
 )
-from kineme.comparison.describe import view
+from kineme.comparison.alignment import maps_onto, paths_of
+from kineme.comparison.alignment import moved as laid_onto
+from kineme.comparison.bounds import fit_bases, reduce_features
+from kineme.comparison.describe import describe_rows, feature_rows
 from kineme.comparison.normalization import SCALES, Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.similarity import compare
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.features.rows import FEATURES
@@ -206,7 +211,7 @@ def library() -> ActionLibrary:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     made = ActionLibrary(folder, create=True)
     known = recognizer()
-    made.learn(known.demonstrations_, labels=known.labels_.tolist())
+    made.learn(known.demonstrations_, labels=known.references_.labels.tolist())
     return made
 
 
@@ -244,10 +249,39 @@ def described(scale: str, translation: bool, cutoff: float | None) -> Batched:
                 np.split(demos.positions / unit, demos.offsets[1:-1]),
                 times=np.split(demos.times, demos.offsets[1:-1]),
             )
-        rows = view(demos, DEFAULT_REPRESENTATIONS, Normalization(translation, scale), cutoff)
+        specification = ComparisonSpecification(normalization=Normalization(translation, scale), cutoff=cutoff)
+        rows = feature_rows(demos, specification)
         return each(len(demos), **{one.name: row for one, row in zip(DEFAULT_REPRESENTATIONS, rows, strict=True)})
 
-    return Batched(f"view {scale} {translation} {cutoff}", call, 1e-8)
+    return Batched(f"feature_rows {scale} {translation} {cutoff}", call, 1e-8)
+
+
+def compared(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Described in several ways, and compared with what the recognizer stores."""
+    comparison, references = recognizer().comparison_, recognizer().references_
+    blocks = feature_rows(demos, comparison.specification)
+    stored = describe_rows(np.concatenate(blocks, axis=1), demos.n_dims, comparison)
+    reduced = reduce_features(fit_bases((np.eye(200),) * len(blocks), stored.n_dims), blocks, stored.n_dims)
+    return each(
+        len(demos),
+        stored=compare(comparison.similarity, stored, references.described),
+        given=compare(comparison.similarity, comparison.prepared(blocks), references.described),
+        reduced=np.concatenate([one.values for one in reduced], axis=1),
+    )
+
+
+def aligned(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Laid onto one movement, as paths and as primitives."""
+    paths, onto = paths_of(demos), paths_of(recognizer().demonstrations_[:1])[0]
+    maps = maps_onto(paths, onto)
+    laid = laid_onto(DMP(n_basis=20, fit="trajectory").learn(demos), maps)
+    return each(
+        len(demos),
+        matrices=maps.matrices * extents(demos)[:, None, None],
+        paths=maps.move(paths),
+        weights=laid.scaled_weights / laid.dmp.K,
+        goals=laid.goals,
+    )
 
 
 def gram_row(name: str, kernel: Any, dtype: str) -> Batched:
@@ -433,6 +467,8 @@ TABLE = [
         for scale in SCALES
         for translation, cutoff in ((True, 10.0), (False, None))
     ),
+    Batched("describe and compare", compared, 2e-5),
+    Batched("maps_onto", aligned, 1e-7),
     Batched("Recognizer", recognized, 2e-5),
     Batched("Recognizer.recognize", answers, 2e-5),
     Batched("Recognizer.predict_partial", partly_seen, 0.0, alone=6),

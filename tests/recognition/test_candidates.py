@@ -1,4 +1,4 @@
-"""Codes: bounds that hold, whatever the movements, the average and the rotation."""
+"""Reduced features: bounds that hold, whatever the movements, the average and the rotation."""
 
 from __future__ import annotations
 
@@ -6,43 +6,43 @@ import numpy as np
 import pytest
 from movement_samples import draw_shapes
 
-from kineme.comparison.bounds import encode, fit_bases, log_bounds
-from kineme.comparison.describe import view
-from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
-from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity
+from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.bounds import fit_bases, log_bounds, reduce_features
+from kineme.comparison.describe import feature_rows, prepare
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.procrustes import Procrustes
 
 ANGLES = {1: (0.0,), 2: (0.0, 0.4, np.pi / 3, 2.0, np.pi), 3: (0.0, 0.4, np.pi / 3, np.pi), 4: (0.0,)}
 
 
-def _views(demos):
-    rows = view(demos, DEFAULT_REPRESENTATIONS, Normalization(), 10.0)
+def _rows(demos):
+    rows = feature_rows(demos, ComparisonSpecification())
     return tuple(block.astype(np.float32) for block in rows)
 
 
 def _exact(similarity, A, B):
-    prepare = similarity.procrustes.prepare
-    return similarity.log_average(tuple(map(prepare, A)), tuple(map(prepare, B)))
+    how = ComparisonSpecification()
+    return similarity.log_average(*(prepare(rows, how, similarity.procrustes) for rows in (A, B)))
 
 
 @pytest.mark.parametrize("mean", LOG_MEANS)
 @pytest.mark.parametrize(("d", "angle"), [(d, angle) for d, angles in ANGLES.items() for angle in angles])
-@pytest.mark.parametrize("n_codes", [1, 3, 12, 100])
-def test_no_movement_is_more_alike_than_its_codes_allow(d, angle, mean, n_codes):
-    asked, stored = _views(draw_shapes([2] * 6, d, seed=1)), _views(draw_shapes([3] * 20, d, seed=2))
+@pytest.mark.parametrize("n_reduced", [1, 3, 12, 100])
+def test_no_movement_is_more_alike_than_its_reduced_features_allow(d, angle, mean, n_reduced):
+    asked, stored = _rows(draw_shapes([2] * 6, d, seed=1)), _rows(draw_shapes([3] * 20, d, seed=2))
     similarity = AveragedSimilarity(Procrustes(d, angle), np.array([0.5, 2.0, 2.2]), mean)
-    bases = fit_bases(stored, d, n_codes)
-    bounds = log_bounds(similarity, encode(bases, asked, d), encode(bases, stored, d))
+    bases = fit_bases(stored, d, n_reduced)
+    bounds = log_bounds(similarity, reduce_features(bases, asked, d), reduce_features(bases, stored, d))
     exact = _exact(similarity, asked, stored)
     assert bounds.shape == exact.shape
     assert (bounds >= exact - 1e-6).all()
 
 
 @pytest.mark.parametrize(("d", "angle"), [(1, 0.0), (2, 0.4), (2, np.pi / 3), (2, np.pi), (3, np.pi), (4, 0.0)])
-def test_codes_that_leave_nothing_out_say_the_similarity_itself(d, angle):
-    asked, stored = _views(draw_shapes([2] * 6, d, seed=1)), _views(draw_shapes([3] * 20, d, seed=1, spread=0.2))
+def test_reduced_features_that_leave_nothing_out_give_the_similarity_itself(d, angle):
+    asked, stored = _rows(draw_shapes([2] * 6, d, seed=1)), _rows(draw_shapes([3] * 20, d, seed=1, spread=0.2))
     similarity = AveragedSimilarity(Procrustes(d, angle), np.array([5.0, 20.0, 22.0]))
     bases = fit_bases(stored, d, 100)
-    bounds = log_bounds(similarity, encode(bases, asked, d), encode(bases, stored, d))
+    bounds = log_bounds(similarity, reduce_features(bases, asked, d), reduce_features(bases, stored, d))
     np.testing.assert_allclose(bounds, _exact(similarity, asked, stored), atol=2e-3)

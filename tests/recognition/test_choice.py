@@ -10,9 +10,11 @@ from movement_samples import draw_shapes
 from sklearn.base import clone
 
 from kineme import Recognizer
+from kineme.comparison.describe import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.errors import SpecificationError
+from kineme.kernels.procrustes import Prepared, Procrustes
 
 
 def _timed(n, seed):
@@ -43,9 +45,13 @@ def test_the_weights_are_those_of_largest_centered_alignment():
     """Against a search over all weights on a grid of twentieths."""
     demos = draw_shapes([9] * 3, seed=4, spread=1.2)
     recognizer = Recognizer(DEFAULT_REPRESENTATIONS, weights="equal").fit(demos)
-    weights = aligned_weights(recognizer.similarity_, recognizer.views_, recognizer.labels_)
-    kernels = np.exp(recognizer.similarity_.logs(recognizer.views_, recognizer.views_))
-    same = (recognizer.labels_[:, None] == recognizer.labels_[None]).astype(float)
+    weights = aligned_weights(
+        recognizer.comparison_.similarity, recognizer.references_.described, recognizer.references_.labels
+    )
+    kernels = np.exp(
+        recognizer.comparison_.similarity.logs(recognizer.references_.described, recognizer.references_.described)
+    )
+    same = (recognizer.references_.labels[:, None] == recognizer.references_.labels[None]).astype(float)
 
     def centered(gram):
         off = ~np.eye(len(gram), dtype=bool)
@@ -73,9 +79,9 @@ def test_many_choose_among_six_and_keep_what_speaks():
     assert set(recognizer.representations_) <= set(CANDIDATES)
     assert (recognizer.weights_ > 0).all()
     assert recognizer.weights_.sum() == pytest.approx(1.0)
-    assert len(recognizer.views_) == len(recognizer.widths_) == len(recognizer.representations_)
+    assert len(recognizer.references_.described.blocks) == len(recognizer.widths_) == len(recognizer.representations_)
     answer = recognizer.recognize(recognizer.demonstrations_[0])
-    assert set(answer.responsibilities) == {one.name for one in recognizer.looks()}
+    assert set(answer.responsibilities) == {one.name for one in recognizer.representations_}
     assert sum(answer.responsibilities.values()) == pytest.approx(1.0)
 
 
@@ -83,7 +89,7 @@ def test_given_weights_are_those_of_the_weighted_mean():
     demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
     equal = Recognizer().fit(demos)
     given = Recognizer(weights=(2.0, 1.0, 1.0)).fit(demos)
-    each = np.exp(equal.similarity_.logs(equal.look_at(fresh), equal.views_))
+    each = np.exp(equal.comparison_.similarity.logs(equal.describe(fresh), equal.references_.described))
     expected = np.log(np.tensordot([0.5, 0.25, 0.25], each, 1))
     np.testing.assert_allclose(given.log_similarity(fresh), expected, rtol=1e-4, atol=1e-4)  # single precision
     one = Recognizer(weights=(0.0, 3.0, 0.0)).fit(demos)
@@ -94,14 +100,11 @@ def test_given_weights_are_those_of_the_weighted_mean():
 def test_kernels_that_know_nothing_stay_equal():
     class Blind:
         def logs(self, A, B):
-            return np.zeros((2, len(A[0]), len(B[0])))
+            return np.zeros((2, len(A), len(B)))
 
-    class Rows(list):
-        def take(self, chosen):
-            return Rows(chosen)
-
-    rows = Rows(range(20))
-    np.testing.assert_array_equal(aligned_weights(Blind(), (rows, rows), np.arange(20) % 2), [0.5, 0.5])
+    rows = Prepared(np.zeros((20, 1)), np.zeros(20))
+    described = Described((rows, rows), Procrustes(1, 0.0))
+    np.testing.assert_array_equal(aligned_weights(Blind(), described, np.arange(20) % 2), [0.5, 0.5])
 
 
 @pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0, 0.0, 0.0), (1.0, -1.0, 1.0), (1.0, np.nan, 1.0)])

@@ -12,9 +12,15 @@ from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.early.early import cut, earliness, partial_shares
-from kineme.recognition.early.hypotheses import Early
+from kineme.recognition.early.early import cut, earliness
+from kineme.recognition.early.early import partial_shares as shares_of
+from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
+
+
+def partial_shares(recognizer, movements):
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    return shares_of(recognizer.comparison_, stored, movements)
 
 
 def _spirals(n_dims, per_class=4, n_classes=4, seed=0):

@@ -12,6 +12,7 @@ from sklearn.metrics import roc_auc_score
 
 import kineme
 from kineme import Recognizer, SpecificationError
+from kineme.comparison.compared import nearest as nearest_of_each
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
 
@@ -71,7 +72,7 @@ def test_p_values_are_shares_that_fall_with_strangeness(counts, seed):
     assert p.shape == (len(fresh), len(counts))
     assert (p >= 0).all()
     assert (p <= 1).all()
-    nearest = recognizer._nearest(fresh)
+    nearest = recognizer._score(fresh, nearest_of_each)[0]
     for c in range(len(counts)):
         order = np.argsort(nearest[:, c])
         assert (np.diff(p[order, c]) >= 0).all()
@@ -105,14 +106,14 @@ def test_strangers_far_away_keep_their_order():
 def test_each_of_unequal_classes_is_calibrated_at_its_own_size():
     """A class shown once is not held to the nearness that forty demonstrations give each other."""
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([1, 40], seed=2))
-    scales = calibrate(recognizer).scales
+    scales = calibrate(recognizer.comparison_.similarity, recognizer.references_).scales
     assert scales[0] > 1.2 * scales[1]
 
 
 def test_a_demonstration_has_no_say_in_its_own_scale():
     """Two of each class: were it in, no score could exceed (2 + 4) / 2 of its mean."""
-    calibration = calibrate(Recognizer().fit(draw_shapes([2] * 12, seed=5)))
-    left = recognizer_distances(Recognizer().fit(draw_shapes([2] * 12, seed=5)))
+    recognizer = Recognizer().fit(draw_shapes([2] * 12, seed=5))
+    calibration, left = recognizer.calibration(), recognizer_distances(recognizer)
     np.testing.assert_allclose(calibration.pooled[0], left / left.mean(), rtol=3e-5)  # rows are single precision
 
 

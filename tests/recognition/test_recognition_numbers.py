@@ -10,14 +10,15 @@ from movement_samples import draw_shapes
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
+from kineme.comparison.describe import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.weights import CANDIDATES, aligned_weights
-from kineme.kernels.procrustes import Prepared
+from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition.classifiers import Nearest, SupportVectors, choose
+from kineme.recognition.classifiers import choose
 from kineme.recognition.conformal import Calibration, calibrate, typical_scale
 from kineme.recognition.early.decision import Decision
-from kineme.recognition.early.hypotheses import Early, known_hypotheses
+from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import beginnings, smooth_paths
 from kineme.recognition.spotting import _recognized
 
@@ -29,7 +30,11 @@ def test_of_four_demonstrations_the_own_scale_counts_half():
     np.fill_diagonal(logs, -np.inf)
     own = np.array([logs[i, i // 4 * 4 : i // 4 * 4 + 4].max() for i in range(24)])
     means = np.sqrt(-2.0 * own).reshape(6, 4).mean(axis=1)
-    np.testing.assert_allclose(calibrate(recognizer).scales, 0.5 * means + 0.5 * means.mean(), rtol=1e-3)
+    np.testing.assert_allclose(
+        calibrate(recognizer.comparison_.similarity, recognizer.references_).scales,
+        0.5 * means + 0.5 * means.mean(),
+        rtol=1e-3,
+    )
 
 
 def test_what_is_not_calibrated_is_unknown_beyond_six_tenths_of_the_way_to_another_class():
@@ -48,7 +53,9 @@ def test_copies_of_one_movement_have_a_scale(monkeypatch, compiled):
     demos = draw_shapes([1] * 3, seed=3)
     copies = demos[[0, 0, 1, 1, 2, 2]]
     recognizer = Recognizer(classifier="nearest", weights="equal").fit(copies, list("aabbcc"))
-    np.testing.assert_allclose(calibrate(recognizer).scales, 5e-3, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        calibrate(recognizer.comparison_.similarity, recognizer.references_).scales, 5e-3, rtol=0, atol=1e-15
+    )
     monkeypatch.setenv("KINEME_COMPILED", compiled)
     assert (recognizer.p_values(copies)[range(6), [0, 0, 1, 1, 2, 2]] > 0.05).all()
     near = [one.positions + 0.05 * np.sin(4 * one.times / one.duration)[:, None] for one in copies]
@@ -57,8 +64,8 @@ def test_copies_of_one_movement_have_a_scale(monkeypatch, compiled):
 
 def test_a_typical_impostor_counts_exp_of_minus_four():
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([3] * 6, seed=1))
-    logs = recognizer.similarity_.logs(recognizer.views_, recognizer.views_)
-    logs[:, recognizer.labels_[:, None] == recognizer.labels_] = -np.inf
+    logs = recognizer.comparison_.similarity.logs(recognizer.references_.described, recognizer.references_.described)
+    logs[:, recognizer.references_.labels[:, None] == recognizer.references_.labels] = -np.inf
     np.testing.assert_allclose(np.median(logs.max(axis=2), axis=1), -4.08, atol=0.05)
 
 
@@ -79,7 +86,11 @@ def test_shares_that_say_less_than_a_fiftieth_are_left_out_and_larger_ones_kept(
     shares = []
     for seed in range(6):
         recognizer = Recognizer(CANDIDATES, weights="equal").fit(draw_shapes([8] * 4, seed=seed, spread=0.8))
-        shares.append(aligned_weights(recognizer.similarity_, recognizer.views_, recognizer.labels_))
+        shares.append(
+            aligned_weights(
+                recognizer.comparison_.similarity, recognizer.references_.described, recognizer.references_.labels
+            )
+        )
     nonzero = np.concatenate(shares)[np.concatenate(shares) > 0]
     assert 0.02 <= nonzero.min() < 0.05
 
@@ -101,7 +112,8 @@ class _Known:
 def test_a_hundredth_is_left_out():
     labels = np.repeat(["a", "b"], 10)
     rows = Prepared(np.zeros((20, 1)), np.zeros(20))
-    np.testing.assert_array_equal(aligned_weights(_Known(labels), (rows, rows), labels), [1.0, 0.0])
+    described = Described((rows, rows), Procrustes(1, 0.0))
+    np.testing.assert_array_equal(aligned_weights(_Known(labels), described, labels), [1.0, 0.0])
 
 
 def test_three_percent_of_noise_are_smoothed_away_and_shapes_are_not():
@@ -111,12 +123,16 @@ def test_three_percent_of_noise_are_smoothed_away_and_shapes_are_not():
     assert Recognizer().fit(noisy[::7]).score(noisy, demos.labels) >= 0.975
 
 
+def _records(recognizer):
+    return recognizer.comparison_, recognizer.references_, recognizer.calibration()
+
+
 def _stretched(factor):
     """A demonstration done slower, as one piece of a recording."""
     demos = draw_shapes([1, 1, 1])
     demos = Demonstrations([Trajectory(np.linspace(0, 2, 80), x.positions, x.label) for x in demos])
     whole = Trajectory(np.linspace(0.0, 2.0 * factor, 80), demos[0].positions)
-    best, p, score = _recognized(Recognizer().fit(demos), whole, np.array([[0, 80]]), 0.05)
+    best, p, score = _recognized(*_records(Recognizer().fit(demos)), whole, np.array([[0, 80]]), 0.05)
     return int(best[0]), float(p[0, best[0]]), float(score[0])
 
 
@@ -143,7 +159,7 @@ def test_beyond_three_times_the_duration_nothing_is_looked_for(factor):
 
 def _evidence(recognizer, early, size=1.0, slower=1.0, late=0.0):
     """How much the best hypothesis loses when the same movement is larger, slower or late on its way, in logarithms."""
-    known = known_hypotheses(recognizer, early)
+    known = hypotheses(recognizer.comparison_, recognizer.references_, early)
     paths = smooth_paths(recognizer.demonstrations_[:1], None)
     plain = beginnings(paths, np.ones(1))
     moved = beginnings(size * paths, np.ones(1))
@@ -181,7 +197,7 @@ def test_a_label_is_decided_when_nine_tenths_were_held_for_a_twentieth_of_the_ti
 
 
 def test_beyond_four_thousand_demonstrations_memory_stays_linear():
-    assert isinstance(choose("auto", np.full(400, 10)), SupportVectors)
-    assert isinstance(choose("auto", np.full(400, 11)), Nearest)
-    assert isinstance(choose("auto", np.array([8, 8])), SupportVectors)
-    assert isinstance(choose("auto", np.array([8, 7])), Nearest)
+    assert choose(np.full(400, 10)) == "svm"
+    assert choose(np.full(400, 11)) == "nearest"
+    assert choose(np.array([8, 8])) == "svm"
+    assert choose(np.array([8, 7])) == "nearest"

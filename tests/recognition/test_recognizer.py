@@ -16,10 +16,10 @@ from sklearn.svm import SVC
 
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme.comparison import compared as module
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition import recognizer as module
 
 any_seed = given(seed=st.integers(0, 10**6))
 planes = pytest.mark.parametrize("d", [2, 3])
@@ -95,9 +95,11 @@ def test_nearest_is_one_nearest_neighbor_on_the_similarity():
 def test_svm_is_scikit_learns_on_the_precomputed_similarity():
     demos, fresh = draw_shapes([8] * 4, seed=2, spread=0.6), draw_shapes([9] * 4, seed=2, spread=0.9)
     recognizer = Recognizer(classifier="svm").fit(demos)
-    wider = recognizer.similarity_.widened(2.0)
-    own, seen = (np.exp(wider.log_average(recognizer.look_at(one), recognizer.views_)) for one in (demos, fresh))
-    expected = SVC(kernel="precomputed", C=1000.0).fit(own, demos.labels).decision_function(seen)
+    wider = recognizer.comparison_.similarity.widened(2.0)
+    own, gram = (
+        np.exp(wider.log_average(recognizer.describe(one), recognizer.references_.described)) for one in (demos, fresh)
+    )
+    expected = SVC(kernel="precomputed", C=1000.0).fit(own, demos.labels).decision_function(gram)
     np.testing.assert_allclose(recognizer.decision_function(fresh), expected, atol=1e-5)
 
 
@@ -105,9 +107,9 @@ def test_prototype_is_the_demonstration_most_like_its_class():
     demos = draw_shapes([5, 3, 4], spread=0.5)
     recognizer = Recognizer(classifier="prototype").fit(demos)
     logs = recognizer.log_similarity(demos)
-    for rows, medoid in zip((range(5), range(5, 8), range(8, 12)), recognizer.classifier_.medoids_, strict=True):
+    for rows, medoid in zip((range(5), range(5, 8), range(8, 12)), recognizer.classifier_.medoids, strict=True):
         assert medoid == max(rows, key=lambda i, rows=rows: logs[i, list(rows)].mean())
-    np.testing.assert_allclose(recognizer.decision_function(demos), logs[:, recognizer.classifier_.medoids_], atol=1e-4)
+    np.testing.assert_allclose(recognizer.decision_function(demos), logs[:, recognizer.classifier_.medoids], atol=1e-4)
 
 
 @pytest.mark.parametrize(("counts", "name"), [([1, 1], "Nearest"), ([8, 7], "Nearest"), ([8, 9], "SupportVectors")])

@@ -12,11 +12,16 @@ import kineme
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
-from kineme.recognition.early.early import partial_shares
-from kineme.recognition.early.hypotheses import Early
+from kineme.recognition.early.early import partial_shares as shares_of
+from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.live_state import LiveStatus
 
 SHAPES = ("CShape", "GShape", "NShape", "Sshape", "WShape", "Zshape")
+
+
+def partial_shares(recognizer, movements):
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    return shares_of(recognizer.comparison_, stored, movements)
 
 
 @pytest.fixture(scope="module")

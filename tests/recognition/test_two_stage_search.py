@@ -11,32 +11,33 @@ from hypothesis import strategies as st
 from movement_samples import draw_shapes
 
 from kineme import Demonstrations, Recognizer
-from kineme.comparison.bounds import encode, fit_bases
-from kineme.comparison.describe import view
-from kineme.comparison.normalization import Normalization
+from kineme.comparison.bounds import fit_bases, reduce_features
+from kineme.comparison.describe import feature_rows
+from kineme.comparison.stored import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
-from kineme.recognition.two_stage_search import Shortlist, Stored
+from kineme.recognition.two_stage_search import TwoStageSearch
 
 
-def _two_stages(recognizer, order=None, n_codes=12, blocks=2):
-    """The same recognizer, its movements coded in any order and in several blocks."""
+def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
+    """The same recognizer, its movements stored in any order and in several blocks."""
     demos = recognizer.demonstrations_
-    order = np.arange(len(demos)) if order is None else order  # row of the codes -> movement
-    views = view(demos[order], recognizer.looks(), Normalization(), recognizer.cutoff)
-    views = tuple(block.astype(np.float32) for block in views)
-    bases = fit_bases(views, demos.n_dims, n_codes)
-    codes = encode(bases, views, demos.n_dims)
+    order = np.arange(len(demos)) if order is None else order  # row of the features -> movement
+    features = feature_rows(demos[order], recognizer.comparison_.specification)
+    features = tuple(block.astype(np.float32) for block in features)
+    bases = fit_bases(features, demos.n_dims, n_reduced)
+    reduced = reduce_features(bases, features, demos.n_dims)
     cuts = np.linspace(0, len(demos), blocks + 1).astype(int)
-    parts = tuple(tuple(one.take(slice(a, b)) for one in codes) for a, b in pairwise(cuts))
+    parts = tuple(tuple(one.take(slice(a, b)) for one in reduced) for a, b in pairwise(cuts))
     asked = []
 
     def fetch(rows):
         asked.append(len(rows))
-        return tuple(block[rows] for block in views)
+        return tuple(block[rows] for block in features)
 
-    stored = Stored(bases, parts, np.argsort(order), recognizer.first_, fetch, lambda rows: demos[order[rows]])
-    return Shortlist(recognizer, recognizer.classes_, stored), asked
+    first = recognizer.references_.first
+    stored = StoredReferences(bases, parts, np.argsort(order), first, fetch, lambda rows: demos[order[rows]])
+    return TwoStageSearch(recognizer.comparison_, recognizer.calibration(), recognizer.classes_, stored), asked
 
 
 def _same(ours, theirs, places):
@@ -51,12 +52,12 @@ def _same(ours, theirs, places):
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 4])
-@given(seed=st.integers(0, 1000), n_codes=st.integers(1, 20))
-def test_where_everything_is_compared_the_answer_is_the_ordinary_one(d, seed, n_codes):
+@given(seed=st.integers(0, 1000), n_reduced=st.integers(1, 20))
+def test_where_everything_is_compared_the_answer_is_the_ordinary_one(d, seed, n_reduced):
     counts = np.random.default_rng(seed).integers(1, 5, 8)
     recognizer = Recognizer(classifier="nearest", weights="equal").fit(draw_shapes(counts, d, seed))
     order = np.random.default_rng(seed).permutation(counts.sum())
-    two, _ = _two_stages(recognizer, order, n_codes)
+    two, _ = _two_stages(recognizer, order, n_reduced)
     asked = draw_shapes([1] * 8, d, seed, spread=0.3)
     for ours, theirs in zip(two.recognize(asked), recognizer.recognize(asked), strict=True):
         _same(ours, theirs, order)
@@ -78,40 +79,40 @@ def test_a_few_comparisons_give_the_label_and_the_p_values_of_all(d, n_classes, 
             assert ours.label == theirs.label
             assert ours.ranked[0] == theirs.ranked[0]
             assert ours.p_values == pytest.approx({name: theirs.p_values[name] for name in ours.p_values}, abs=1e-5)
-    assert sum(fetched) < 0.6 * len(asked) * len(recognizer.labels_)
+    assert sum(fetched) < 0.6 * len(asked) * len(recognizer.references_.labels)
 
 
 @given(seed=st.integers(0, 1000))
 def test_the_nearest_movement_is_always_compared(seed):
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([5] * 30, 2, seed))
-    two, _ = _two_stages(recognizer, n_codes=3)
+    two, _ = _two_stages(recognizer, n_reduced=3)
     asked = draw_shapes([1] * 30, 2, seed + 1)
-    seen = recognizer.look_at(asked)
-    exact = recognizer.similarity_.log_average(seen, recognizer.views_)
-    bounds = two.stored.bounds(recognizer.similarity_, two.codes_of(seen))
+    described = recognizer.describe(asked)
+    exact = recognizer.comparison_.similarity.log_average(described, recognizer.references_.described)
+    bounds = two.stored.bounds(recognizer.comparison_.similarity, two.reduced(described))
     for i in range(30):
-        places, logs, _ = two.compare(tuple(one.take(slice(i, i + 1)) for one in seen), bounds[i])
+        places, logs, _ = two.compare(described.take(slice(i, i + 1)), bounds[i])
         assert exact[i].argmax() in places
         np.testing.assert_allclose(logs, exact[i, places], atol=1e-4)
-        nearest = np.maximum.reduceat(exact[i], recognizer.first_)
+        nearest = np.maximum.reduceat(exact[i], recognizer.references_.first)
         for c in np.unique(places // 5):
             assert logs[places // 5 == c].max() == pytest.approx(nearest[c], abs=1e-4)
 
 
 @given(seed=st.integers(0, 1000))
 def test_whoever_could_be_nearer_is_compared_too(seed):
-    """However little the codes say, and however few are compared first."""
+    """However few the reduced features, and however few are compared first."""
     recognizer = Recognizer(classifier="nearest", weights="equal").fit(draw_shapes([5] * 30, 2, seed, spread=0.3))
     asked = draw_shapes([1] * 30, 2, seed, spread=0.3)
     with pytest.MonkeyPatch.context() as patch:
         for name in ("_LEADING", "_BEST", "_CLASSES"):
             patch.setattr(two_stage_search, name, 1)
-        answers = _two_stages(recognizer, n_codes=2)[0].recognize(asked)
+        answers = _two_stages(recognizer, n_reduced=2)[0].recognize(asked)
     nearest = recognizer.log_similarity(asked).argmax(axis=1)
     assert [one.nearest[0].index for one in answers if one.label == one.ranked[0]] == [
         k for k, one in zip(nearest, answers, strict=True) if one.label == one.ranked[0]
     ]
-    assert [one.ranked[0] for one in answers] == recognizer.labels_[nearest].tolist()
+    assert [one.ranked[0] for one in answers] == recognizer.references_.labels[nearest].tolist()
 
 
 def test_the_order_of_questions_and_of_stored_movements_does_not_matter():
@@ -134,7 +135,7 @@ def test_doubt_is_bounded():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_stage_search, "_MOST", 20)
         patch.setattr(two_stage_search, "_OF_CLASSES", 10)
-        two, fetched = _two_stages(recognizer, n_codes=2)
+        two, fetched = _two_stages(recognizer, n_reduced=2)
         assert two.recognize(one)[0].label == 0
     assert fetched[-1] <= 30
 

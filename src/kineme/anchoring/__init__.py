@@ -11,8 +11,9 @@ from kineme.anchoring.proposals.assign import Placement, place
 from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import propose
-from kineme.anchoring.seen import see, see_rows
-from kineme.anchoring.similarities import similarities
+from kineme.comparison.describe import describe as see
+from kineme.comparison.describe import describe_rows as see_rows
+from kineme.comparison.similarity import similarities
 
 _PICTURES = {  # Matplotlib loads on first use, not with the numbers
     "draw_map": "symbol_map",

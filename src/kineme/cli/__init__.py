@@ -1,4 +1,4 @@
-"""The command line: parse, call, print."""
+"""The command line: parse options, call the library, print results."""
 
 from kineme.cli.main import main
 

@@ -1,4 +1,4 @@
-"""``kineme anchor``: from movements without a name to symbols, with a person or by a script."""
+"""``kineme anchor``: propose symbols among unlabeled movements, and accept them in a dialogue or by options."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from kineme.cli.options import json_option, library_option, whole
 from kineme.cli.output import say, write
 from kineme.output.text import counted, printable
 
-_SHOWN = 5  # movements left over, written out
+_SHOWN = 5  # remaining movements that are listed
 
 
 class Choice(click.ParamType):  # type: ignore[type-arg]
-    """Numbers of proposals separated by commas, or all."""
+    """Numbers of proposals separated by commas, or "all"."""
 
-    name = "0,1,...|all"
+    name = "1,2,...|all"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> list[int] | str:
         """Text as numbers."""
@@ -31,43 +31,47 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"expected numbers of proposals separated by commas, or all, got {value!r}", param, ctx)
 
 
-@click.command(short_help="Turn movements without a name into symbols.")
+@click.command(short_help="Turn unlabeled movements into symbols.")
 @library_option
 @click.option("--method", type=click.Choice(["agglomerative", "hdbscan"]),
-              help="Cluster anew.  [default: by the likeness within the symbols that there are]")  # fmt: skip
-@click.option("--clusters", type=whole(1), help="How many kinds.  [default: as many as fit]")
-@click.option("--min-members", type=whole(2), default=3, show_default=True, help="That make a kind.")
+              help="Clustering.  [default: members as similar as those of the stored symbols]")  # fmt: skip
+@click.option("--clusters", type=whole(1), help="Number of clusters.  [default: chosen from the data]")
+@click.option(
+    "--min-members", type=whole(2), default=3, show_default=True, help="Smallest number of movements in a proposal."
+)
 @click.option("--join/--no-join", default=True, show_default=True,
-              help="First let movements join the symbols that they are recognized as.")  # fmt: skip
-@click.option("--accept", type=Choice(), help="Name these proposals, without asking.")
-@click.option("--reject", type=Choice(), help="Leave these movements unnamed, and do not propose them again.")
+              help="First add movements to the symbols that they are recognized as.")  # fmt: skip
+@click.option("--accept", type=Choice(), help="Accept these proposals without asking.")
+@click.option("--reject", type=Choice(), help="Reject these proposals, and do not propose their movements again.")
 @click.option("--names", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help='A JSON file of names: {"0": "wave", "1": "nod"}.  [default: kind 1, kind 2, ...]')  # fmt: skip
+              help='A JSON file of names: {"1": "wave", "2": "nod"}.  [default: cluster 1, ...]')  # fmt: skip
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), default="proposals", show_default=True,
               help="Folder for a picture of every proposal.")  # fmt: skip
 @json_option
 def anchor(folder: Path, **options: Any) -> None:
-    """Propose kinds among the movements without a name, and turn them into symbols.
+    """Propose symbols among the unlabeled movements, and accept them.
 
-    On a terminal it asks for each; with --accept or --reject it does not; else it changes nothing, and lists them under
-    the numbers that --accept will know them by.
+    On a terminal it asks about each proposal. With --accept or --reject it does not ask. Otherwise it changes nothing
+    and lists the proposals by the numbers that --accept takes.
 
     Example: kineme anchor --library actions/ --accept all --names names.json
     """
     from kineme.cli.anchor_session import Session
     from kineme.library.library import ActionLibrary
-    from kineme.library.symbols.proposals import join, joinable, propose_kinds
+    from kineme.library.symbols.proposals import propose
+    from kineme.library.symbols.recognized import assign_recognized, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
     names = _names(options["names"])
     writes = scripted or interactive
     with ActionLibrary(folder, read_only=not writes) as library:
-        # What joins is left out whether it is written or not: a number means the same when listed and when accepted.
-        joining = joinable(library) if options["join"] else {}
+        # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
+        # listed and when it is accepted.
+        joining = recognized(library.store) if options["join"] else {}
         members = [one for ids in joining.values() for one in ids.tolist()]
-        proposals = propose_kinds(
-            library, None, options["method"], options["clusters"], options["min_members"], members
+        proposals = propose(
+            library.store, None, options["method"], options["clusters"], options["min_members"], members
         )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
@@ -75,7 +79,7 @@ def anchor(folder: Path, **options: Any) -> None:
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
-            "joined": join(library, joining) if writes else {},
+            "joined": assign_recognized(library.store, joining) if writes else {},
             "would_join": {} if writes else {name: len(ids) for name, ids in joining.items()},
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
@@ -91,7 +95,7 @@ def anchor(folder: Path, **options: Any) -> None:
 
 
 def _named(library: Any, ids: Any) -> str:
-    """The first movements by name, for a person."""
+    """Names of the first movements."""
     if not len(ids):
         return ""
     names = library.movements(ids=ids[:_SHOWN]).names or ()
@@ -109,16 +113,19 @@ def _names(path: Path | None) -> dict[int, str]:
         names = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(names, dict):
             raise ValueError("no numbers of proposals")
-        return {int(number): check_name(name) for number, name in names.items()}
+        found = {int(number): check_name(name) for number, name in names.items()}
+        if min(found, default=1) < 1:
+            raise ValueError(f"proposals are counted from 1, got {min(found)}")
+        return found
     except ValueError as error:
         raise DataError(
-            f'expected {path} to hold names by the number of the proposal, as {{"0": "wave"}}, got something else '
+            f'expected {path} to hold names by the number of the proposal, as {{"1": "wave"}}, got something else '
             f"({error})"
         ) from error
 
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
-    """A sheet of all proposals, then a picture of each."""
+    """Draw an overview of all proposals, then a picture of each."""
     from kineme.anchoring.figures.proposal import draw_proposal
     from kineme.anchoring.figures.proposal_sheet import draw_proposals
     from kineme.output.figures import save_figure
@@ -126,45 +133,48 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     if not len(proposals):
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    movements = proposals.movements(library)
+    movements = library.movements(ids=proposals.ids)
     like = library.specification.recognizer()
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
-    for k, one in enumerate(proposals.found.proposals):
-        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"kind-{k}.png"))
-    old = len(proposals)
-    while (stale := folder / f"kind-{old}.png").exists():  # of an earlier run, under a number that means nothing now
+    for number, one in enumerate(proposals.found.proposals, 1):
+        paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))
+    number = len(proposals) + 1
+    while (stale := folder / f"proposal-{number}.png").exists():  # of an earlier run
         stale.unlink()
-        old += 1
+        number += 1
     return paths
 
 
 def _chosen(proposals: Any, choice: Any, option: str) -> list[int]:
-    numbers = range(len(proposals)) if choice == "all" else choice or []
+    """Numbers of proposals, from 1."""
+    numbers = range(1, len(proposals) + 1) if choice == "all" else choice or []
     for number in numbers:
-        if not 0 <= number < len(proposals):
+        if not 1 <= number <= len(proposals):
             raise click.BadParameter(
-                f"there are {len(proposals)} proposals, counted from 0, got {number}", param_hint=option
+                f"there are {len(proposals)} proposals, counted from 1, got {number}", param_hint=option
             )
     return list(dict.fromkeys(numbers))
 
 
 def _accept(library: Any, proposals: Any, chosen: list[int], names: dict[int, str]) -> dict[str, int]:
     done = {}
-    for k in chosen:
-        name = names.get(k) or _free_name(library)
-        library.accept(proposals[k], name)
-        done[name] = len(proposals[k])
+    for number in chosen:
+        one = proposals[number - 1]
+        name = names.get(number) or _free_name(library, number)
+        library.accept(one, name)
+        done[name] = len(one)
     return done
 
 
-def _free_name(library: Any) -> str:
+def _free_name(library: Any, number: int) -> str:
+    """The number of the proposal as a name; of one that a symbol has, the next free number."""
     taken = {symbol.name for symbol in library.symbols()}
-    return next(name for k in range(1, len(taken) + 2) if (name := f"kind {k}") not in taken)
+    return next(name for k in range(number, number + len(taken) + 1) if (name := f"cluster {k}") not in taken)
 
 
 def _reject(library: Any, proposals: Any, chosen: list[int]) -> list[int]:
-    for k in chosen:
-        library.reject(proposals[k])
+    for number in chosen:
+        library.reject(proposals[number - 1])
     return chosen
 
 
@@ -172,14 +182,14 @@ def _as_data(proposals: Any) -> dict[str, Any]:
     return {
         "proposals": [
             {
-                "number": k,
+                "number": number,
                 "movements": [int(i) for i in one.members],
                 "medoid": one.medoid,
                 "cohesion": one.cohesion,
                 "stability": one.stability,
-                "nearest": one.nearest,
+                "nearest": None if one.nearest is None else one.nearest + 1,
             }
-            for k, one in enumerate(proposals[i] for i in range(len(proposals)))
+            for number, one in enumerate((proposals[i] for i in range(len(proposals))), 1)
         ],
         "left_over": [int(i) for i in proposals.left_over],
     }

@@ -1,4 +1,4 @@
-"""The dialogue of ``kineme anchor``: one proposal after the other, until all are named or the person stops."""
+"""The dialogue of ``kineme anchor``: one proposal after another, until all are named or the user stops."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kineme.output.text import counted, printable
 HELP = """\
   a name         makes it a symbol, or joins the symbol of that name
   (nothing)      leaves it for later
-  /split         looks for two kinds in it
+  /split         looks for two clusters in it
   /reject        leaves its movements unnamed, and does not propose it again
   /members       lists its movements
   /name TEXT     a name that begins with a slash
@@ -23,7 +23,7 @@ HELP = """\
 
 
 class Item(NamedTuple):
-    """A proposal on the list: its members are ids of movements."""
+    """A proposal in the queue; its members are ids of movements."""
 
     title: str
     proposal: Any
@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
 
 class Session:
-    """Ask about each proposal; every answer is committed at once.
+    """Ask about each proposal and commit every answer at once.
 
     Parameters
     ----------
@@ -44,10 +44,10 @@ class Session:
 
     def __init__(self, library: Any, proposals: Any, pictures: list[Path]) -> None:
         self.library = library
-        self.items = deque(Item(str(k), proposals[k], pictures[k]) for k in range(len(proposals)))
+        self.items = deque(Item(str(k + 1), proposals[k], pictures[k]) for k in range(len(proposals)))
 
     def run(self) -> None:
-        """Until the list is empty, /quit, or the end of the input."""
+        """Run until the queue is empty, the user enters /quit, or the input ends."""
         if self.items:
             write("Give each a name; /help says what else there is.")
         while self.items:
@@ -67,7 +67,7 @@ class Session:
         write(f"{counted(len(self.library.symbols()), 'symbol')}, {counted(left, 'movement')} without one")
 
     def _answer(self, item: Item, line: str) -> bool:
-        """Do what the person says; whether to go on."""
+        """Carry out one line of input; return whether to continue."""
         command, _, rest = line.partition(" ")
         if command in {"/quit", "/q"}:
             return False
@@ -101,7 +101,7 @@ class Session:
     def _split(self, item: Item) -> None:
         parts = self.library.propose(item.proposal.members, n_clusters=2, min_members=2)
         if len(parts) < 2:
-            write("  no two kinds of two movements or more in it")
+            write("  no two clusters of two movements or more in it")
             return
         self.items.popleft()
         for k in reversed(range(len(parts))):

@@ -1,4 +1,4 @@
-"""``kineme evaluate``: recognizers side by side on a data set."""
+"""``kineme evaluate``: compare recognizers on a data set."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _QUICK_SPLITS = 2
 @click.command(short_help="Compare recognizers on a data set.")
 @click.argument("data")
 @click.option("--protocol", "protocols", multiple=True, type=click.Choice(PROTOCOL_NAMES),
-              help="What to ask; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
+              help="Protocol; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
 @click.option("--method", "methods", multiple=True, type=click.Choice(METHOD_NAMES),
-              help="Whom to ask; may be repeated.  [default: all]")  # fmt: skip
+              help="Method; may be repeated.  [default: all]")  # fmt: skip
 @click.option("--splits", type=whole(1), default=10, show_default=True, help="Random splits per protocol.")
 @click.option("--shots", multiple=True, type=whole(1), default=(1, 3, 5), show_default=True,
               help="Training movements per class; may be repeated.")  # fmt: skip
 @click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of splits and perturbations.")
-@click.option("--jobs", type=whole(1), default=None, help="Processes.  [default: the processors]")
+@click.option("--jobs", type=whole(1), default=None, help="Number of processes.  [default: one per processor]")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for evaluation.html and evaluation.json.")  # fmt: skip
-@click.option("--quick", is_flag=True, help="At most two splits, without the rivals that are slow.")
+@click.option("--quick", is_flag=True, help="At most two splits, without slow rivals.")
 def evaluate(data: str, protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
     """Evaluate recognition on DATA: lasa, lasa-letters, or a folder with one folder of recordings per label.
 

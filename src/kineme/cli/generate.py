@@ -1,4 +1,4 @@
-"""``kineme generate``: move again, from a recording or a saved primitive to a file."""
+"""``kineme generate``: a new movement from a symbol, a recording or a saved primitive."""
 
 from __future__ import annotations
 
@@ -13,20 +13,26 @@ from kineme.cli.output import write_bytes
 from kineme.output.text import printable
 
 
-@click.command(short_help="Move again: a symbol or a recording, to a new goal.")
+@click.command(short_help="Generate a movement from a symbol or a recording.")
 @click.argument("source", type=SymbolName())
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
-@click.option("--start", type=Numbers(), help="Where to start.  [default: as demonstrated]")
-@click.option("--goal", type=Numbers(), help="Where to go.  [default: as demonstrated]")
-@click.option("--duration", type=Finite(), help="Seconds.  [default: as demonstrated]")
-@click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second, at least.")
-@click.option("--settle", type=Finite(), help="Go on past the duration until this close to the goal.")
-@click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="A point to steer around; repeatable.")
-@click.option("--index", type=whole(0), default=0, show_default=True, help="Which of several saved primitives.")
-@click.option("--formulation", default="bio-inspired", show_default=True, help="For a recording: how to learn it.")
-@click.option("--n-basis", type=int, default=40, show_default=True, help="For a recording: basis functions.")
+@click.option("--start", type=Numbers(), help="Start position.  [default: as demonstrated]")
+@click.option("--goal", type=Numbers(), help="Goal position.  [default: as demonstrated]")
+@click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
+@click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
+@click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
+@click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="Point to avoid; may be repeated.")
 @click.option(
-    "--save", type=click.Path(dir_okay=False, path_type=Path), help="Keep the primitive in this .kineme file."
+    "--index",
+    type=whole(0),
+    default=0,
+    show_default=True,
+    help="Number of the primitive in a file with several, from 0.",
+)
+@click.option("--formulation", default="bio-inspired", show_default=True, help="Formulation for a recording.")
+@click.option("--n-basis", type=int, default=40, show_default=True, help="Number of basis functions for a recording.")
+@click.option(
+    "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
 )
 @click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), default="-", show_default=True,
               help="A .csv, .npz or .json file; - for the screen, as CSV or --json.")  # fmt: skip
@@ -55,14 +61,14 @@ def generate(**options: Any) -> None:
 
 
 def _primitive(options: dict[str, Any]) -> Any:
-    """A batch of one: of a symbol, a recording or a file of primitives."""
+    """The primitive of a symbol, a recording or a file, as a batch of one."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
         from kineme.library.library import ActionLibrary
         from kineme.library.symbols.grounding import primitive_of
 
         with ActionLibrary(options["folder"], read_only=True) as library:
-            return primitive_of(library, source)
+            return primitive_of(library.store, source)
     from kineme.primitives.discrete.dmp import DMP
     from kineme.primitives.generation.generate import primitives_from
 
@@ -79,7 +85,7 @@ def _primitive(options: dict[str, Any]) -> Any:
 
 
 def _is_symbol(source: str, folder: Path | None) -> bool:
-    """A library on the command line means a symbol; one from the environment leaves files their names."""
+    """Whether SOURCE is a symbol: with --library always; with a library from the environment, unless a file exists."""
     given = click.get_current_context().get_parameter_source("folder")
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 

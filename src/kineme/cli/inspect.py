@@ -1,4 +1,4 @@
-"""``kineme inspect``: what a set of recordings holds, before anything is learned from it."""
+"""``kineme inspect``: summarize a set of recordings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
 
 
-@click.command(short_help="Show what a set of recordings holds.")
+@click.command(short_help="Summarize a set of recordings.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @layout_options
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")

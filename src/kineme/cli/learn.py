@@ -1,4 +1,4 @@
-"""``kineme learn``: recordings into an action library."""
+"""``kineme learn``: learn recordings into an action library."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
 from kineme.output.text import counted, printable
 
-_SHOWN = 10  # problems written out
+_SHOWN = 10  # problems that are listed
 
 
 @click.command(short_help="Store recordings in an action library.")
 @click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
 @library_option
-@click.option("--label", help="Name of the symbol of all of them.  [default: the label in the file, or its folder]")
-@click.option("--no-labels", is_flag=True, help="Learn them without a symbol, for kineme anchor.")
+@click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")
+@click.option("--no-labels", is_flag=True, help="Store movements without labels, for kineme anchor.")
 @layout_options
 @json_option
 def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     """Learn RECORDINGS, files or folders, or - for CSV from the standard input, into a library.
 
-    The library is made if there is none. In a folder, the name of the innermost folder is the label. What is known
-    already is not stored again; what cannot be read is listed, and the rest is learned.
+    The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements
+    that are stored already are not stored again; what cannot be read is listed, and the rest is learned.
 
     Example: kineme learn recordings/ --library actions/
     """
@@ -64,7 +64,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 
 def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
-    """What could be read, with its folder, and what could not; an error if that is everything."""
+    """Recordings with their folder, and problems; an error if nothing could be read."""
     from kineme.errors import DataError
 
     found: list[tuple[Path, Any]] = []
@@ -87,11 +87,11 @@ def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], l
     from kineme.library.learning.recordings import learn_recordings
 
     with _progress(len(recordings)) as progress:
-        return learn_recordings(library, recordings, options, labels, progress, root)
+        return learn_recordings(library.store, recordings, options, labels, progress, root)
 
 
 def _joined(library: Any, before: int) -> int:
-    """Movements that had no symbol and show one now: a label came with what was known."""
+    """Number of stored movements that were unlabeled and got a symbol, since their copy has a label."""
     import numpy as np
 
     return len(np.setdiff1d(library.at(before).unlabeled(), library.unlabeled()))
@@ -99,7 +99,7 @@ def _joined(library: Any, before: int) -> int:
 
 @contextmanager
 def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
-    """A bar on a terminal, to be told the movements done and their number."""
+    """A progress bar on a terminal; it takes the number of movements done and the number of all."""
     from tqdm import tqdm
 
     with tqdm(total=total, desc="learning", unit="movement", leave=False, disable=None) as bar:

@@ -1,4 +1,4 @@
-"""``kineme library``: look into an action library, and keep it in order."""
+"""``kineme library``: show and edit an action library."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from kineme.output.text import counted, printable
 
 @click.group()
 def library() -> None:
-    """Look into an action library, and keep it in order."""
+    """Show and edit an action library."""
 
 
 def opened(folder: Path, *, read_only: bool = True) -> Any:
-    """The library in a folder."""
+    """Open the library in a folder."""
     from kineme.library.library import ActionLibrary
 
     return ActionLibrary(folder, read_only=read_only)
@@ -26,7 +26,7 @@ def opened(folder: Path, *, read_only: bool = True) -> Any:
 
 @library.command("list")
 @library_option
-@click.option("--at", "version", type=ID, help="As it was at this version.")
+@click.option("--at", "version", type=ID, help="Show this version of the library.")
 @json_option
 def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     """List the symbols of a library."""
@@ -60,11 +60,11 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
 @json_option
 def show(symbol: str, folder: Path, as_json: bool) -> None:
     """Show one symbol: its movements, where they come from, and how they vary."""
-    from kineme.library.symbols.symbol_report import sheet
+    from kineme.library.symbols.symbol_report import symbol_report
 
     with opened(folder) as actions:
-        data = sheet(actions, symbol)
-    say(as_json, data, lambda: _sheet_text(data))
+        data = symbol_report(actions.store, symbol)
+    say(as_json, data, lambda: _report_text(data))
 
 
 @library.command()
@@ -86,7 +86,7 @@ def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
 @library_option
 @json_option
 def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
-    """Write down what a symbol means."""
+    """Set the description of a symbol."""
     with opened(folder, read_only=False) as actions:
         actions.describe(symbol, text)
         data = {**brief(actions[symbol]), "version": actions.version}
@@ -102,7 +102,7 @@ def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
 def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Path, as_json: bool) -> None:
     """Delete a symbol, whose movements stay as unlabeled ones, or single movements.
 
-    Nothing is lost: earlier versions still show them, see kineme library history.
+    Earlier versions still contain them, see kineme library history.
     """
     if (symbol is None) == (not movements):
         raise click.UsageError("expected a SYMBOL, or --movement ID, and not both")
@@ -117,10 +117,12 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
 
 @library.command()
 @library_option
-@click.option("--limit", "-n", type=whole(1), default=20, show_default=True, help="Only the last ones.")
+@click.option(
+    "--limit", "-n", type=whole(1), default=20, show_default=True, help="Number of versions to list, the latest ones."
+)
 @json_option
 def history(folder: Path, limit: int, as_json: bool) -> None:
-    """List what changed, when."""
+    """List the versions: what changed, and when."""
     with opened(folder) as actions:
         versions = actions.history()
     data = [{"version": one.id, "at": one.at, "action": one.action, **one.detail} for one in versions[-limit:]]
@@ -160,7 +162,7 @@ def verify(ctx: click.Context, folder: Path, as_json: bool) -> None:
 @library_option
 @json_option
 def export(path: Path, folder: Path, as_json: bool) -> None:
-    """Write a whole library to one file, to keep or to give away."""
+    """Write a whole library to one file, as a backup or for others."""
     with opened(folder) as actions:
         actions.export(path)
         data: dict[str, Any] = {"path": str(path), "movements": len(actions), "bytes": path.stat().st_size}
@@ -172,7 +174,7 @@ def export(path: Path, folder: Path, as_json: bool) -> None:
 @library_option
 @json_option
 def import_(path: Path, folder: Path, as_json: bool) -> None:
-    """Make a library of an exported file."""
+    """Create a library from an exported file."""
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary.import_(path, folder) as actions:
@@ -192,7 +194,7 @@ def brief(symbol: Any) -> dict[str, Any]:
     }
 
 
-def _sheet_text(data: dict[str, Any]) -> str:
+def _report_text(data: dict[str, Any]) -> str:
     from kineme.output.table import Table, to_text
 
     rows = [
@@ -207,6 +209,6 @@ def _sheet_text(data: dict[str, Any]) -> str:
 
 
 def _place(point: list[float], member: dict[str, Any]) -> str:
-    """A point in words; what single precision leaves of a zero is zero."""
+    """A point as text; values within single precision of zero are zero."""
     least = 1e-6 * max(map(abs, [*member["start"], *member["goal"]]))
     return ", ".join(f"{x if abs(x) > least else 0:.4g}" for x in point)

@@ -1,4 +1,4 @@
-"""``kineme``: the group of commands, and how errors end them."""
+"""``kineme``: the group of commands, and their error messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class _OneLineErrors(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(errors="backslashreplace")  # what its encoding lacks is written out
+            sys.stdout.reconfigure(errors="backslashreplace")  # characters that the encoding lacks are escaped
         try:
             return super().invoke(ctx)
         except click.ClickException as error:

@@ -1,4 +1,4 @@
-"""Options that several commands share: which library, and the form of the output."""
+"""Options and parameter types that several commands share."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-_PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that are one word to every shell, and no option
+_PLAIN = re.compile(r"\w[\w@%+:./-]*")  # names that every shell reads as one word, and that are not options
 
 
-_MOST = 1_000_000  # of what is counted: more is a slip of the finger
-_LARGEST_ID = 2**62 - 2  # of versions and movements: those of `library.storage.schema`, which --help need not load
+_MOST = 1_000_000  # largest count; more is a typing error
+_LARGEST_ID = 2**62 - 2  # of versions and movements, as in `library.storage.schema`, which --help should not load
 
 
 def whole(least: int, most: int = _MOST) -> click.IntRange:
-    """A whole number from `least`, none so large that a computer would not come back."""
+    """A whole number from `least` to `most`."""
     return click.IntRange(least, most)
 
 
@@ -28,7 +28,7 @@ ID = whole(0, _LARGEST_ID)
 
 
 class Finite(click.FloatRange):
-    """A number in a range; neither NaN nor infinity is one."""
+    """A number in a range, neither NaN nor infinite."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
         """Text as a number."""
@@ -57,13 +57,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
 class SymbolName(click.ParamType):  # type: ignore[type-arg]
     """Name or id of a symbol; the shell completes it from the library named on the same line.
 
-    Bash puts what it completes on the line as it is: a name that it would read as something else is offered as its id.
+    Bash inserts completions without quoting: for a name that would need quotes, the id is offered.
     """
 
     name = "symbol"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Names and ids that begin as typed; none without a library, never an error."""
+        """Names and ids that begin with the typed text; none without a library, and never an error."""
         from kineme.errors import KinemeError
 
         folder = ctx.params.get("folder") or ctx.lookup_default("folder")

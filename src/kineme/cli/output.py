@@ -1,4 +1,4 @@
-"""What commands print: text for people, JSON for programs."""
+"""Output of the commands: text for people, JSON for programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import click
 
 from kineme.output.text import printable_lines
 
-_LISTED = 12  # items of a list, written out
+_LISTED = 12  # items of a list that are printed; more are counted
 
 
 def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
@@ -20,27 +20,27 @@ def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
 
 
 def write(text: Any = "", *, err: bool = False) -> None:
-    """Print lines, without anything that a terminal would obey; what comes from a file may hold that."""
+    """Print lines with control characters escaped: texts from files may contain them."""
     click.echo(printable_lines(text), err=err)
 
 
 def write_bytes(data: bytes) -> None:
-    """Print a file as it is, for the program that reads it."""
+    """Print bytes unchanged, for other programs."""
     click.echo(data, nl=False)
 
 
 def ask(question: str) -> str:
-    """A line from the person at the terminal; empty for none."""
+    """Ask the user for a line; empty if none is entered."""
     return str(click.prompt(printable_lines(question), default="", show_default=False))
 
 
 def confirm(question: str, **options: Any) -> bool:
-    """Yes or no from the person at the terminal."""
+    """Ask the user for yes or no."""
     return click.confirm(printable_lines(question), **options)
 
 
 def to_json(data: Any, encoding: str = "utf-8") -> str:
-    """One JSON document; where a terminal would obey a character, or the encoding lacks one, all in ASCII."""
+    """One JSON document; in ASCII if it has control characters, or characters that the encoding lacks."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, indent=1)
     try:
         text.encode(encoding)
@@ -52,7 +52,7 @@ def to_json(data: Any, encoding: str = "utf-8") -> str:
 
 
 def in_words(detail: Mapping[str, Any]) -> str:
-    """Keys with their values, ``added 30; symbols nod, wave``: nothing of what is empty, the number of a long list."""
+    """Keys with their values, as ``added 30; symbols nod, wave``, without empty ones; of a long list, its length."""
     parts = []
     for key, value in detail.items():
         items = value if isinstance(value, list) else [value]

@@ -1,4 +1,4 @@
-"""Reading recordings for a command: the options that say what the columns are, and the standard input."""
+"""Read recordings for a command: the options for the columns, and the standard input."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Unit(click.ParamType):  # type: ignore[type-arg]
     name = "s|ms|us|ns|SECONDS"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
-        """A number where it reads as one."""
+        """A number if the text is one, else the name of a unit."""
         try:
             return float(value)
         except ValueError:
@@ -26,7 +26,7 @@ class Unit(click.ParamType):  # type: ignore[type-arg]
 
 
 class Heads(click.ParamType):  # type: ignore[type-arg]
-    """Columns separated by commas, by head or counted from 0."""
+    """Columns separated by commas, as heads or as numbers counted from 0."""
 
     name = "a,b,..."
 
@@ -38,26 +38,26 @@ class Heads(click.ParamType):  # type: ignore[type-arg]
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
     click.option("--columns", type=Heads(), help="Columns of the coordinates."),
-    click.option("--movement", type=Heads(), help="Columns that tell the movements of a table apart."),
-    click.option("--label-column", metavar="COLUMN", help="Column that names the action."),
-    click.option("--units", type=Unit(), help="Unit of the time stamps, or the step of samples without, in seconds."),
+    click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
+    click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
+    click.option("--units", type=Unit(), help="Unit of the time stamps, by name or in seconds."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
-        help="What a missing or repeated sample costs.",
+        help="What is dropped for a missing or repeated sample.",
     ),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
 
 
 def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say what the columns of a table are; by default that is found out."""
+    """Add the options for the roles of a table's columns; by default the roles are detected."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
 
 
 def read(path: Path, options: dict[str, Any]) -> Any:
-    """Recordings from a folder, a file, or - the standard input, as `layout_options` say."""
+    """Read recordings from a folder, a file, or - the standard input, with the `layout_options`."""
     from kineme.files.limits import read_limited
     from kineme.files.recordings import read_recordings, read_recordings_from_bytes
     from kineme.files.tables.layout import Layout

@@ -1,4 +1,4 @@
-"""``kineme recognize``: what a recording shows, by the symbols of a library."""
+"""``kineme recognize``: recognize recordings with the symbols of a library."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kineme.cli.reading import layout_options, read
 from kineme.output.text import printable
 
 
-@click.command(short_help="Say which symbol a recording shows, if any.")
+@click.command(short_help="Recognize recordings with the symbols of a library.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
 @library_option
 @click.option(
@@ -91,7 +91,7 @@ def _text(data: dict[str, Any], error_rate: float) -> str:
 
 
 def _relative(transform: dict[str, Any]) -> str:
-    """Size, direction and duration, as against the movement that it is most like."""
+    """Size, direction and duration relative to the most similar stored movement."""
     degrees = round(math.degrees(transform["angle"])) + 0
     return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
 

@@ -10,7 +10,7 @@ from kineme.cli.options import whole
 from kineme.cli.output import write
 
 
-@click.command(short_help="Repeat the paper's tables and figures.")
+@click.command(short_help="Reproduce the paper's tables and figures.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for report.html, results.json, tables.txt and the figures.")  # fmt: skip
 @click.option("--draws", type=whole(1), default=None,

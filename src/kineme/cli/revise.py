@@ -1,4 +1,4 @@
-"""``kineme library`` merge, split, review: symbols that turn out to be one, or two."""
+"""``kineme library`` merge, split and review."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from kineme.output.text import counted, printable
 
 @click.command()
 @click.argument("symbols", type=SymbolName(), nargs=-1, required=True)
-@click.option("--into", required=True, help="Name of the symbol that holds them all afterwards.")
+@click.option("--into", required=True, help="Name of the merged symbol.")
 @library_option
 @json_option
 def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
-    """Make one symbol of several."""
+    """Merge several symbols into one."""
     with opened(folder, read_only=False) as actions:
         actions.merge(symbols, into)
         data = {**brief(actions[into]), "version": actions.version}
@@ -27,12 +27,14 @@ def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> N
 
 @click.command()
 @click.argument("symbol", type=SymbolName())
-@click.option("--movement", "movements", type=ID, multiple=True, required=True, help="Goes over; may be repeated.")
+@click.option(
+    "--movement", "movements", type=ID, multiple=True, required=True, help="Movement to take over; may be repeated."
+)
 @click.option("--into", required=True, help="Name of the new symbol.")
 @library_option
 @json_option
 def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
-    """Make a new symbol of some movements of another one."""
+    """Split a symbol: some of its movements become a new symbol."""
     with opened(folder, read_only=False) as actions:
         actions.split(symbol, list(movements), into)
         data = {**brief(actions[into]), "version": actions.version}
@@ -43,7 +45,7 @@ def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_j
 @library_option
 @json_option
 def review(folder: Path, as_json: bool) -> None:
-    """Find symbols that could be one, and symbols that are of two kinds."""
+    """Find symbols that could be merged, and symbols that could be split."""
     with opened(folder) as actions:
         found = actions.review()
     data = {
@@ -57,11 +59,11 @@ def review(folder: Path, as_json: bool) -> None:
             for one in found.merges
         ]
         lines += [
-            f"{printable(one.symbol)} is of two kinds: {len(one.parts[0])} movements, and "
+            f"{printable(one.symbol)} could be two: {len(one.parts[0])} movements, and "
             + ", ".join(map(str, one.parts[1].tolist()))
             for one in found.splits
         ]
-        return "\n".join(lines) or "the symbols are well apart, and each is of one kind"
+        return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
 
     say(as_json, data, text)
 

@@ -1,4 +1,4 @@
-"""``kineme library`` ground, nearest, between, map: what symbols mean to a planner, and to each other."""
+"""``kineme library`` ground, schema, nearest, between and map."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from kineme.output.text import counted, printable
 @click.argument("symbol", type=SymbolName())
 @library_option
 @click.option("--by", type=click.Choice(["medoid", "mean"]), default="medoid", show_default=True,
-              help="What stands for it: its most typical movement, or the mean.")  # fmt: skip
-@click.option("--units", help="Of the positions, as mm, or one for each dimension, separated by commas.")
+              help="Prototype: the most typical movement, or the mean.")  # fmt: skip
+@click.option("--units", help="Units of the positions, as mm; one, or one per dimension separated by commas.")
 @click.option("--output", "-o", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), default="-",
               show_default=True, help="A .json file; - for the screen.")  # fmt: skip
 def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) -> None:
     """Write a symbol for a planner: primitive, parameters and their demonstrated ranges, as JSON.
 
-    kineme library schema prints the schema of it.
+    kineme library schema prints the JSON Schema of this output.
     """
     with opened(folder) as actions:
         grounding = actions.ground(symbol, by, units.split(",") if units and "," in units else units)
@@ -35,18 +35,18 @@ def ground(symbol: str, folder: Path, by: str, units: str | None, output: Path) 
 
 @click.command()
 def schema() -> None:
-    """Print the JSON Schema of what ground writes."""
+    """Print the JSON Schema of the output of ground."""
     text = files("kineme").joinpath("anchoring/grounding/grounding.schema.json").read_text(encoding="utf-8")
-    say(True, json.loads(text), str)  # as kineme.anchoring.grounding_schema(), which would load all of anchoring
+    say(True, json.loads(text), str)  # kineme.anchoring.grounding_schema() would load all of anchoring
 
 
 @click.command()
 @click.argument("symbol", type=SymbolName())
-@click.option("-k", type=whole(1), default=3, show_default=True, help="How many.")
+@click.option("-k", type=whole(1), default=3, show_default=True, help="Number of symbols to list.")
 @library_option
 @json_option
 def nearest(symbol: str, k: int, folder: Path, as_json: bool) -> None:
-    """List the symbols most like one."""
+    """List the symbols most similar to one."""
     with opened(folder) as actions:
         data = [one._asdict() for one in actions.nearest(symbol, k)]
     say(as_json, data, lambda: "\n".join(f"{one['distance']:.3f}  {printable(one['symbol'])}" for one in data))
@@ -64,19 +64,19 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
     say(as_json, data, lambda: "\n".join(map(_lies, data)) or "none")
 
 
-@click.command("map", short_help="Draw the symbols on a map, like near like.")
+@click.command("map", short_help="Draw a map of the symbols, similar ones near each other.")
 @click.argument("path", type=click.Path(dir_okay=False, path_type=Path))
 @library_option
 @json_option
 def draw(path: Path, folder: Path, as_json: bool) -> None:
-    """Draw the symbols on a map, those that are alike near each other: a .png, .svg or .pdf file."""
+    """Draw a map of the symbols, similar ones near each other: a .png, .svg or .pdf file."""
     from kineme.anchoring.figures.symbol_map import draw_map
     from kineme.library.symbols.grounding import prototype_of, space_of
     from kineme.output.figures import save_figure
 
     with opened(folder) as actions:
-        space = space_of(actions)
-        typical = [prototype_of(actions, actions[name]) for name in space.symbols]
+        space = space_of(actions.store)
+        typical = [prototype_of(actions.store, actions[name]) for name in space.symbols]
         save_figure(draw_map(space, actions.movements(ids=typical)), path)
         data = {"path": str(path), "symbols": list(space.symbols), "distances": space.distances.tolist()}
     say(as_json, data, lambda: f"wrote {printable(path)}: {counted(len(data['symbols']), 'symbol')}")

@@ -1,1 +1,1 @@
-"""Comparing movements: representations, normalization, averaged kernel, widths, alignment, bounds."""
+"""How alike movements are: representations, description, widths, averaged kernel, alignment, bounds."""

@@ -1,7 +1,7 @@
-"""Short codes of movements that bound the averaged kernel from above: the first of two stages of a search.
+"""Reduced features of movements bound the averaged kernel from above: the first stage of a two-stage search.
 
 Source of the idea: C. Faloutsos, M. Ranganathan, Y. Manolopoulos, "Fast subsequence matching in time-series databases",
-SIGMOD 1994, lemma 1: a search on codes whose distance is never larger than the true one dismisses nothing falsely.
+SIGMOD 1994, lemma 1: a search on features whose distance is never larger than the true one dismisses nothing falsely.
 """
 
 from __future__ import annotations
@@ -12,70 +12,76 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity
+from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Procrustes
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
 Single = NDArray[np.float32]
 
-N_CODES = 12  # per representation and dimension: on handwriting, hardly any of 200,000 is then in doubt
-_TILE_ROWS = 16_384  # codes at a time: what is computed of them stays in a core's cache
+N_REDUCED = 12  # per representation and dimension: on handwriting, hardly any of 200,000 is then in doubt
+_TILE_ROWS = 16_384  # movements at a time: what is computed of them stays in a core's cache
 _ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
 _NEWTON_STEPS = 6  # each brings the bound in space closer, and none below what it bounds
 
 
-class Code(NamedTuple):
-    """What a few functions say of the rows of one representation, and the size of what they leave out.
+class ReducedFeatures(NamedTuple):
+    """Feature rows of one representation in k coordinates per dimension, and the norm of what these leave out.
 
-    With P (S, k) orthonormal, each dimension of a row is ``x = P y + e``. The same P serves every dimension, so codes
-    y turn with the movement.
+    With P (S, k) orthonormal, each dimension of a row is ``x = P y + e``. The same P serves every dimension, so the
+    reduced features y turn with the movement.
     """
 
     values: Single  # (n, d * k), y dimension-major
     squares: Single  # (n,), |x|^2
-    rests: Single  # (n,), |e|
+    residual_norms: Single  # (n,), |e|
 
-    def take(self, chosen: Any) -> Code:
+    def take(self, chosen: Any) -> ReducedFeatures:
         """The chosen movements."""
-        return Code(self.values[chosen], self.squares[chosen], self.rests[chosen])
+        return ReducedFeatures(self.values[chosen], self.squares[chosen], self.residual_norms[chosen])
 
 
-def fit_bases(views: tuple[NDArray[Any], ...], n_dims: int, n_codes: int = N_CODES) -> tuple[Array, ...]:
+def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_REDUCED) -> tuple[Array, ...]:
     """For each representation, the k functions (S, k) that hold most of the rows' energy: principal components.
 
-    Dimensions are pooled and nothing is centered, so that turned rows have turned codes. Bounds hold for any
+    Dimensions are pooled and nothing is centered, so that turned rows have turned reduced features. Bounds hold for any
     orthonormal basis; movements unlike those that it was fitted to only make them less tight.
 
     Parameters
     ----------
-    views : tuple of R ndarrays of shape (n, d * S)
-        As from `views.view`.
+    rows : tuple of R ndarrays of shape (n, d * S)
+        As from `describe.feature_rows`.
     n_dims : int
-    n_codes : int, default 12
+    n_reduced : int, default 12
         k, or S where that is smaller.
     """
     bases = []
-    for rows in views:
-        x = np.asarray(rows, dtype=np.float64).reshape(len(rows) * n_dims, -1)
+    for block in rows:
+        x = np.asarray(block, dtype=np.float64).reshape(len(block) * n_dims, -1)
         vectors = np.linalg.eigh(x.T @ x)[1]
-        bases.append(np.ascontiguousarray(vectors[:, ::-1][:, :n_codes]))
+        bases.append(np.ascontiguousarray(vectors[:, ::-1][:, :n_reduced]))
     return tuple(bases)
 
 
-def encode(bases: tuple[Array, ...], views: tuple[NDArray[Any], ...], n_dims: int) -> tuple[Code, ...]:
-    """Codes of rows (n, d * S), one for each representation."""
-    codes = []
-    for P, rows in zip(bases, views, strict=True):
-        x = np.asarray(rows, dtype=np.float64)
+def reduce_features(
+    bases: tuple[Array, ...], rows: tuple[NDArray[Any], ...], n_dims: int
+) -> tuple[ReducedFeatures, ...]:
+    """Reduced features of rows (n, d * S), for each representation."""
+    reduced = []
+    for P, block in zip(bases, rows, strict=True):
+        x = np.asarray(block, dtype=np.float64)
         y = (x.reshape(len(x) * n_dims, -1) @ P).reshape(len(x), -1)
         squares = np.einsum("ij,ij->i", x, x)
-        rests = np.sqrt(np.maximum(squares - np.einsum("ij,ij->i", y, y), 0.0))
-        codes.append(Code(y.astype(np.float32), squares.astype(np.float32), rests.astype(np.float32)))
-    return tuple(codes)
+        norms = np.sqrt(np.maximum(squares - np.einsum("ij,ij->i", y, y), 0.0))
+        single = (part.astype(np.float32) for part in (y, squares, norms))
+        reduced.append(ReducedFeatures(*single))
+    return tuple(reduced)
 
 
-def log_bounds(similarity: AveragedSimilarity, asked: tuple[Code, ...], stored: tuple[Code, ...]) -> Single:
+def log_bounds(
+    similarity: AveragedSimilarity, asked: tuple[ReducedFeatures, ...], stored: tuple[ReducedFeatures, ...]
+) -> Single:
     """Numbers (n, m) that the logarithms of the averaged kernel do not exceed.
 
     With ``x = P y + e``, and R a rotation within the limit, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
@@ -85,22 +91,22 @@ def log_bounds(similarity: AveragedSimilarity, asked: tuple[Code, ...], stored: 
     n, m = len(asked[0].values), len(stored[0].values)
     bounds = np.empty((n, m), dtype=np.float32)
     average: Any = LOG_MEANS[similarity.mean]  # keeps single precision
-    louder = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
-    # What does not depend on the stored code is multiplied by 1 / sigma^2 beforehand.
+    log_weights = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
+    # What does not depend on the stored movements is multiplied by 1 / sigma^2 beforehand.
     scaled = [
-        Code(*(np.asarray(one / width**2, dtype=np.float32) for one in code))
-        for code, width in zip(asked, similarity.widths, strict=True)
+        ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in one))
+        for one, width in zip(asked, similarity.widths, strict=True)
     ]
 
     def fill(start: int, stop: int) -> None:
         logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
-        for r, code in enumerate(stored):
+        for r, block in enumerate(stored):
             half = np.float32(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
-            most = _alignments(similarity.procrustes, scaled[r].values, code.values[start:stop])
-            most += code.rests[start:stop, None] * scaled[r].rests
-            most -= half * code.squares[start:stop, None]
-            most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(louder[r])
-            np.minimum(most, np.float32(louder[r]), out=logs[r])
+            most = _alignments(similarity.procrustes, scaled[r].values, block.values[start:stop])
+            most += block.residual_norms[start:stop, None] * scaled[r].residual_norms
+            most -= half * block.squares[start:stop, None]
+            most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(log_weights[r])
+            np.minimum(most, np.float32(log_weights[r]), out=logs[r])
         bounds[:, start:stop] = average(logs).T
 
     for_tiles(fill, m, max(1, _TILE_ROWS // n))
@@ -108,7 +114,7 @@ def log_bounds(similarity: AveragedSimilarity, asked: tuple[Code, ...], stored: 
 
 
 def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
-    """Largest inner products (m, n) of codes after rotation; in space, numbers that are not below them."""
+    """Largest inner products (m, n) of reduced features after rotation; in space, numbers that are not below them."""
     d, n = procrustes.n_dims, len(A)
     if procrustes.max_angle == 0 or d == 1:
         return np.asarray(B @ A.T)

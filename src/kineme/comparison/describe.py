@@ -1,14 +1,17 @@
-"""Movements as a recognizer sees them: smooth paths, then one block of rows per representation."""
+"""Movements are described: smoothed, then one block of rows per representation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import Representation
+from kineme.comparison.specification import Compares, ComparisonSpecification, specification_of
+from kineme.errors import TrajectoryError
+from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -19,42 +22,145 @@ _TILE_SAMPLES = 200_000  # numbers in one tile of paths: smaller ones make two t
 N_POINTS = 199  # even samples between the recording and the phases; every second is one of 100
 
 
-def view(
-    movements: Any, representations: Sequence[Representation], normalization: Normalization, cutoff: float | None
-) -> tuple[Array, ...]:
-    """Smooth movements below `cutoff` cycles each, and describe them: rows (n, d * S) per representation."""
+@dataclass(frozen=True, eq=False)
+class Described:
+    """n movements in each of R representations, ready for comparison.
+
+    Attributes
+    ----------
+    blocks : tuple of R Prepared
+        One block of n rows for each representation.
+    procrustes : Procrustes
+        The distance between rows.
+    mean : str
+        The A-average over representations.
+    """
+
+    blocks: tuple[Prepared, ...]
+    procrustes: Procrustes
+    mean: str = "arithmetic"
+
+    def __len__(self) -> int:
+        return len(self.blocks[0].rows)
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return self.procrustes.n_dims
+
+    def take(self, chosen: Any) -> Described:
+        """The chosen movements: a slice, a mask or indices."""
+        return Described(tuple(block.take(chosen) for block in self.blocks), self.procrustes, self.mean)
+
+    def select(self, representations: Iterable[int]) -> Described:
+        """The same movements in some of the representations."""
+        return Described(tuple(self.blocks[r] for r in representations), self.procrustes, self.mean)
+
+
+def describe(movements: Any, like: Compares | None = None) -> Described:
+    """Describe movements.
+
+    Parameters
+    ----------
+    movements : Described, or movements as `Demonstrations.of` accepts them
+    like : Recognizer, Comparison or ComparisonSpecification, optional
+        Whose representations, invariances, smoothing and mean to take; it need not be fitted.
+
+    Returns
+    -------
+    Described
+        Movements that are described already are returned as they are.
+    """
+    if isinstance(movements, Described):
+        return movements
+    how = specification_of(like)
     demos = Demonstrations.of(movements)
-    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in representations)
+    return prepare(feature_rows(demos, how), how, how.procrustes(demos.n_dims))
+
+
+def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None) -> Described:
+    """Feature rows of n movements that were stored, the representations one after the other, as descriptions.
+
+    Parameters
+    ----------
+    rows : array_like of shape (n, sum_r d S_r)
+        As `feature_rows` gives them, concatenated.
+    n_dims : int
+        Dimensions d of the movements.
+    like : Recognizer, Comparison or ComparisonSpecification, optional
+        The one that the rows were made for.
+
+    Raises
+    ------
+    TrajectoryError
+        Rows of another width than the representations make.
+    """
+    how = specification_of(like)
+    rows = np.asarray(rows)
+    widths = [n_dims * one.n_points for one in how.representations]
+    if rows.ndim != 2 or rows.shape[1] != sum(widths) or not len(rows):
+        raise TrajectoryError(
+            f"expected feature rows of shape (n, {sum(widths)}) for {n_dims} dimensions and {len(widths)} "
+            f"representations, got shape {rows.shape}; pass n_dims and the recognizer that the rows were made for"
+        )
+    return prepare(np.split(rows, np.cumsum(widths)[:-1], axis=1), how, how.procrustes(n_dims))
+
+
+def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes) -> Described:
+    """Rows (n, d * S), one block per representation, ready for comparison.
+
+    In single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
+    """
+    blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
+    return Described(blocks, procrustes, like.specification.mean)
+
+
+def feature_rows(movements: Any, specification: ComparisonSpecification) -> tuple[Array, ...]:
+    """Smooth movements and describe them: rows (n, d * S) per representation, in double precision."""
+    demos = Demonstrations.of(movements)
+    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.representations)
 
     def fill(start: int, stop: int) -> None:
-        seen = view_tile(demos, start, stop, representations, normalization, cutoff)
-        for block, tile in zip(rows, seen, strict=True):
+        for block, tile in zip(rows, _tile_rows(demos, start, stop, specification)[1], strict=True):
             block[start:stop] = tile
 
-    for_tiles(fill, len(demos), tile_movements(demos.n_dims))
+    for_tiles(fill, len(demos), _tile_movements(demos.n_dims))
     return rows
 
 
-def view_tile(
+class Tile(NamedTuple):
+    """Movements start:stop of many, described; `paths` (n, d, T) are as `even_paths` gives them."""
+
+    start: int
+    stop: int
+    paths: Array
+    described: Described
+
+
+def for_described(
     demos: Demonstrations,
-    start: int,
-    stop: int,
-    representations: Sequence[Representation],
-    normalization: Normalization,
-    cutoff: float | None,
-) -> tuple[Array, ...]:
-    """The rows of movements start:stop."""
-    paths = even_paths(demos, start, stop, cutoff)
-    if not normalization.translation:
-        paths = paths + demos.positions[demos.offsets[start:stop]][:, :, None]
-    normalized: dict[tuple[float, int], Array] = {}  # representations share their phases
-    seen = []
-    for one in representations:
-        phase = (one.arc_share, one.n_points)
-        if phase not in normalized:
-            normalized[phase] = normalization.apply(one.along(paths))
-        seen.append(one.describe(normalized[phase], normalization.translation))
-    return tuple(seen)
+    like: Compares,
+    procrustes: Procrustes,
+    work: Callable[[Tile], None],
+    most: int | None = None,
+) -> None:
+    """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
+
+    So the rows of a movement are compared before they leave the core's cache.
+    """
+    how = like.specification
+
+    def one_tile(start: int, stop: int) -> None:
+        work(describe_tile(demos, start, stop, how, procrustes))
+
+    step = _tile_movements(demos.n_dims)
+    for_tiles(one_tile, len(demos), step if most is None else min(step, most))
+
+
+def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, procrustes: Procrustes) -> Tile:
+    """Describe movements start:stop, all at once."""
+    paths, rows = _tile_rows(demos, start, stop, like.specification)
+    return Tile(start, stop, paths, prepare(rows, like, procrustes))
 
 
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
@@ -64,6 +170,27 @@ def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | Non
     return smooth_rows(demos, start, stop, cutoff, N_POINTS)
 
 
-def tile_movements(n_dims: int) -> int:
+def recorded_paths(demos: Demonstrations, paths: Array, start: int = 0) -> Array:
+    """Paths (n, d, T) of movements start:start + n, as `even_paths` gives them, moved to where they were recorded."""
+    return paths + demos.positions[demos.offsets[start : start + len(paths)]][:, :, None]
+
+
+def _tile_rows(
+    demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
+) -> tuple[Array, tuple[Array, ...]]:
+    """Paths of movements start:stop, as `even_paths` gives them, and their feature rows."""
+    relative = even_paths(demos, start, stop, how.cutoff)
+    paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
+    normalized: dict[tuple[float, int], Array] = {}  # representations share their phases
+    rows = []
+    for one in how.representations:
+        phase = (one.arc_share, one.n_points)
+        if phase not in normalized:
+            normalized[phase] = how.normalization.apply(one.along(paths))
+        rows.append(one.describe(normalized[phase], how.normalization.translation))
+    return relative, tuple(rows)
+
+
+def _tile_movements(n_dims: int) -> int:
     """Movements of one tile."""
     return max(1, _TILE_SAMPLES // (n_dims * N_POINTS))

@@ -1,4 +1,4 @@
-"""Which representations speak, and how loudly: chosen on the training movements where they suffice."""
+"""Weights of the representations: given, equal, or fitted to the training movements where these suffice."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.comparison.describe import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
 from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
-from kineme.kernels.procrustes import Prepared
 from kineme.validation import Array
 
-ENOUGH = 8  # demonstrations of every class, from which on they choose
-_ROWS = 500  # movements that the choice is made on, at most
-_LEAST = 0.02  # a representation with a smaller share costs more than it says
+ENOUGH = 8  # demonstrations of every class, from which on weights are fitted
+_ROWS = 500  # movements that they are fitted to, at most
+_LEAST = 0.02  # a representation with a smaller weight costs more time than it is worth
+_DEFAULTS = 0.5  # of the weight always belongs to the default representations
 
-#: What is chosen from where nothing is prescribed: both quantities over time, arc length, and between.
+#: Representations whose weights are fitted by default: both quantities over time, arc length, and between.
 CANDIDATES = (
     *DEFAULT_REPRESENTATIONS,
     Representation("positions", arc_share=0.0),
@@ -28,53 +29,61 @@ CANDIDATES = (
 
 
 def suffices(per_class: NDArray[Any]) -> bool:
-    """Whether there are demonstrations enough to choose representations on."""
+    """Whether there are enough demonstrations of every class to fit weights."""
     return len(per_class) > 1 and int(per_class.min()) >= ENOUGH
 
 
-def chosen_weights(
-    similarity: AveragedSimilarity, views: tuple[Prepared, ...], labels: NDArray[Any], n_usual: int
+def fitted_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], n_defaults: int
 ) -> Array:
-    """Half of them chosen by `aligned_weights`, half equal on the first `n_usual` representations, (R,).
+    """Half of the weight as `aligned_weights` fits it, half shared equally by the first `n_defaults` representations.
 
-    The training movements know which representation is right among them. The other half is for what they have not
-    shown: what the usual representations see is never unheard.
+    The training movements tell which representations separate *them*. A default representation that does not help on
+    them may be the one that recognizes a movement perturbed in a way that they do not show, so the defaults keep half
+    of the weight whatever is fitted.
+
+    Returns
+    -------
+    ndarray of shape (R,)
+        Summing to 1.
     """
-    usual = np.arange(len(views)) < n_usual
-    return np.asarray(0.5 * aligned_weights(similarity, views, labels) + 0.5 * usual / n_usual)
+    defaults = np.arange(len(described.blocks)) < n_defaults
+    fitted = aligned_weights(similarity, described, labels)
+    return np.asarray((1.0 - _DEFAULTS) * fitted + _DEFAULTS * defaults / n_defaults)
 
 
-def aligned_weights(similarity: AveragedSimilarity, views: tuple[Prepared, ...], labels: NDArray[Any]) -> Array:
+def aligned_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
     """Weights w >= 0 with which the average of the kernels is most like the kernel of the labels.
 
     Minimizes ``|sum_r w_r K_r - Y|`` over all pairs of different movements, K_r and Y (1 for a pair of one class, else
     0) centered, which up to its length is the w of largest alignment (Cortes, Mohri, Rostamizadeh, "Algorithms for
-    learning kernels based on centered alignment", Journal of Machine Learning Research 13, 2012, Proposition 9). We
-    leave the diagonal out: a movement is like itself in every representation, which says nothing.
+    learning kernels based on centered alignment", Journal of Machine Learning Research 13, 2012, Proposition 9). The
+    diagonal is left out: a movement is like itself in every representation, which distinguishes none.
 
     Parameters
     ----------
     similarity : AveragedSimilarity
         Of equal weights.
-    views : tuple of R Prepared
+    described : Described
+        In R representations.
     labels : ndarray of shape (n,)
         In the order of the rows; at most 500 evenly spaced movements are compared.
 
     Returns
     -------
     ndarray of shape (R,)
-        Summing to 1; shares below 0.02 are 0.
+        Summing to 1; weights below 0.02 are 0.
     """
     from scipy.optimize import nnls
 
     chosen = evenly_spaced(len(labels), _ROWS)
-    some = tuple(one.take(chosen) for one in views)
+    some = described.take(chosen)
     same = (labels[chosen, None] == labels[None, chosen]).astype(float)
     kernels = np.stack([_centered(one) for one in np.exp(similarity.logs(some, some))], axis=1)
     weights, _ = nnls(kernels, _centered(same))
     weights = np.where(weights >= _LEAST * weights.sum(), weights, 0.0)
-    if not weights.any():  # no kernel knows the classes
-        return np.full(len(views), 1.0 / len(views))
+    if not weights.any():  # no kernel is like that of the labels
+        return np.full(len(described.blocks), 1.0 / len(described.blocks))
     return np.asarray(weights / weights.sum())
 
 
@@ -102,7 +111,7 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
 def _centered(gram: Array) -> Array:
     """The pairs of different movements, after rows and columns are centered."""
     gram, n = gram.copy(), len(gram)
-    np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))  # no say of its own
+    np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))  # the diagonal moves no mean
     gram -= gram.mean(axis=0)
     gram -= gram.mean(axis=1, keepdims=True)
     return gram[~np.eye(n, dtype=bool)]

@@ -1,5 +1,5 @@
-"""Real data sets that come inside wheels."""
+"""Data sets of real recordings that are installed with the package."""
 
-from kineme.datasets.lasa import LASA_26, LASA_30, PAPER_LETTERS, load_lasa
+from kineme._lazy import lazy_names as _lazy_names
 
-__all__ = ["LASA_26", "LASA_30", "PAPER_LETTERS", "load_lasa"]
+__getattr__, __dir__, __all__ = _lazy_names(__name__)

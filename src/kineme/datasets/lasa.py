@@ -87,6 +87,6 @@ def _read(path: Path) -> Demos:
     """All demonstrations of one file."""
     try:
         return read_demos(path.read_bytes())
-    except OSError as error:  # that of the reader, a `DataError`, included
+    except OSError as error:  # includes the reader's `DataError`
         reason = error.__cause__ or error
         raise DataError(f"expected {path.name} to be a MATLAB file with 'demos', got {reason!r}{_ADVICE}") from error

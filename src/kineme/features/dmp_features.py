@@ -1,4 +1,4 @@
-"""From trajectories to the feature vector of Eq. (9), as a scikit-learn transformer."""
+"""DMP features of movements, Eq. (9), as a scikit-learn transformer."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class DMPFeatures(MovementFeatures):
     fit_to : {"forcing", "trajectory"}, default "forcing"
         The `fit` of `DMP`; a scikit-learn estimator has a method of that name.
     dtype : {"float64", "float32"}, default "float64"
-        Of the result; kernels compute in the type they are given.
+        Type of the result; kernels compute in the type of their input.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class DMPFeatures(MovementFeatures):
         self.dtype = dtype
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Check the parameters and remember the dimensions of the movements; nothing is learned from y."""
+        """Check the parameters and store the number of dimensions; y is ignored."""
         self._check_parameters()
         shared = {field.name for field in fields(DMP)} - {"fit"}
         self.dmp_ = DMP(fit=self.fit_to, **{name: getattr(self, name) for name in shared})

@@ -1,4 +1,4 @@
-"""What a transformer from movements to feature rows is, whatever its primitives are."""
+"""Base class of the transformers from movements to features."""
 
 from __future__ import annotations
 

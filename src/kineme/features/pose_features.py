@@ -27,9 +27,9 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
     features : DMPFeatures, optional
         What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_basis`` and so on.
     orientation_weight : float, default 0.2
-        How much a radian counts beside the positions, in their unit per radian: 0.2 m, about the length of a hand or
-        a tool, weighs a turn by how far it moves the tip. Positions in millimeters need 200. Without positions it
-        is not used.
+        Weight of a radian beside the positions, in their unit per radian. With 0.2 m, about the length of a hand or a
+        tool, a rotation counts as much as the displacement of the tip. Positions in millimeters need 200. Not used
+        without positions.
 
     Attributes
     ----------
@@ -51,13 +51,13 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         self.orientation_weight = orientation_weight
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Check the parameters and the movements; nothing is learned from y."""
+        """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
         demonstrations = Demonstrations.of(X)
         self.n_columns_ = demonstrations.n_dims
         self.steps_ = tuple(self.features_.preprocessing)
-        self.features_.set_params(preprocessing=())  # done before the goal is read; see to_tangent
+        self.features_.set_params(preprocessing=())  # preprocessing is applied in to_tangent, before the goal is read
         self.features_.fit(self._tangent(demonstrations))
         return self
 

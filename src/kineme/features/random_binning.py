@@ -1,4 +1,4 @@
-"""An explicit feature map of the truncated Euclidean kernel, for sets too large for a Gram matrix."""
+"""Random binning: an explicit feature map of the truncated Euclidean kernel, for sets too large for a Gram matrix."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     m : float, optional
-        Where differences are truncated; by default that of `TruncatedEuclidean`'s median heuristic.
+        Difference at which the kernel is truncated; by default from the median heuristic of `TruncatedEuclidean`.
     sigma : float, default 1.0
         As in Eq. (7): below 1 the pitch is ``sigma m``; above 1 the kernel has a constant, one more column.
     n_shifts : int, default 4
         Random grids P per coordinate. The error of ``Z Z^T`` falls as ``1 / sqrt(P n)`` with n coordinates.
     seed : int, default 0
-        Of the shifts.
+        Seed of the random shifts.
 
     Attributes
     ----------
     m_ : float
     n_features_in_ : int
     n_columns_ : int
-        Columns of Z. Numbers beyond the bins seen in `fit` share none with them: they count as different, as they are.
+        Columns of Z. Values outside the bins of the training rows have no column: they share no bin with those rows.
 
     References
     ----------
@@ -77,7 +77,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         self.pitch_ = self.m_ * min(1.0, float(self.sigma))
         draws = np.random.default_rng(self.seed).uniform(size=(rows.shape[1], self.n_shifts))
         self.shifts_ = draws * self.pitch_
-        with np.errstate(over="ignore"):  # then there are too many bins, too
+        with np.errstate(over="ignore"):  # an overflow means too many bins too, which is refused below
             low, high = (np.floor((edge[:, None] + self.shifts_) / self.pitch_) for edge in (rows.min(0), rows.max(0)))
         counts = (high - low + 1).ravel()
         if not counts.sum() <= _COLUMNS:
@@ -106,8 +106,8 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         # sigma > 1: k = m (1 - 1/sigma) + (m / sigma) hat; sigma < 1: k = m hat of pitch sigma m.
         weight = np.sqrt(self.m_ / (max(1.0, float(self.sigma)) * per_row))
         values = (weight * seen).reshape(-1)
-        index = np.int32 if n * per_row <= _COLUMNS else np.int64  # scikit-learn's linear models want 32 bits
-        ends = np.arange(n + 1, dtype=index) * per_row  # stays of that type
+        index = np.int32 if n * per_row <= _COLUMNS else np.int64  # scikit-learn's linear models need 32-bit indices
+        ends = np.arange(n + 1, dtype=index) * per_row  # keeps that type
         Z = csr_array((values, columns.ravel(), ends), shape=(n, int(self.bins_.sum())))
         Z.eliminate_zeros()
         if self.sigma > 1:

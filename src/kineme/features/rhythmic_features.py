@@ -1,4 +1,4 @@
-"""From rhythmic recordings to feature rows, as a scikit-learn transformer."""
+"""Features of rhythmic recordings, as a scikit-learn transformer."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
 class RhythmicFeatures(MovementFeatures):
-    """Describe each recording by its rhythmic DMP: one cycle, whatever part of it came first, rows as in Eq. (9).
+    """Describe each recording by its rhythmic DMP: features of one cycle, wherever it started, rows as in Eq. (9).
 
     Parameters
     ----------
     feature : {"shape-attractor", "forcing", "weights"}, default "shape-attractor"
-        ``r f``, which knows the amplitude; f or w, which do not. None of them knows place and tempo.
+        ``r f``, which depends on the amplitude; f or w, which do not. None of them depends on translation and tempo.
     n_basis, stiffness, damping, ridge, n_points, overlap, period, align_on, aperiodic, preprocessing
         The specification; see `RhythmicDMP`.
     n_samples : int, default 100
@@ -26,13 +26,13 @@ class RhythmicFeatures(MovementFeatures):
     fit_to : {"forcing", "trajectory"}, default "trajectory"
         The `fit` of `RhythmicDMP`.
     dtype : {"float64", "float32"}, default "float64"
-        Of the result.
+        Type of the result.
 
     Attributes
     ----------
     dmp_ : RhythmicDMP
-        The specification in force. Unless `align_on` is given, it names the dimension with the largest first harmonic
-        in most training recordings: two dimensions that are nearly alike must not take turns.
+        The specification in force. Unless `align_on` is given, it is the dimension with the largest first harmonic in
+        most training recordings, one for all: otherwise it could change between recordings with two similar dimensions.
     n_dims_ : int
         Dimensions d of the training movements.
     """
@@ -70,7 +70,7 @@ class RhythmicFeatures(MovementFeatures):
         self.dtype = dtype
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Check the parameters and choose the dimension to align on; nothing is learned from y.
+        """Check the parameters and choose the dimension to align on; y is ignored.
 
         Raises
         ------

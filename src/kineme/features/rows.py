@@ -1,4 +1,4 @@
-"""From learned primitives to the rows of Eq. (9)."""
+"""Feature rows of learned primitives, Eq. (9)."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Files: recordings in, movements out, and a container for learned things. No pickle, atomic writes."""
+"""Files: read recordings, write movements, and save learned models. No pickle; writes are atomic."""

@@ -1,4 +1,4 @@
-"""Leave out of a file's movements those that are none, and say why; nothing loops over the good ones."""
+"""Drop the invalid movements of a file and report why; no Python loop runs over the valid ones."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ Flags = NDArray[np.bool_]
 
 
 def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block, list[Problem]]:
-    """The movements that can be used, and a problem for each other one.
+    """The valid movements, and one problem for each invalid movement.
 
     Parameters
     ----------
     block : Block
     file : str
-        For the problems.
+        Name of the file in the problems.
     skip : {"movement", "sample"}
-        Whether a sample that is missing, infinite, out of range, or not later than the one before costs its movement
-        or is left out alone. Movements of fewer than `MIN_SAMPLES` samples are left out in any case, and so are those
-        whose extent is out of range; the ranges are those of `kineme.validation`.
+        What is dropped for a sample that is missing, infinite, out of range, or not later than the one before: its
+        movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent out of range,
+        are always dropped; the ranges are those of `kineme.validation`.
     """
     problems: list[Problem] = []
     odd = _unusable(block, skip)
@@ -59,7 +59,7 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
 
 
 def _unusable(block: Block, skip: str) -> Flags:
-    """Per sample: out of range, or not later than the sample before (than all before, where samples are left out)."""
+    """Per sample: out of range, or not later than the sample before; if samples are dropped, than all kept before."""
     total = len(block.positions)
     odd: Flags = np.asarray(~(np.abs(block.positions) <= LARGEST_POSITION).all(axis=1))
     if block.faults:
@@ -76,14 +76,14 @@ def _unusable(block: Block, skip: str) -> Flags:
 
 
 def _late_after_leaving_out(times: Array, offsets: NDArray[np.intp], odd: Flags, late: Flags) -> Flags:
-    """Samples not later than all usable ones before them, in those movements that have any fault."""
+    """Samples not later than all usable ones before them, in the movements that have a fault."""
     result = np.zeros_like(odd)
     owners = np.unique(np.searchsorted(offsets, np.flatnonzero(odd | late), side="right") - 1)
     for i in owners:
         rows = slice(offsets[i], offsets[i + 1])
         usable = np.where(odd[rows], -np.inf, times[rows])
         before = np.maximum.accumulate(np.concatenate(([-np.inf], usable[:-1])))
-        with np.errstate(invalid="ignore"):  # of what is left out
+        with np.errstate(invalid="ignore"):  # dropped samples may be NaN or infinite
             result[rows] = ~odd[rows] & ~(usable - before >= SHORTEST_STEP)
     return result
 

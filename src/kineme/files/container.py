@@ -1,8 +1,7 @@
-"""One file for learned things: a JSON header and plain arrays in a zip archive, as NumPy's npz.
+"""The file format of learned models: a JSON header and plain arrays in a zip archive, like NumPy's npz.
 
-Nothing in such a file is ever executed or looked up as a class: the header is data, arrays of objects are
-refused, and what a header means is decided by tables in this library. The archive's checksums make
-truncation and damage visible.
+Nothing in such a file is executed or looked up as a class: the header is data, arrays of objects are refused, and the
+meaning of a header is defined by tables in this library. The checksums of the archive detect truncation and damage.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[
     Parameters
     ----------
     kind : str
-        What the file holds; `read_container` refuses any other.
+        Name of the content; `read_container` refuses a file of another one.
     header : dict
         Anything that JSON can hold.
     arrays : dict
@@ -46,7 +45,7 @@ def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[
 
 
 def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
-    """Read a file of `write_container`; an array is read when it is asked for.
+    """Read a file of `write_container`; each array is read on first use.
 
     Raises
     ------

@@ -12,11 +12,11 @@ _OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=Tr
 
 
 def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
-    """All files that are not hidden, sorted, and what is wrong with the others and with folders.
+    """All files that are not hidden, sorted, and the problems with links and folders.
 
-    Names that begin with a dot are passed over. Links to folders are followed after everything else, and no folder is
-    entered twice. A link that leads out of the folder is a problem, and followed only with `follow_links`: a folder
-    that somebody sent must not fetch what lies elsewhere.
+    Names that begin with a dot are skipped. Links to folders are followed last, and no folder is entered twice. A link
+    that leads out of the folder is a problem, and followed only with `follow_links`: a folder from elsewhere must not
+    make the program read other files of this machine.
     """
     files: list[Path] = []
     problems: list[Problem] = []
@@ -45,13 +45,13 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
 
 
 def _leads_out(link: Path, folder: Path) -> bool:
-    """Whether a link leads to something, and that lies elsewhere."""
+    """Whether the target of a link exists and lies outside the folder."""
     target, top = os.path.realpath(link), os.path.realpath(folder)
     return os.path.exists(target) and os.path.commonpath([target, top]) != top
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:
-    """Not where nobody can tell, such as a link to itself: reading it as a file says why."""
+    """Whether a path is a folder; False if unknown, as for a link to itself: reading it as a file reports why."""
     try:
         return entry.is_dir()
     except OSError:
@@ -59,6 +59,6 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
 
 
 def as_text(path: Path | str) -> str:
-    r"""A path with forward slashes; bytes that are no text are written as ``\xff``, so that it can be stored."""
+    r"""A path with forward slashes; bytes that are not UTF-8 are escaped as ``\xff``, so that it can be stored."""
     plain = path.as_posix() if isinstance(path, Path) else path
     return plain.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

@@ -1,4 +1,4 @@
-"""The one table of formats: file ending to reader."""
+"""The table of formats: file extension -> reader."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.table_movements import table_movements
 from kineme.files.tables.text_table import read_text_table
 
-_NUMBER, _LIST = 32, 88  # bytes that one takes in Python
+_NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
 class Format(NamedTuple):
-    """How the bytes of a file become movements, and whether the file's name is their label."""
+    """The reader of a format, and whether the name of the file is the label of its movements."""
 
     read: Callable[[bytes, Layout], Found]
     label_is_stem: bool = False

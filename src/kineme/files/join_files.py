@@ -1,24 +1,26 @@
-"""Many files as one set of demonstrations, each movement with where it comes from."""
+"""Merge many files into one set of demonstrations, each movement with its source."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.parsed_file import Block, Detected, Problem
 from kineme.files.read_file import FileRead
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.trajectory import Trajectory
 
 
 class Source(NamedTuple):
-    """Where a movement comes from.
+    """The source of a movement.
 
     Attributes
     ----------
@@ -45,7 +47,9 @@ class Source(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """What was read, where it comes from, and what could not be read.
+    """Movements with their sources, and the problems of what could not be read.
+
+    A sequence of `Trajectory`, taken wherever movements are expected.
 
     Attributes
     ----------
@@ -66,6 +70,17 @@ class Recordings:
 
     def __len__(self) -> int:
         return len(self.sources)
+
+    def __iter__(self) -> Iterator[Trajectory]:
+        return iter(self.demonstrations)
+
+    @overload
+    def __getitem__(self, index: int) -> Trajectory: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
+    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
+        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
+        return self.demonstrations[index]
 
     @property
     def labels(self) -> tuple[str | None, ...]:
@@ -137,7 +152,7 @@ def _joined(arrays: Sequence[Any]) -> Any:
 
 
 def _stamps(block: Block) -> Any:
-    """Times, or an even second where a file has none."""
+    """Time stamps; if a file has none, even ones over one second."""
     if block.times is not None:
         return block.times
     lengths = np.diff(block.offsets)

@@ -1,8 +1,8 @@
-"""One limit on what a file may take in memory once it is read, whatever its format.
+"""The limit on the memory that one file may take once it is read, for all formats.
 
-A small file can expand to more than any memory holds: by compression, by a header that promises much, by numbers
-written in two characters each. Readers therefore ask here before they expand anything. The limit is
-the environment variable ``KINEME_MAX_FILE_BYTES``; by default 4 GiB, or half of the memory where that is less.
+A small file can need more memory than there is: by compression, by the sizes in its header, or by numbers of two
+characters each. Readers therefore check here before they allocate. The limit is the environment variable
+``KINEME_MAX_FILE_BYTES``; by default 4 GiB, or half of the memory if that is less.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def max_file_bytes() -> int:
 
 
 def check_expanded(n_bytes: int, what: str = "a file") -> None:
-    """Refuse what would take more memory than the limit.
+    """Refuse a size in memory above the limit.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def check_expanded(n_bytes: int, what: str = "a file") -> None:
 
 
 def read_limited(stream: BinaryIO) -> bytes:
-    """All bytes of a stream that does not say how many there are."""
+    """All bytes of a stream of unknown length, up to the limit."""
     chunks: list[bytes] = []
     n_bytes = 0
     while chunk := stream.read(_CHUNK):
@@ -68,6 +68,6 @@ def read_limited(stream: BinaryIO) -> bytes:
 def _by_default() -> int:
     try:
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):  # not every system tells
+    except (AttributeError, ValueError, OSError):  # not every system has this
         return _MOST
     return min(_MOST, memory // 2) if memory > 0 else _MOST

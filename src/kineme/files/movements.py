@@ -1,4 +1,4 @@
-"""Writing one generated movement to a file: CSV, NPZ, JSON."""
+"""Write one generated movement to a file: CSV, NPZ, JSON."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from kineme.errors import DataError
+from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
 from kineme.validation import Array
+
+_DERIVATIVES = ("velocities", "accelerations")
 
 Columns = dict[str, Array]  # times (T,), positions, velocities and accelerations (T, d)
 
@@ -23,16 +27,45 @@ def encode_movement(columns: Columns, ending: str) -> bytes:
     Raises
     ------
     DataError
-        An ending that no writer has; the message lists those that do.
+        No writer has that extension; the message lists those that exist.
     """
     if ending not in WRITERS:
         raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
     return WRITERS[ending](columns)
 
 
-def write_movement(path: Path, columns: Columns) -> Path:
-    """Write a movement in the format that the file's ending names, atomically."""
+def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
+    """Write one movement to a CSV, NPZ or JSON file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its ending names the format.
+    movement : MovementsLike or dict
+        One movement, in any way that `Demonstrations.of` takes it; of a rollout velocities and accelerations are
+        written too. Or a dict of ``times`` (T,), ``positions`` and, if you like, ``velocities`` and ``accelerations``
+        (T, d).
+
+    Returns
+    -------
+    Path
+        Where it was written; `read_recording` reads it.
+
+    Raises
+    ------
+    DataError
+        An ending that no writer has, or a file that cannot be written.
+    TrajectoryError
+        Several movements, or what is none.
+    """
+    path, columns = Path(path), movement if isinstance(movement, dict) else _columns_of(movement)
     return write_atomically(path, encode_movement(columns, path.suffix.lower()))
+
+
+def _columns_of(movement: MovementsLike) -> Columns:
+    one = as_recording(movement)
+    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
+    return {"times": one.times, "positions": one.positions, **derivatives}
 
 
 def _csv(columns: Columns) -> bytes:
@@ -54,5 +87,5 @@ def _json(columns: Columns) -> bytes:
     return (json.dumps({name: values.tolist() for name, values in columns.items()}) + "\n").encode()
 
 
-#: File ending -> encoder. All of them keep every bit of the numbers.
+#: File extension -> encoder. All of them keep every bit of the numbers.
 WRITERS: dict[str, Callable[[Columns], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}

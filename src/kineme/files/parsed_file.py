@@ -1,4 +1,4 @@
-"""What readers hand over: movements of one file as a block, what was detected, what was wrong and where."""
+"""The result of a reader: movements of one file as a block, how it was understood, and problems with their lines."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ _SHOWN = 40  # names in a message
 class Problem(NamedTuple):
     """Something that could not be read.
 
-    `line` counts from 1, None where a file has no lines. `error` is the class of error that it is where just this one
-    file is read.
+    `line` counts from 1; None if the file has no lines. `error` is the class that is raised if only this file is read.
     """
 
     file: str
@@ -52,10 +51,10 @@ class Detected(NamedTuple):
     units : str or float
         Their unit.
     units_from : str
-        How that is known: ``"given"``, ``"head"``, ``"dates"``; or guessed: ``"since 1970"``, ``"by its steps"``, see
+        Source of the unit: ``"given"``, ``"head"``, ``"dates"``; or a guess: ``"since 1970"``, ``"by its steps"``, see
         `kineme.files.tables.time_units.unit_by_size`, or ``"assumed"``.
     movement, label, ignored : tuple of str
-        Columns that tell movements apart, that name the action, and that are left aside.
+        Columns that tell movements apart, that name the action, and that are ignored.
     """
 
     format: str
@@ -116,6 +115,6 @@ class Found(NamedTuple):
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names for a message; of very many the first."""
+    """Names for a message; only the first ones of very many."""
     some = list(names)
     return str(some) if len(some) <= _SHOWN else f"{some[:_SHOWN]} and {len(some) - _SHOWN} more"

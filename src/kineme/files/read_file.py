@@ -1,4 +1,4 @@
-"""One file, whole: its bytes are read once, hashed, and turned into checked movements; what fails is a problem."""
+"""Read one file: its bytes are read once, hashed, and parsed into checked movements; failures become problems."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.files.limits import check_expanded
 from kineme.files.parsed_file import Block, Detected, Problem
 from kineme.files.tables.layout import Layout
 
-#: What readers raise on a file that is not what its name says; nested too deep and too large for the memory included.
+#: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (
     KinemeError,
     ValueError,
@@ -35,9 +35,9 @@ _NOWHERE = "expected a file, got a link that leads nowhere; delete it, or restor
 
 
 class FileRead(NamedTuple):
-    """What a file gave: movements and how they were understood, or neither; and what was wrong."""
+    """The result for one file: movements and how they were read, or neither; and its problems."""
 
-    path: str  # relative to what is read, as text
+    path: str  # relative to the folder that is read
     sha256: str
     size: int
     mtime: float
@@ -53,8 +53,8 @@ def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
     ----------
     path : Path
     relative : Path
-        How it is called in the result. Its innermost folder is the label of movements that carry none themselves,
-        unless the format has it that the file's own name is.
+        Path in the result. Its innermost folder is the label of movements without one in the file, unless the format
+        takes the name of the file itself.
     layout : Layout
     """
     name = as_text(relative)
@@ -72,30 +72,30 @@ def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
 
 
 def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
-    """Read what a file of that name holds."""
+    """Read the content of a file of that name."""
     name = as_text(relative)
     sha256 = hashlib.sha256(data).hexdigest()
     form = format_of(relative)
     try:
         check_expanded(len(data))
-        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is found to be infinite
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
             detected, block = form.read(data, layout)
             block, problems = check_block(block, name, layout.skip)
     except _UNREADABLE as error:
         return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     labels = [label if one is None else _storable(one) for one in block.labels]
-    block = Block(block.positions, block.times, block.offsets, labels, block.places)  # lets go of the file's bytes
+    block = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
     return FileRead(name, sha256, len(data), mtime, detected, block, problems)
 
 
 def format_of(path: Path) -> Format:
-    """The row of `FORMATS` for a file's ending.
+    """The row of `FORMATS` for a file's extension.
 
     Raises
     ------
     DataError
-        No format has that ending; the message lists those that there are.
+        No format has that extension; the message lists those that exist.
     """
     form = FORMATS.get(path.suffix.lower())
     if form is None:
@@ -104,12 +104,12 @@ def format_of(path: Path) -> Format:
 
 
 def _storable(label: str) -> str:
-    """A label without halves of characters, which JSON can hold but nothing can store or print."""
+    """A label without lone surrogates, which JSON can hold but which cannot be encoded as UTF-8."""
     return label.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _plainly(error: BaseException) -> str:
-    """What went wrong, on one line, whatever other libraries write."""
+    """The message of an exception on one line."""
     return " ".join(_reason(error).splitlines())
 
 

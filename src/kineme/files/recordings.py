@@ -1,4 +1,4 @@
-"""Reading recorded movements from a folder or a file, whatever the format; see `kineme.files.formats`."""
+"""Read recorded movements from a folder or a file of any format, see `kineme.files.formats`."""
 
 from __future__ import annotations
 

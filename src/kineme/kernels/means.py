@@ -47,6 +47,7 @@ def _harmonic(similarities: Rows) -> Rows:
         return np.reciprocal(mean, out=mean)
 
 
+#: Name of a mean -> how it averages similarities, and what is proved of it.
 MEANS: dict[str, Mean] = {
     "arithmetic": Mean(
         lambda k: k.mean(axis=0),

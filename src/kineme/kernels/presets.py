@@ -15,7 +15,7 @@ class PaperKernels(NamedTuple):
     truncated: TruncatedEuclidean
 
 
-# Keys are (feature, formulation) as `DMPFeatures` and `DMP` name them.
+#: (feature, formulation), as `DMPFeatures` and `DMP` name them -> the kernels of the paper, Table 3.
 PAPER_WIDTHS: dict[tuple[str, str], PaperKernels] = {
     ("weights", "original"): PaperKernels(RBF(500), TruncatedEuclidean(750, 1)),
     ("weights", "bio-inspired"): PaperKernels(RBF(3.5e7), TruncatedEuclidean(1e7, 1)),

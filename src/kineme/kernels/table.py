@@ -46,6 +46,7 @@ class KernelRow:
         return tuple(name for name, mean in MEANS.items() if proved[mean.psd])
 
 
+#: Name of a kernel -> its class, its formula, and what is proved of it.
 KERNELS: dict[str, KernelRow] = {
     "rbf": KernelRow(RBF, "exp(-‖x - y‖² / (2 σ²))", "(6)", psd=True, infinitely_divisible=True),
     "truncated": KernelRow(

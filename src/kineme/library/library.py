@@ -6,34 +6,35 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes, read, symbols
-from kineme.library.storage.connection import FILE
-from kineme.library.storage.placing import as_folder
+from kineme.library.storage.folder import FILE, as_folder
+from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
-from kineme.library.storage.store import Store
+from kineme.library.storage.store import Store, history
 
 if TYPE_CHECKING:
     from kineme.anchoring.grounding.space import Between, Near
     from kineme.anchoring.proposals.proposals import Proposal
     from kineme.library.learning.learn import LearnReport
-    from kineme.library.recognition.recognize import Serving
-    from kineme.library.storage.history import Version
+    from kineme.library.recognition.recognize import LibraryRecognizer
     from kineme.library.storage.source import Source
     from kineme.library.storage.symbols import Symbol
     from kineme.library.storage.verify import Problem
-    from kineme.library.symbols.proposals import LibraryProposals, Review
+    from kineme.library.storage.versions import Version
+    from kineme.library.symbols.proposals import LibraryProposals
+    from kineme.library.symbols.review import Review
     from kineme.movements.trajectories.demonstrations import Demonstrations
+    from kineme.movements.trajectories.trajectory import Trajectory
     from kineme.primitives.discrete.dmp import DMP
     from kineme.primitives.discrete.primitives import Primitives
+    from kineme.recognition.answer import Answer
     from kineme.recognition.recognizer import Recognizer
-
-Ids = NDArray[np.int64]
 
 
 class ActionLibrary:
@@ -183,7 +184,7 @@ class ActionLibrary:
         """Ids of the movements that show no symbol, ascending."""
         return read.unlabeled_ids(self.store)
 
-    def movements(self, symbol: str | None = None, ids: Any = None) -> Demonstrations:
+    def movements(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Demonstrations:
         """Recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
 
         Labels are the names of symbols if every one of the movements shows one, else None.
@@ -191,16 +192,16 @@ class ActionLibrary:
         chosen = self._choose(symbol, ids)
         return read.movements(self.store, chosen, read.names_of(self.store, chosen))
 
-    def features(self, ids: Any = None) -> NDArray[np.float32]:
+    def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
         """Rows of all representations of `specification`, one after the other, shape (k, sum of d * S)."""
         return read.features(self.store, self._choose(None, ids))
 
-    def primitives(self, symbol: str | None = None, ids: Any = None) -> Primitives:
+    def primitives(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Primitives:
         """Primitives: all, those of a symbol, or those of `ids`, in their order."""
         chosen = self._choose(symbol, ids)
         return read.primitives(self.store, chosen, read.names_of(self.store, chosen))
 
-    def _choose(self, symbol: str | None, ids: Any) -> Ids:
+    def _choose(self, symbol: str | None, ids: ArrayLike | None) -> Ids:
         return self.ids(symbol) if ids is None else read.as_ids(self.store, ids)
 
     def symbols(self) -> tuple[Symbol, ...]:
@@ -214,7 +215,13 @@ class ActionLibrary:
     def __contains__(self, who: object) -> bool:
         return symbols.exists(self.store, who)
 
-    def recognize(self, movements: Any, error_rate: float = 0.05) -> Any:
+    @overload
+    def recognize(self, movements: Trajectory | NDArray[Any], error_rate: float = ...) -> Answer: ...
+
+    @overload
+    def recognize(self, movements: Demonstrations | Sequence[Any], error_rate: float = ...) -> list[Answer]: ...
+
+    def recognize(self, movements: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """What each movement is, or that it is unknown; labels are names of symbols.
 
         Up to 1000 movements that show a symbol, all are compared as `kineme.Recognizer` does. Above, few are, chosen by
@@ -241,18 +248,16 @@ class ActionLibrary:
         TrajectoryError
             Movements of another number of dimensions.
         """
-        return self._serving.recognize(movements, error_rate)
+        return self._recognizer.recognize(movements, error_rate)
 
     @cached_property
-    def _serving(self) -> Serving:
-        from kineme.library.recognition.recognize import Serving
+    def _recognizer(self) -> LibraryRecognizer:
+        from kineme.library.recognition.recognize import LibraryRecognizer
 
-        return Serving(self.store)
+        return LibraryRecognizer(self.store)
 
     def history(self) -> tuple[Version, ...]:
         """Every change, the first one first."""
-        from kineme.library.storage.history import history
-
         return history(self.store)
 
     def at(self, version: int) -> ActionLibrary:
@@ -269,14 +274,14 @@ class ActionLibrary:
 
     def export(self, path: str | Path) -> Path:
         """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
-        from kineme.library.storage.exchange import export
+        from kineme.library.storage.export_import import export
 
         return export(self.store, path)
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
         """Make a library in `folder` of a file that `export` wrote, after checking every byte of it, and open it."""
-        from kineme.library.storage.exchange import import_
+        from kineme.library.storage.export_import import import_
 
         import_(path, folder)
         return cls(folder, **options)
@@ -289,7 +294,7 @@ class ActionLibrary:
         """Say what a symbol is, and set its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
         changes.describe(self.store, who, **({} if text is None else {"description": text}), **values)
 
-    def delete(self, what: Any) -> None:
+    def delete(self, what: str | ArrayLike) -> None:
         """Take a symbol away, given by name or id, whose movements stay; or movements, given by their ids.
 
         Earlier versions keep what is deleted, and `at` shows it.
@@ -303,18 +308,18 @@ class ActionLibrary:
         """Make one symbol of several: an existing one, or a new one of that name. Their ids become its parents."""
         changes.merge(self.store, names, into)
 
-    def split(self, name: str, ids: Any, new: str) -> None:
+    def split(self, name: str, ids: ArrayLike, new: str) -> None:
         """Make a new symbol of some members of another one, which becomes its parent."""
         changes.split(self.store, name, ids, new)
 
-    def assign(self, ids: Any, symbol: str, how: str = "anchored") -> None:
+    def assign(self, ids: ArrayLike, symbol: str, how: str = "anchored") -> None:
         """Let movements show a symbol, made if there is none, instead of the one that they showed.
 
         `how` is "label" (a person said so), "anchored" (by a cluster) or "recognized".
         """
         changes.assign(self.store, ids, symbol, how)
 
-    def release(self, ids: Any) -> None:
+    def release(self, ids: ArrayLike) -> None:
         """Let movements show no symbol any more."""
         changes.release(self.store, ids)
 
@@ -326,23 +331,27 @@ class ActionLibrary:
         dict
             Name of the symbol -> how many joined it.
         """
-        from kineme.library.symbols.proposals import join_symbols
+        from kineme.library.symbols.recognized import assign_recognized, recognized
 
-        return join_symbols(self, error_rate)
+        return assign_recognized(self.store, recognized(self.store, error_rate))
 
     def propose(
-        self, ids: Any = None, method: str | None = None, n_clusters: int | None = None, min_members: int = 3
+        self,
+        ids: ArrayLike | None = None,
+        method: str | None = None,
+        n_clusters: int | None = None,
+        min_members: int = 3,
     ) -> LibraryProposals:
-        """Kinds among the movements without a symbol, or among `ids`, for a person to name.
+        """Propose symbols for the movements without one, or for `ids`; a person names them.
 
-        Where there are symbols, what makes a kind is measured by them, see `kineme.anchoring.proposals.assign.place`;
-        else, and where `method` or `n_clusters` is given, the movements are clustered, see
-        `kineme.anchoring.proposals.propose.propose`. A kind of which four fifths were in one proposal that was rejected
-        is not proposed again. Fewer than three movements make no proposal.
+        Where there are symbols, these measure how alike movements of one symbol are, see
+        `kineme.anchoring.proposals.assign.place`; else, and where `method` or `n_clusters` is given, the movements are
+        clustered, see `kineme.anchoring.proposals.propose.propose`. A proposal is left out if four fifths of its
+        movements were in one proposal that was rejected. Fewer than three movements make no proposal.
         """
-        from kineme.library.symbols.proposals import propose_kinds
+        from kineme.library.symbols.proposals import propose
 
-        return propose_kinds(self, ids, method, n_clusters, min_members)
+        return propose(self.store, ids, method, n_clusters, min_members)
 
     def accept(self, proposal: Proposal, name: str, description: str | None = None) -> None:
         """Let the members of a proposal show the symbol of that name, made if there is none, its medoid the prototype.
@@ -351,13 +360,13 @@ class ActionLibrary:
         """
         from kineme.library.symbols.proposals import accept
 
-        accept(self, proposal, name, description)
+        accept(self.store, proposal, name, description)
 
     def reject(self, proposal: Proposal) -> None:
-        """Remember that these movements are no kind: they stay without a symbol and are not proposed again."""
+        """Remember that these movements are no symbol: they stay without one and are not proposed again."""
         from kineme.library.symbols.proposals import reject
 
-        reject(self, proposal)
+        reject(self.store, proposal)
 
     def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
         """A symbol in a planner's terms: the primitive that stands for it, and the ranges that were demonstrated.
@@ -376,31 +385,31 @@ class ActionLibrary:
         """
         from kineme.library.symbols.grounding import ground_symbol
 
-        return ground_symbol(self, who, by, units)
+        return ground_symbol(self.store, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
         """The symbols most like one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
         from kineme.library.symbols.grounding import space_of
 
-        return space_of(self).nearest(self[who].name, k)
+        return space_of(self.store).nearest(self[who].name, k)
 
     def between(self, a: str, b: str, eps: float = 0.25) -> tuple[Between, ...]:
         """The symbols that lie between two, the smallest detour first."""
         from kineme.library.symbols.grounding import space_of
 
-        return space_of(self).between(self[a].name, self[b].name, eps)
+        return space_of(self.store).between(self[a].name, self[b].name, eps)
 
-    def morph(self, a: str, b: str, shares: Any = 0.5) -> Primitives:
+    def morph(self, a: str, b: str, shares: ArrayLike = 0.5) -> Primitives:
         """Primitives on the way from a symbol to another, one for each share of the way: 0 is a, 1 is b."""
         from kineme.library.symbols.grounding import morph_symbols
 
-        return morph_symbols(self, a, b, shares)
+        return morph_symbols(self.store, a, b, shares)
 
     def review(self) -> Review:
-        """Symbols whose movements are hard to tell apart, and symbols whose movements are of two kinds.
+        """Symbols whose movements are hard to tell apart, and symbols whose movements form two clusters.
 
         Advice for `merge` and `split`; nothing is changed.
         """
-        from kineme.library.symbols.proposals import review_symbols
+        from kineme.library.symbols.review import review
 
-        return review_symbols(self)
+        return review(self.store)

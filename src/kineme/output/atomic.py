@@ -7,7 +7,7 @@ import re
 import secrets
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -26,25 +26,71 @@ def write_atomically(path: Path, data: bytes) -> Path:
         raise IsADirectoryError(f"expected the name of a file to write, got the folder {str(path)!r}; add a name")
     if not path.parent.is_dir():
         raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, there is none; create it")
-    with replaced(path) as beside:
+    with whole_file(path) as beside:
         beside.write_bytes(data)
     return path
 
 
 @contextmanager
-def replaced(path: Path) -> Iterator[Path]:
-    """Context manager: a hidden name beside `path` to write to; on success that file is flushed and renamed to `path`.
+def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = ()) -> Iterator[Path]:
+    """Context manager: a hidden name beside `path` to write to; on success that file is flushed and named `path`.
 
     Leftovers of killed processes are removed.
+
+    Parameters
+    ----------
+    path : Path
+    replace : bool, default True
+        Whether the new file takes the place of one that is there.
+    companions : sequence of str
+        Ends of the names of other files that may be made beside the new one, as "-wal" by SQLite; they are deleted.
+
+    Raises
+    ------
+    FileExistsError
+        `replace` is False and there is a file of that name, or another process was faster; it stays as it is.
+    OSError
+        The folder is missing, read-only or full; what was at `path` is as it was.
     """
+    if not replace and path.exists():
+        raise FileExistsError(path)
     remove_leftovers(path)
     beside = name_beside(path)
     try:
         yield beside
         bring_to_disk(beside)
-        beside.replace(path)
+        if replace:
+            beside.replace(path)
+        else:
+            _name_new(beside, path)
+            _bring_folder_to_disk(path.parent)
     finally:
-        beside.unlink(missing_ok=True)
+        for end in ("", *companions):
+            beside.with_name(beside.name + end).unlink(missing_ok=True)
+
+
+def _name_new(beside: Path, path: Path) -> None:
+    """Give a file its name, which no other file may have."""
+    try:
+        os.link(beside, path)  # unlike a rename, it refuses to replace
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links
+        if path.exists():
+            raise FileExistsError(path) from None
+        beside.rename(path)
+
+
+def _bring_folder_to_disk(folder: Path) -> None:
+    """Bring a new name to the disk, where folders can be opened."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def bring_to_disk(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What every batch of learned movements can do: count, choose, join, show, save and load its members."""
+"""Base class of batches of learned primitives: length, indexing, `join`, `save` and `load`."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from kineme.movements.trajectories.labels import label_array
 class Batch:
     """Base of frozen records of n learned movements of d dimensions, with one specification of N basis functions.
 
-    A subclass lists its arrays once, in `ROWS`; protection, selection, joining and files follow from that list.
+    A subclass lists its arrays once, in `ROWS`; write protection, indexing, concatenation and files use that list.
     """
 
-    #: Array -> its shape in the letters n, d, N.
+    #: Name of an array -> its shape in the letters n, d, N.
     ROWS: ClassVar[dict[str, str]]
     #: The class of `dmp`.
     SPECIFICATION: ClassVar[type]
-    #: What a saved file says that it holds.
+    #: Name of the content in saved files.
     KIND: ClassVar[str]
 
     dmp: Any
@@ -62,14 +62,14 @@ class Batch:
 
     @classmethod
     def join(cls, batches: Iterable[Self]) -> Self:
-        """Several batches as one, in the order given.
+        """Concatenate several batches, in the order given.
 
         Raises
         ------
         SpecificationError
-            Batches of different specifications: their numbers mean different things.
+            Batches of different specifications: their weights are not comparable.
         TrajectoryError
-            No batch, something else, batches of different dimensions, labels on some batches only.
+            No batch, something that is not a batch, batches of different dimensions, labels on some batches only.
         """
         batches = list(batches)
         if not batches or not all(isinstance(batch, cls) for batch in batches):

@@ -1,4 +1,4 @@
-"""Primitives to a file and back: the specification as data, numbers bit for bit."""
+"""Save primitives to files and load them: the specification as plain data, arrays bit for bit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import label_array
 from kineme.primitives.batch import Batch
 
-#: The preprocessing steps that a file can name. Files carry names of this table, never of classes.
+#: The preprocessing steps in files, by names of this table; files never contain names of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 
 _LABEL_TYPES = (str, int, float, bool)
@@ -39,7 +39,7 @@ def load_batch(cls: type[B], path: str | Path) -> B:
 
 
 def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays], T]) -> T:
-    """Read a file of one kind and build what it holds; a header or arrays that do not fit are a `DataError`."""
+    """Read a file with content of the given name and build it; a header or arrays that do not fit are a `DataError`."""
     header, arrays = read_container(Path(path), kind)
     try:
         return build(header, arrays)
@@ -107,7 +107,7 @@ def specification_to_dict(dmp: Any) -> dict[str, Any]:
 
 
 def specification_from_dict(specification: type[T], data: dict[str, Any]) -> T:
-    """Plain data as a specification; every parameter is checked as if a user had typed it."""
+    """Plain data as a specification; every parameter is checked like user input."""
     steps = []
     for record in data["preprocessing"]:
         parameters = dict(record)

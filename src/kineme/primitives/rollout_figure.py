@@ -1,4 +1,4 @@
-"""Generated movements in a picture."""
+"""A figure of generated movements."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kineme.output.figures import BLUE, GREEN, ORANGE, PURPLE, new_figure
 from kineme.output.text import drawable
 from kineme.validation import Array
 
-_MOST = 50  # movements in one picture; more would be a blot
+_MOST = 50  # movements in one figure; more would be illegible
 _ROWS = 8  # dimensions below each other, before a second column begins
 _COLORS = (BLUE, ORANGE, GREEN, PURPLE)
 

@@ -4,28 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.similarity import LOG_MEANS, SHARES
-from kineme.kernels.procrustes import Prepared
+from kineme.comparison.compared import Compared, for_compared
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Tile, recorded_paths
+from kineme.comparison.references import References
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.classifiers import Nearest
-from kineme.recognition.conformal import check_error_rate
+from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.classifiers import Classifier
+from kineme.recognition.conformal import Calibration
 from kineme.recognition.transform import Transform, map_onto
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
 
 _SHOWN = 3  # demonstrations named in an answer
 
 
 @dataclass(frozen=True)
 class Neighbor:
-    """A demonstration like the movement; `index` is its place in the recognizer's `demonstrations_`."""
+    """A stored demonstration that is similar to the movement.
+
+    Attributes
+    ----------
+    index : int
+        Its position in the recognizer's `demonstrations_`; in a library, its id.
+    name : str or None
+        Where it comes from.
+    similarity : float
+        The averaged kernel K between the two, from 0 to 1.
+    """
 
     index: int
     name: str | None
@@ -58,11 +69,11 @@ class Answer:
         Share of each representation in the similarity to the first of them; they sum to 1.
     """
 
-    label: Any
+    label: Label | None
     confidence: float
-    p_values: Mapping[Any, float]
+    p_values: Mapping[Label, float]
     calibrated: bool
-    ranked: tuple[Any, ...]
+    ranked: tuple[Label, ...]
     nearest: tuple[Neighbor, ...]
     transform: Transform
     responsibilities: Mapping[str, float]
@@ -74,21 +85,7 @@ class Answer:
 
 def is_one(X: Any) -> bool:
     """Whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
-    from kineme.movements.trajectories.trajectory import Trajectory
-
     return isinstance(X, Trajectory) or (isinstance(X, np.ndarray) and X.dtype != object and X.ndim <= 2)
-
-
-def answers(recognizer: Recognizer, X: Any, error_rate: float) -> list[Answer]:
-    """An answer for each movement."""
-    check_error_rate(error_rate)
-    demos = Demonstrations.of(X)
-    seen = recognizer.look_at(demos)
-    found: list[Answer] = []
-    for tile in recognizer._tiles(seen):
-        n = len(tile[0].rows)
-        found += answers_to(recognizer, demos[len(found) : len(found) + n], tile, error_rate)
-    return found
 
 
 def known_labels(classes: NDArray[Any], scores: Array, p_values: Array, error_rate: float) -> NDArray[np.object_]:
@@ -99,27 +96,50 @@ def known_labels(classes: NDArray[Any], scores: Array, p_values: Array, error_ra
     return np.asarray(labels)
 
 
-def answers_to(
-    recognizer: Recognizer, demos: Demonstrations, seen: tuple[Prepared, ...], error_rate: float
+def answers(
+    comparison: Comparison,
+    references: References,
+    classifier: Classifier,
+    calibration: Calibration,
+    demos: Demonstrations,
+    error_rate: float,
 ) -> list[Answer]:
-    """An answer for each movement of a tile that the recognizer has looked at."""
-    by_look = recognizer.similarity_.logs(seen, recognizer.views_)  # (R, n, m)
-    logs = LOG_MEANS[recognizer.mean](by_look)
-    nearest = np.maximum.reduceat(logs, recognizer.first_, axis=1)
-    classifier = recognizer.classifier_
-    scores = nearest if isinstance(classifier, Nearest) else classifier.scores(recognizer, seen)
-    calibration = recognizer.calibration()
-    p, calibrated = calibration.p_values(nearest, error_rate), bool(calibration.calibrated(error_rate).all())
-    labels = known_labels(recognizer.classes_, scores, p, error_rate)
-    classes = recognizer.classes_.tolist()
+    """An answer for each movement."""
+    found: dict[int, list[Answer]] = {}
+
+    def answer(tile: Tile, compared: Compared) -> None:
+        some = demos if len(compared) == len(demos) else demos[tile.start : tile.stop]
+        paths = recorded_paths(some, tile.paths)
+        found[tile.start] = answers_to(compared, classifier, calibration, some, paths, error_rate)
+
+    for_compared(comparison, references, demos, answer)
+    return [one for start in sorted(found) for one in found[start]]
+
+
+def answers_to(
+    compared: Compared,
+    classifier: Classifier,
+    calibration: Calibration,
+    demos: Demonstrations,
+    paths: Array,
+    error_rate: float,
+) -> list[Answer]:
+    """An answer for each movement of a tile that was compared; `paths` (n, d, T) are where they were recorded."""
+    scores = classifier.scores(compared)
+    p = calibration.p_values(compared.nearest, error_rate)
+    calibrated = bool(calibration.calibrated(error_rate).all())
+    references = compared.references
+    labels = known_labels(references.classes, scores, p, error_rate)
+    classes = references.classes.tolist()
     ranks = np.argsort(-scores, axis=1, kind="stable")
-    place = {label: c for c, label in enumerate(classes)}
-    shown = np.array([ranks[i, 0] if label is None else place[label] for i, label in enumerate(labels)])
-    like = [_nearest(recognizer, logs[i], int(c)) for i, c in enumerate(shown)]
+    index_of = {label: c for c, label in enumerate(classes)}
+    shown = np.array([ranks[i, 0] if label is None else index_of[label] for i, label in enumerate(labels)])
+    slices = list(references.slices())
+    like = [_nearest(references, compared.log_average[i], slices[c]) for i, c in enumerate(shown.tolist())]
     example = np.array([near[0].index for near in like], dtype=np.intp)
-    share = SHARES[recognizer.mean](by_look[:, np.arange(len(demos)), example])
-    transforms = map_onto(recognizer, example, demos, share)
-    names = [one.name for one in recognizer.looks()]
+    share = compared.shares(example)
+    transforms = map_onto(compared, example, demos, paths, share)
+    names = [one.name for one in compared.comparison.representations]
     others = p.copy()
     known = np.array([label is not None for label in labels])
     others[known, shown[known]] = 0.0
@@ -138,10 +158,8 @@ def answers_to(
     ]
 
 
-def _nearest(recognizer: Recognizer, logs: Array, c: int) -> tuple[Neighbor, ...]:
-    """The nearest demonstrations of one class."""
-    stop = [*recognizer.first_[1:], len(recognizer.labels_)][c]
-    rows = np.arange(recognizer.first_[c], stop)
-    best = rows[np.argsort(-logs[rows], kind="stable")[:_SHOWN]]
-    names = recognizer.demonstrations_.names
+def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:
+    """The nearest references of one class, which are in these rows."""
+    best = rows.start + np.argsort(-logs[rows], kind="stable")[:_SHOWN]
+    names = references.demonstrations.names
     return tuple(Neighbor(int(i), names[i] if names else None, float(np.exp(logs[i]))) for i in best)

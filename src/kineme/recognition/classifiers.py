@@ -1,17 +1,21 @@
-"""From similarities to a score per class: nearest demonstration, nearest prototype, support vectors."""
+"""From similarities to a score per class: nearest reference, nearest prototype, support vectors."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.kernels.procrustes import Prepared
+from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.compared import Compared
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described
+from kineme.comparison.references import References
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
 
 _MANY = 8  # demonstrations of every class, from which on "auto" takes the SVM
 _LARGEST_GRAM = 4000  # demonstrations; beyond, "auto" keeps memory linear in them
@@ -20,78 +24,105 @@ _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold e
 
 
 class Classifier(Protocol):
-    """What a recognizer needs of a classifier."""
+    """What gives each class a score."""
 
-    def fit(self, recognizer: Recognizer) -> None:
-        """Learn from the stored views and labels of a recognizer."""
-        ...
-
-    def scores(self, recognizer: Recognizer, seen: tuple[Prepared, ...]) -> Array:
-        """A score per class, shape (n, C)."""
+    def scores(self, compared: Compared) -> Array:
+        """A score per class, shape (n, C): larger is more like it."""
         ...
 
 
+@dataclass(frozen=True)
 class Nearest:
-    """The most similar demonstration of each class speaks for it: 1-NN on the averaged kernel."""
+    """Each class scores as its most similar reference: the nearest neighbor by the averaged kernel."""
 
-    def fit(self, recognizer: Recognizer) -> None:
-        """Nothing to learn."""
-
-    def scores(self, recognizer: Recognizer, seen: tuple[Prepared, ...]) -> Array:
-        """Logarithm of the largest similarity to a demonstration of each class."""
-        logs = recognizer.similarity_.log_average(seen, recognizer.views_)
-        return np.asarray(np.maximum.reduceat(logs, recognizer.first_, axis=1))
+    def scores(self, compared: Compared) -> Array:
+        """Logarithm of the largest similarity to a reference of each class."""
+        return compared.nearest
 
 
+@dataclass(frozen=True, eq=False)
 class Prototype:
-    """Each class is its medoid: the demonstration most similar to the others of its class."""
+    """Each class is its medoid: the reference most similar to the others of its class.
 
-    def fit(self, recognizer: Recognizer) -> None:
-        """Choose the medoid of each class."""
-        ends = [*recognizer.first_[1:], len(recognizer.labels_)]
-        medoids = []
-        for start, end in zip(recognizer.first_, ends, strict=True):
-            own = tuple(one.take(slice(start, end)) for one in recognizer.views_)
-            medoids.append(start + int(recognizer.similarity_.log_average(own, own).mean(axis=1).argmax()))
-        self.medoids_ = np.array(medoids)
-        self.views_ = tuple(one.take(self.medoids_) for one in recognizer.views_)
-
-    def scores(self, recognizer: Recognizer, seen: tuple[Prepared, ...]) -> Array:
-        """Logarithm of the similarity to each class's medoid."""
-        return recognizer.similarity_.log_average(seen, self.views_)
-
-
-class SupportVectors:
-    """scikit-learn's SVM on the averaged kernel, one class against the rest.
-
-    The kernels are twice as wide as for the nearest: there, only the closest movement shall speak; an SVM weighs many,
-    and between demonstrations that do not see each other it has nothing to weigh.
+    Attributes
+    ----------
+    medoids : ndarray of shape (C,)
+        Indices of the references.
+    described : Described
+        The medoids.
     """
 
-    def fit(self, recognizer: Recognizer) -> None:
-        """Fit on the Gram matrix of the stored demonstrations."""
-        from sklearn.svm import SVC
+    medoids: NDArray[np.intp]
+    described: Described
 
-        self.similarity_ = recognizer.similarity_.widened(_WIDER)
-        gram = np.exp(self.similarity_.log_average(recognizer.views_, recognizer.views_))
-        self.model_ = SVC(kernel="precomputed", C=_PENALTY, decision_function_shape="ovr")
-        self.model_.fit(gram, recognizer.labels_)
+    def scores(self, compared: Compared) -> Array:
+        """Logarithm of the similarity to each class's medoid."""
+        return compared.comparison.similarity.log_average(compared.described, self.described)
 
-    def scores(self, recognizer: Recognizer, seen: tuple[Prepared, ...]) -> Array:
+
+@dataclass(frozen=True, eq=False)
+class SupportVectors:
+    """scikit-learn's SVM on the averaged kernel, one class against the others.
+
+    The kernels are twice as wide as for the nearest neighbor. That one should be decided by the closest movement alone;
+    an SVM weighs many, and where the similarities of different demonstrations are almost zero it has nothing to weigh.
+
+    Attributes
+    ----------
+    similarity : AveragedSimilarity
+        With the wider kernels.
+    model : sklearn.svm.SVC
+    """
+
+    similarity: AveragedSimilarity
+    model: Any
+
+    def scores(self, compared: Compared) -> Array:
         """The SVM's decision values; of two classes, the negative and the positive one."""
-        gram = np.exp(self.similarity_.log_average(seen, recognizer.views_))
-        values = np.asarray(self.model_.decision_function(gram))
+        gram = np.exp(LOG_MEANS[self.similarity.mean](self.similarity.logs_at(compared.squares)))
+        values = np.asarray(self.model.decision_function(gram))
         return np.column_stack((-values, values)) if values.ndim == 1 else values
 
 
-#: Name -> classifier.
-CLASSIFIERS: dict[str, type[Any]] = {"nearest": Nearest, "prototype": Prototype, "svm": SupportVectors}
+def fit_nearest(comparison: Comparison, references: References) -> Nearest:
+    """There is nothing to fit."""
+    return Nearest()
 
 
-def choose(name: str, per_class: NDArray[Any]) -> Classifier:
-    """The classifier of that name; "auto" by the number of demonstrations per class."""
-    if name == "auto":
-        few = len(per_class) == 1 or per_class.min() < _MANY or per_class.sum() > _LARGEST_GRAM
-        name = "nearest" if few else "svm"
-    chosen: Classifier = CLASSIFIERS[name]()
-    return chosen
+def fit_prototype(comparison: Comparison, references: References) -> Prototype:
+    """Choose the medoid of each class."""
+    medoids = []
+    for rows in references.slices():
+        own = references.described.take(rows)
+        medoids.append(rows.start + int(comparison.similarity.log_average(own, own).mean(axis=1).argmax()))
+    chosen = np.array(medoids)
+    return Prototype(chosen, references.described.take(chosen))
+
+
+def fit_support_vectors(comparison: Comparison, references: References) -> SupportVectors:
+    """Fit an SVM to the Gram matrix of the references."""
+    from sklearn.svm import SVC
+
+    similarity = comparison.similarity.widened(_WIDER)
+    gram = np.exp(similarity.log_average(references.described, references.described))
+    model = SVC(kernel="precomputed", C=_PENALTY, decision_function_shape="ovr").fit(gram, references.labels)
+    return SupportVectors(similarity, model)
+
+
+#: Name -> what fits the classifier.
+CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
+    "nearest": fit_nearest,
+    "prototype": fit_prototype,
+    "svm": fit_support_vectors,
+}
+
+
+def choose(per_class: NDArray[np.intp]) -> str:
+    """The classifier that "auto" stands for, by the number of references per class."""
+    few = len(per_class) == 1 or per_class.min() < _MANY or per_class.sum() > _LARGEST_GRAM
+    return "nearest" if few else "svm"
+
+
+def fit_classifier(name: str, comparison: Comparison, references: References) -> Classifier:
+    """The classifier of that name; "auto" is chosen by the number of references per class."""
+    return CLASSIFIERS[choose(references.counts) if name == "auto" else name](comparison, references)

@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.references import References
 from kineme.comparison.sampling import evenly_spaced
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_number
-
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
 
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spread
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
@@ -61,7 +59,7 @@ class Calibration:
        79 % of true members were rejected at 0.05, the more the more they differed (``python -m bench --only
        one_shot``). `calibrated` tells which classes this is about.
 
-    The scale s_c is the mean left-out distance of the class, drawn towards that of all classes as if by four more,
+    The scale s_c is the mean left-out distance of the class, shrunk towards that of all classes as if by four more,
     since the mean of two or three is little known. With one demonstration of every class no distance within a class is
     known; s_c is then set so that the law reaches 0.05 at six tenths of the median distance from a demonstration to
     the nearest other class: where a movement is half way to an impostor in two of three representations and
@@ -97,24 +95,27 @@ class Calibration:
         """
         return np.array([counted is not None for counted in self._counted(error_rate)])
 
+    def select(self, classes: NDArray[np.intp]) -> Calibration:
+        """The calibration of some of the classes."""
+        own, pooled = (tuple(part[c] for c in classes) for part in (self.own, self.pooled))
+        return Calibration(self.scales[classes], own, pooled)
+
     def _counted(self, error_rate: float) -> list[Array | None]:
         """Of each class the scores that count: its own, else those of all, else none."""
         choices = zip(self.own, self.pooled, strict=True)
         return [next((one for one in pair if (len(one) + 1) * error_rate > 1 - 1e-12), None) for pair in choices]
 
 
-def calibrate(recognizer: Recognizer) -> Calibration:
-    """Score demonstrations against the others, at most a hundred of each class."""
-    first, n = recognizer.first_, len(recognizer.labels_)
-    counts = np.diff(first, append=n)
+def calibrate(similarity: AveragedSimilarity, references: References) -> Calibration:
+    """Score references against the others, at most a hundred of each class."""
+    counts, described = references.counts, references.described
     blocks, impostors = [], []
-    for start, count in zip(first, counts, strict=True):
-        chosen = start + evenly_spaced(count, _CALIBRATED)
-        rows = tuple(one.take(chosen) for one in recognizer.views_)
-        away = distances(recognizer.similarity_.log_average(rows, recognizer.views_))
+    for own_class, count in zip(references.slices(), counts, strict=True):
+        chosen = own_class.start + evenly_spaced(count, _CALIBRATED)
+        away = distances(similarity.log_average(described.take(chosen), described))
         away[np.arange(len(chosen)), chosen] = np.inf
-        blocks.append(ClassDistances(away[:, start : start + count].copy(), chosen - start))
-        away[:, start : start + count] = np.inf
+        blocks.append(ClassDistances(away[:, own_class].copy(), chosen - own_class.start))
+        away[:, own_class] = np.inf
         impostors.append(away.min(axis=1))
     typical = typical_scale(np.concatenate(impostors))
     known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
@@ -144,9 +145,9 @@ class ClassDistances:
         """Distance to the nearest and second nearest of the next `size` others, in a circle, and which is nearest."""
         k, n = self.distances.shape
         later = (np.arange(n) - self.places[:, None]) % n
-        seen = np.where(later <= size, self.distances, np.inf)
-        order = np.sort(seen, axis=1)
-        return order[:, 0], order[:, 1] if n > 1 else np.full(k, np.inf), seen.argmin(axis=1)
+        within = np.where(later <= size, self.distances, np.inf)
+        order = np.sort(within, axis=1)
+        return order[:, 0], order[:, 1] if n > 1 else np.full(k, np.inf), within.argmin(axis=1)
 
     def left_out(self, size: int) -> Array:
         """Distances (k, k) to the nearest, row i as if demonstration i did not exist; NaN where there is none."""
@@ -168,11 +169,11 @@ def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> tu
             scales.append(max(common, _LEAST))
             continue
         own, without = block.nearest(size)[0], block.left_out(size)
-        scales.append(max(_drawn(own[None], common)[0], _LEAST))
-        scores.append(own / np.maximum(_drawn(without, common), _LEAST))
+        scales.append(max(_shrunk(own[None], common)[0], _LEAST))
+        scores.append(own / np.maximum(_shrunk(without, common), _LEAST))
     return np.array(scales), np.concatenate(scores)
 
 
-def _drawn(values: Array, common: float) -> Array:
-    """Means of rows, NaN left out, drawn towards the common one."""
+def _shrunk(values: Array, common: float) -> Array:
+    """Means of rows, NaN left out, shrunk towards the common one."""
     return np.asarray((np.nansum(values, axis=1) + _PRIOR * common) / (np.isfinite(values).sum(axis=1) + _PRIOR))

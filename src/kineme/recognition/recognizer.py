@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from copy import copy
-from typing import Any, Self
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Self, overload
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.comparison.describe import tile_movements, view, view_tile
+from kineme.comparison.compared import Compared, Score, nearest, score
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described, describe
+from kineme.comparison.fit import fit_comparison
 from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
-from kineme.comparison.similarity import LOG_MEANS, AveragedSimilarity, impostor_widths
-from kineme.comparison.weights import CANDIDATES, chosen_weights, given_weights, suffices
-from kineme.errors import SpecificationError, TrajectoryError
-from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.movements.preparation.smooth import Smooth
-from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.classifiers import CLASSIFIERS, Classifier, Nearest, choose
+from kineme.comparison.references import References
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.specification import ComparisonSpecification
+from kineme.comparison.weights import CANDIDATES
+from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.answer import Answer, answers, is_one, known_labels
+from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
-from kineme.recognition.labels import check_labels
-from kineme.runtime.parallel import for_tiles, single_threaded_blas
-from kineme.validation import Array, check_choice, check_number
+from kineme.validation import Array, check_choice
 
-_TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
+if TYPE_CHECKING:
+    from kineme.recognition.early.hypotheses import Early, Hypotheses
+    from kineme.recognition.early.stream import Live
+    from kineme.recognition.spotting import Spotted
 
 
 class Recognizer(ClassifierMixin, BaseEstimator):
@@ -37,21 +40,21 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     ----------
     representations : tuple of Representation, optional
         By default positions over arc length, forcing term over arc length, forcing term over time; where `weights`
-        are chosen, also positions over time and both over a blend of time and arc length.
+        are fitted, also positions over time and both over a blend of time and arc length.
     max_angle : float, optional
-        Largest rotation [rad] between movements of one kind; by default pi/3 in two and three dimensions, else 0. Each
+        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0. Each
         invariance merges something: pi merges N and Z, more than a right angle V and caret.
     scale : {"path", "per-dimension", "none"}, default "path"
         What of the size is taken out, see `Normalization`. "path" merges a dot and a circle.
     translation : bool, default True
-        Take out the place.
+        Whether translation is taken out.
     cutoff : float or None, default 10.0
         Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
     weights : {"auto", "equal"} or sequence of R numbers, default "auto"
-        Of the representations in the arithmetic mean. "auto" chooses them on the training movements from eight of every
-        class on, see `chosen_weights`; with fewer, or with another mean, they are equal.
+        Of the representations in the arithmetic mean. "auto" fits them to the training movements from eight of every
+        class on, see `kineme.comparison.weights.fitted_weights`; with fewer, or with another mean, they are equal.
     classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
         "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
         the SVM from eight demonstrations of every class on, up to 4000 in all, else the nearest.
@@ -63,12 +66,15 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     demonstrations_ : Demonstrations
         The training movements, ordered by class.
     representations_ : tuple of R Representation
-        Those that speak.
+        Those with a weight above 0.
     weights_ : ndarray of shape (R,)
-        How loudly; they sum to 1.
+        Their weights in the average; they sum to 1.
     widths_ : ndarray of shape (R,)
-        Kernel width of each representation.
+        Their kernel widths.
     n_dims_ : int
+        Dimensions of the movements.
+    comparison_ : Comparison
+    references_ : References
 
     Examples
     --------
@@ -99,8 +105,20 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.classifier = classifier
         self.weights = weights
 
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """How movements are compared, by the parameters alone."""
+        given = self.representations
+        return ComparisonSpecification(
+            DEFAULT_REPRESENTATIONS if given is None else given,
+            Normalization(self.translation, self.scale),
+            self.cutoff,
+            self.max_angle,
+            self.mean,
+        )
+
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Store the demonstrations as the recognizer sees them.
+        """Describe and store the demonstrations.
 
         Parameters
         ----------
@@ -108,47 +126,76 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             Whatever `Demonstrations.of` accepts.
         y : array_like of shape (n,), optional
             Labels; by default those of the demonstrations.
+
+        Raises
+        ------
+        SpecificationError
+            A parameter out of its range, or demonstrations that are all the same.
+        TrajectoryError
+            Not one label for each movement.
         """
-        check_choice("mean", self.mean, list(LOG_MEANS))
+        specification = self.specification
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
-        Normalization(self.translation, self.scale)  # checks its own parameters
-        if self.cutoff is not None:
-            Smooth(self.cutoff)  # checks its own parameter
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
-        self.n_dims_ = demos.n_dims
-        self.procrustes_ = Procrustes(demos.n_dims, self._angle(demos.n_dims))
-        order = np.argsort(labels, kind="stable")
-        self.classes_, first = np.unique(labels[order], return_index=True)
-        self.demonstrations_ = demos[order]
-        self.labels_ = labels[order]
-        self.first_ = first  # of each class, in the order of the demonstrations
-        per_class = np.diff(first, append=len(labels))
-        with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
-            self._choose_representations(per_class)
-        self.classifier_: Classifier = choose(self.classifier, per_class)
-        self.classifier_.fit(self)
-        self.calibration_: Calibration | None = None  # these two are made when first asked for
-        self.hypotheses_: dict[Any, Any] = {}
+        candidates = CANDIDATES if self.representations is None else None
+        self.comparison_, self.references_ = fit_comparison(specification, demos, labels, self.weights, candidates)
+        self.classifier_ = fit_classifier(self.classifier, self.comparison_, self.references_)
+        self._calibration: Calibration | None = None  # these two are made when first asked for
+        self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self
+
+    @property
+    def classes_(self) -> NDArray[Any]:
+        """Labels, sorted, (C,)."""
+        return self._fitted[1].classes
+
+    @property
+    def demonstrations_(self) -> Demonstrations:
+        """The training movements, ordered by class."""
+        return self._fitted[1].all_movements()
+
+    @property
+    def representations_(self) -> tuple[Representation, ...]:
+        """The representations with a weight above 0."""
+        return self._fitted[0].representations
+
+    @property
+    def weights_(self) -> NDArray[Any]:
+        """Their weights, (R,), summing to 1."""
+        return np.asarray(self._fitted[0].similarity.weights)
+
+    @property
+    def widths_(self) -> Array:
+        """Their kernel widths, (R,)."""
+        return self._fitted[0].similarity.widths
+
+    @property
+    def n_dims_(self) -> int:
+        """Number of dimensions of the movements."""
+        return self._fitted[0].n_dims
+
+    def describe(self, X: Any) -> Described:
+        """Movements described as the stored ones are, ready to be compared with them."""
+        comparison, _ = self._fitted
+        return describe(comparison.checked(X), comparison)
 
     def log_similarity(self, X: Any) -> Array:
         """Logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""
-        check_is_fitted(self)
-        return self.similarity_.log_average(self.look_at(X), self.views_)
-
-    def look_at(self, X: Any) -> tuple[Prepared, ...]:
-        """Movements as rows per representation, ready to be compared with the stored ones."""
-        return self._view(self._checked(X))
+        comparison, references = self._fitted
+        return comparison.similarity.log_average(self.describe(X), references.described)
 
     def decision_function(self, X: Any) -> Array:
-        """Score of each class, shape (n, C): larger is more like it; scales depend on the classifier."""
-        check_is_fitted(self)
-        return self._scored(X, self.classifier_)
+        """Score of each class, shape (n, C): larger is more like it. Scales depend on the classifier.
+
+        Of two classes, shape (n,): the score of ``classes_[1]`` minus that of ``classes_[0]``.
+        """
+        scores = self._scores(X)
+        return scores[:, 1] - scores[:, 0] if scores.shape[1] == 2 else scores
 
     def predict(self, X: Any) -> NDArray[Any]:
-        """The most similar class of each movement, shape (n,)."""
-        return np.asarray(self.classes_[self.decision_function(X).argmax(axis=1)])
+        """The class with the largest score of each movement, shape (n,)."""
+        return np.asarray(self.classes_[self._scores(X).argmax(axis=1)])
 
     def predict_proba(self, X: Any) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.
@@ -156,7 +203,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         A ranking made comparable, not a calibrated probability; `recognize` gives p-values, and says whether those are
         calibrated.
         """
-        scores = self.decision_function(X)
+        scores = self._scores(X)
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
@@ -165,7 +212,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         demos = Demonstrations.of(X)
         return float(super().score(demos, check_labels(demos, y), sample_weight))
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
+    @overload
+    def recognize(self, X: Trajectory | NDArray[Any], error_rate: float = 0.05) -> Answer: ...
+    @overload
+    def recognize(self, X: Demonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """What each movement is, or that it is unknown, and why.
 
         Parameters
@@ -181,9 +232,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         -------
         Answer, or list of Answer for many movements
         """
-        from kineme.recognition.answer import answers, is_one
-
-        found = answers(self, [X] if is_one(X) else X, error_rate)
+        check_error_rate(error_rate)
+        comparison, references = self._fitted
+        demos = comparison.checked([X] if is_one(X) else X)
+        found = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
         return found[0] if is_one(X) else found
 
     def p_values(self, X: Any, error_rate: float = 0.05) -> Array:
@@ -193,32 +245,30 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         tells which classes keep the rate, see `Calibration`.
         """
         check_error_rate(error_rate)
-        return self.calibration().p_values(self._nearest(X), error_rate)
+        return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
 
     def predict_known(self, X: Any, error_rate: float = 0.05) -> NDArray[Any]:
-        """Labels as from `predict`, among classes with a p-value above `error_rate`; None, unknown, without any."""
-        from kineme.recognition.answer import known_labels
+        """Labels as from `predict`, among the classes whose p-value is above `error_rate`.
 
-        p_values = self.p_values(X, error_rate)
-        return known_labels(self.classes_, self.decision_function(X), p_values, error_rate)
+        None, for unknown, if no class has a p-value above it.
+        """
+        check_error_rate(error_rate)
+        similarities, scores = self._score(X, nearest, self._classifier_scores)
+        p_values = self.calibration().p_values(similarities, error_rate)
+        return known_labels(self.classes_, scores, p_values, error_rate)
 
     def novelty(self, X: Any) -> Array:
         """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
-        return np.asarray(self.calibration().scores(self._nearest(X)).min(axis=1))
+        return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
 
     def calibration(self) -> Calibration:
         """Of the p-values; made when first asked for, since it compares the demonstrations with each other."""
-        check_is_fitted(self)
-        if self.calibration_ is None:
-            self.calibration_ = calibrate(self)
-        return self.calibration_
+        comparison, references = self._fitted
+        if self._calibration is None:
+            self._calibration = calibrate(comparison.similarity, references)
+        return self._calibration
 
-    def looks(self) -> tuple[Representation, ...]:
-        """The representations that speak."""
-        check_is_fitted(self)
-        return self.representations_
-
-    def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Any]:
+    def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
 
         The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all
@@ -238,25 +288,26 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Returns
         -------
         list of Spotted
-            ``(start, end, label, confidence)`` in order of time; label None is motion of no known kind. Rests are left
+            ``(start, end, label, confidence)`` in order of time; label None is motion of no known class. Rests are left
             out. A movement is looked for between a third and three times the durations demonstrated for it.
         """
         from kineme.recognition.spotting import spot
 
-        check_is_fitted(self)
-        return list(spot(self, recording, error_rate, max_pieces))
+        comparison, references = self._fitted
+        return spot(comparison, references, self.calibration(), recording, error_rate, max_pieces)
 
-    def predict_partial(self, X: Any, early: Any = None) -> NDArray[Any]:
-        """The most likely class of each movement of which only the beginning has been seen, shape (n,).
+    def predict_partial(self, X: Any, early: Early | None = None) -> NDArray[Any]:
+        """The most likely class of each movement of which only the beginning is given, shape (n,).
 
         Each beginning is compared with the beginnings of every stored movement at many values of progress; see `Early`.
         """
         from kineme.recognition.early.early import partial_shares
 
-        check_is_fitted(self)
-        return np.asarray(self.classes_[partial_shares(self, X, early)[:, :-1].argmax(axis=1)])
+        comparison, references = self._fitted
+        shares = partial_shares(comparison, self._beginnings(early), X)
+        return np.asarray(references.classes[shares[:, :-1].argmax(axis=1)])
 
-    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Any = None) -> Any:
+    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Early | None = None) -> Live:
         """Recognize a movement while it is under way: `Live`, whose ``update(t, x)`` takes each sample.
 
         Parameters
@@ -269,107 +320,50 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             How much size, duration and timing may vary.
         """
         from kineme.recognition.early.decision import Decision
-        from kineme.recognition.early.hypotheses import as_early
         from kineme.recognition.early.stream import Live
 
-        check_is_fitted(self)
-        return Live(self, Decision(confidence, patience), as_early(early))
+        comparison, references = self._fitted
+        beginnings = self._beginnings(early)
+        return Live(comparison, references, beginnings, Decision(confidence, patience), self.recognize)
 
-    def over(self, stored: Any, labels: NDArray[Any], views: tuple[Prepared, ...], calibration: Calibration) -> Self:
-        """A recognizer that compares in the same way, by the nearest, with other movements that were seen already.
+    def look_at(self, X: Any) -> Described:
+        """Deprecated name of `describe`."""
+        warn("Recognizer.look_at is now Recognizer.describe", DeprecationWarning, stacklevel=2)
+        return self.describe(X)
 
-        Parameters
-        ----------
-        stored : Demonstrations
-            Ordered by class; or what gives them when indexed by an array.
-        labels : ndarray of shape (m,)
-            Sorted.
-        views : tuple of R Prepared
-            Their rows.
-        calibration : Calibration
-            Of their classes, in order.
+    def looks(self) -> tuple[Representation, ...]:
+        """Deprecated name of `representations_`."""
+        warn("Recognizer.looks() is now Recognizer.representations_", DeprecationWarning, stacklevel=2)
+        return self.representations_
+
+    @property
+    def _fitted(self) -> tuple[Comparison, References]:
+        """What `fit` made.
+
+        Raises
+        ------
+        sklearn.exceptions.NotFittedError
         """
-        new = copy(self)
-        new.demonstrations_, new.labels_, new.views_, new.calibration_ = stored, labels, views, calibration
-        new.classes_, new.first_ = np.unique(labels, return_index=True)
-        new.classifier_ = Nearest()
-        new.hypotheses_ = {}
-        return new
+        check_is_fitted(self, "comparison_")
+        return self.comparison_, self.references_
 
-    def _choose_representations(self, per_class: NDArray[Any]) -> None:
-        """Look at the demonstrations, set the widths and the weights, and keep the representations with weight."""
-        choosing = self._chooses(per_class)
-        given = CANDIDATES if choosing else DEFAULT_REPRESENTATIONS
-        looks = given if self.representations is None else check_representations(self.representations)
-        self.representations_ = looks
-        views = self._view(self.demonstrations_)
-        widths = impostor_widths(self.procrustes_, views, self.labels_)
-        weights = np.full(len(looks), 1.0 / len(looks))
-        if choosing:
-            n_usual = len(looks) if self.representations is not None else len(DEFAULT_REPRESENTATIONS)
-            equal = AveragedSimilarity(self.procrustes_, widths)
-            weights = chosen_weights(equal, views, self.labels_, n_usual)
-        elif not isinstance(self.weights, str):
-            weights = given_weights(self.weights, len(looks))
-        kept = np.flatnonzero(weights)
-        self.representations_ = tuple(looks[r] for r in kept)
-        self.views_ = tuple(views[r] for r in kept)
-        self.widths_, self.weights_ = widths[kept], weights[kept]
-        self.similarity_ = AveragedSimilarity(self.procrustes_, self.widths_, self.mean, self.weights_)
+    def _scores(self, X: Any) -> Array:
+        """Score of each class by the classifier, shape (n, C)."""
+        return self._score(X, self._classifier_scores)[0]
 
-    def _chooses(self, per_class: NDArray[Any]) -> bool:
-        """Whether the weights are chosen on these movements."""
-        if isinstance(self.weights, str):
-            check_choice("weights", self.weights, ["auto", "equal"])
-        elif self.mean != "arithmetic":
-            raise SpecificationError(f"expected weights with mean='arithmetic', got them with mean={self.mean!r}")
-        return (
-            isinstance(self.weights, str)
-            and self.weights == "auto"
-            and self.mean == "arithmetic"
-            and suffices(per_class)
-        )
+    def _classifier_scores(self, compared: Compared) -> Array:
+        return self.classifier_.scores(compared)
 
-    def _angle(self, n_dims: int) -> float:
-        if self.max_angle is not None:
-            check_number("max_angle", self.max_angle, least=0.0)
-            return float(self.max_angle)
-        return math.pi / 3 if n_dims in (2, 3) else 0.0
+    def _score(self, X: Any, *scores: Score) -> tuple[Array, ...]:
+        """Scores (n, C) by each function; every movement is described once."""
+        comparison, references = self._fitted
+        return score(comparison, references, comparison.checked(X), *scores)
 
-    def _view(self, demos: Demonstrations) -> tuple[Prepared, ...]:
-        return self._prepared(view(demos, self.looks(), Normalization(self.translation, self.scale), self.cutoff))
+    def _beginnings(self, early: Early | None) -> Hypotheses:
+        """The beginnings of the demonstrations, kept from the last time that the same ones were asked for."""
+        from kineme.recognition.early.hypotheses import as_early, hypotheses
 
-    def _prepared(self, seen: tuple[Array, ...]) -> tuple[Prepared, ...]:
-        # Single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
-        return tuple(self.procrustes_.prepare(block.astype(np.float32)) for block in seen)
-
-    def _nearest(self, X: Any) -> Array:
-        """Log similarity to the nearest demonstration of each class, shape (n, C)."""
-        return self._scored(X, Nearest())
-
-    def _scored(self, X: Any, classifier: Classifier) -> Array:
-        """Scores (n, C), tile by tile: what is seen of a movement is compared before it leaves the core's cache."""
-        demos = self._checked(X)
-        normalization = Normalization(self.translation, self.scale)
-        scores = np.empty((len(demos), len(self.classes_)))
-
-        def score(start: int, stop: int) -> None:
-            seen = view_tile(demos, start, stop, self.looks(), normalization, self.cutoff)
-            scores[start:stop] = classifier.scores(self, self._prepared(seen))
-
-        for_tiles(score, len(demos), min(tile_movements(demos.n_dims), max(1, _TILE_PAIRS // len(self.labels_))))
-        return scores
-
-    def _checked(self, X: Any) -> Demonstrations:
-        check_is_fitted(self)
-        demos = Demonstrations.of(X)
-        if demos.n_dims != self.n_dims_:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims_} dimensions as in fit, got {demos.n_dims}; select the dimensions"
-            )
-        return demos
-
-    def _tiles(self, seen: tuple[Prepared, ...]) -> Iterator[tuple[Prepared, ...]]:
-        n, step = len(seen[0].rows), max(1, _TILE_PAIRS // len(self.labels_))
-        for start in range(0, n, step):
-            yield tuple(one.take(slice(start, start + step)) for one in seen)
+        asked = as_early(early)
+        if self._hypotheses is None or self._hypotheses[0] != asked:  # one at a time: memory stays linear
+            self._hypotheses = asked, hypotheses(*self._fitted, asked)
+        return self._hypotheses[1]

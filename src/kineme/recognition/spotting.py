@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.compared import nearest, score
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.references import References
 from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.motion import Motion, observe
@@ -15,15 +18,13 @@ from kineme.movements.segmentation.rest import Rest
 from kineme.movements.segmentation.segment import as_recording, moving
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.movements.segmentation.speed_minima import SpeedMinima
+from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.recognition.conformal import check_error_rate
+from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.validation import Array, check_count
 
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
-
 _MIN_SAMPLES = 8
-_TEMPO = 1.5  # one standard deviation of the ratio of durations, for one person's movements of one kind
+_TEMPO = 1.5  # one standard deviation of the ratio of durations, for one person's movements of one class
 _MAX_TEMPO = 3.0  # beyond this ratio of durations it is not looked for
 _IMPOSTOR = -4.0  # log similarity of a typical impostor: the kernels' width is 0.35 of its distance
 _PER_MOVEMENT = 0.5  # typical durations that a movement costs: it pays from half way to an impostor on
@@ -37,18 +38,25 @@ class Spotted(NamedTuple):
 
     start: float
     end: float
-    label: Any
+    label: Label | None
     confidence: float
 
 
-def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
-    """Find the movements that a recognizer knows in a recording; see `Recognizer.spot`."""
+def spot(
+    comparison: Comparison,
+    references: References,
+    calibration: Calibration,
+    recording: Any,
+    error_rate: float,
+    max_pieces: int,
+) -> list[Spotted]:
+    """Find movements like the references in a recording; see `Recognizer.spot`."""
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
     whole = as_recording(recording)
-    if whole.n_dims != recognizer.n_dims_:
+    if whole.n_dims != comparison.n_dims:
         raise TrajectoryError(
-            f"expected a recording of {recognizer.n_dims_} dimensions as in fit, got {whole.n_dims}; "
+            f"expected a recording of {comparison.n_dims} dimensions as in fit, got {whole.n_dims}; "
             "select the dimensions"
         )
     atoms, bout = _atoms(whole)
@@ -60,18 +68,19 @@ def spot(recognizer: Recognizer, recording: Any, error_rate: float = 0.05, max_p
     first, last, rows = first[long_enough], last[long_enough], rows[long_enough]
     if not len(rows):
         return []
-    best, p, score = _recognized(recognizer, whole, rows, error_rate)
-    chosen = _best_chain(first, last, score, len(atoms))
+    best, p, scores = _recognized(comparison, references, calibration, whole, rows, error_rate)
+    chosen = _best_chain(first, last, scores, len(atoms))
+    classes = references.classes.tolist()
     found = [
-        (first[c], last[c], recognizer.classes_[best[c]], 1.0 - float(np.delete(p[c], best[c]).max(initial=0.0)))
-        for c in chosen
+        (first[c], last[c], classes[best[c]], 1.0 - float(np.delete(p[c], best[c]).max(initial=0.0))) for c in chosen
     ]
     unknown = _left_over(first, last, chosen, bout)
     p_of = {(a, b): float(row.max()) for a, b, row in zip(first.tolist(), last.tolist(), p, strict=True)}
     found += [(a, b, None, 1.0 - p_of.get((a, b), 0.0)) for a, b in unknown]
     t = whole.times
     return [
-        Spotted(float(t[atoms[a, 0]]), float(t[atoms[b, 1] - 1]), *rest) for a, b, *rest in sorted(found, key=_start)
+        Spotted(float(t[atoms[a, 0]]), float(t[atoms[b, 1] - 1]), *answer)
+        for a, b, *answer in sorted(found, key=_start)
     ]
 
 
@@ -102,35 +111,46 @@ def _unions(n: int, longest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _recognized(
-    recognizer: Recognizer, whole: Trajectory, rows: Rows, error_rate: float
+    comparison: Comparison,
+    references: References,
+    calibration: Calibration,
+    whole: Trajectory,
+    rows: Rows,
+    error_rate: float,
 ) -> tuple[NDArray[np.intp], Array, Array]:
     """Best class, p-values (n, C), and score of each candidate; the score is positive where it counts as known."""
     candidates = pieces_of(whole, rows)
-    logs = np.maximum.reduceat(recognizer.log_similarity(candidates), recognizer.first_, axis=1)
+    (logs,) = score(comparison, references, candidates, nearest)
     durations = whole.times[rows[:, 1] - 1] - whole.times[rows[:, 0]]
-    far = _log_tempo(recognizer, durations)
-    p = recognizer.calibration().p_values(logs, error_rate)
+    far = _log_tempo(references, durations)
+    p = calibration.p_values(logs, error_rate)
     logs = logs - 0.5 * (far / np.log(_TEMPO)) ** 2
     plausible = far <= np.log(_MAX_TEMPO)
     p, logs = np.where(plausible, p, 0.0), np.where(plausible, logs, -np.inf)
     best = logs.argmax(axis=1)
     one = np.arange(len(rows))
     closeness = np.maximum(1.0 - logs[one, best] / _IMPOSTOR, 0.0)
-    timed = recognizer.demonstrations_.movements.times is not None
-    typical = float(np.median(recognizer.demonstrations_.durations if timed else durations))
-    score = closeness * durations - _PER_MOVEMENT * typical
-    return best, p, np.where(p[one, best] > error_rate, score, 0.0)
+    demonstrated = _durations(references)
+    typical = float(np.median(durations if demonstrated is None else demonstrated))
+    gain = closeness * durations - _PER_MOVEMENT * typical
+    return best, p, np.where(p[one, best] > error_rate, gain, 0.0)
 
 
-def _log_tempo(recognizer: Recognizer, durations: Array) -> Array:
+def _durations(references: References) -> Array | None:
+    """Durations of the references; None where their arrays came without time stamps, so that none is known."""
+    demos = references.all_movements()
+    return None if demos.movements.times is None else demos.durations
+
+
+def _log_tempo(references: References, durations: Array) -> Array:
     """How far, in logarithms, each duration is from those demonstrated for each class, shape (n, C)."""
-    demos = recognizer.demonstrations_
-    if demos.movements.times is None:  # arrays without time stamps: no duration is known
-        return np.zeros((len(durations), len(recognizer.classes_)))
-    demonstrated = np.log(demos.durations)
-    low, high = (which.reduceat(demonstrated, recognizer.first_) for which in (np.minimum, np.maximum))
-    seen = np.log(durations)[:, None]
-    return np.asarray(np.maximum(np.maximum(low - seen, seen - high), 0.0))
+    known = _durations(references)
+    if known is None:
+        return np.zeros((len(durations), len(references.classes)))
+    demonstrated = np.log(known)
+    low, high = (which.reduceat(demonstrated, references.first) for which in (np.minimum, np.maximum))
+    own = np.log(durations)[:, None]
+    return np.asarray(np.maximum(np.maximum(low - own, own - high), 0.0))
 
 
 def _best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
@@ -160,6 +180,6 @@ def _left_over(
     free = np.ones(len(bout), dtype=bool)
     for c in chosen:
         free[first[c] : last[c] + 1] = False
-    kind = np.where(free, bout, -1)
-    edges = np.flatnonzero(np.diff(np.concatenate(([-1], kind, [-1]))))
-    return [(int(a), int(b) - 1) for a, b in pairwise(edges) if kind[a] >= 0]
+    run = np.where(free, bout, -1)
+    edges = np.flatnonzero(np.diff(np.concatenate(([-1], run, [-1]))))
+    return [(int(a), int(b) - 1) for a, b in pairwise(edges) if run[a] >= 0]

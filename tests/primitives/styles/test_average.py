@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP, TrajectoryError
-from kineme.primitives.styles import average
-from kineme.styles import average_by_label
+from kineme.styles import average, average_by_label
 
 any_seed = given(seed=st.integers(0, 10**6))
 

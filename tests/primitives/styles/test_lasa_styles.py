@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from kineme import DMP, TrajectoryError, load_lasa
 from kineme.output.figures import render
-from kineme.primitives.styles import average
 from kineme.primitives.styles.figure import draw_morph, two_kinds
-from kineme.styles import learn_styles
+from kineme.styles import average, learn_styles
 
 MIXED = {"Multi_Models_2": 4, "Multi_Models_3": 4, "Multi_Models_4": 4}  # name -> movements of its first kind
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import DMP, SpecificationError, TrajectoryError
-from kineme.primitives.styles import average
-from kineme.styles import average_by_label, learn_styles
+from kineme.styles import average, average_by_label, learn_styles
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from sklearn.decomposition import PCA
 
 from kineme import DMP
-from kineme.primitives.styles import average
 from kineme.primitives.styles.metrics import METRICS
-from kineme.styles import learn_styles
+from kineme.styles import average, learn_styles
 
 any_seed = given(seed=st.integers(0, 10**6))
 each_metric = pytest.mark.parametrize("metric", METRICS)

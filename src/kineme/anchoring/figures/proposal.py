@@ -6,18 +6,18 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from kineme.anchoring.align import maps_onto, paths_of
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.proposals.proposals import Proposal, check_members
+from kineme.comparison.alignment import maps_onto, paths_of
+from kineme.comparison.specification import Compares
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
-from kineme.recognition.recognizer import Recognizer
 
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
 
 
-def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Recognizer | None = None) -> Figure:
+def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Compares | None = None) -> Figure:
     """Members laid onto the medoid, the medoid bold, a dot at the start; inset, as they were recorded.
 
     Parameters
@@ -61,13 +61,13 @@ def words(proposal: Proposal) -> str:
     return f"{len(proposal)} movements, cohesion {proposal.cohesion:.2f}, stability {proposal.stability:.2f}"
 
 
-def shown_paths(demos: Demonstrations, proposal: Proposal, like: Recognizer | None) -> tuple[Any, Any]:
+def shown_paths(demos: Demonstrations, proposal: Proposal, like: Compares | None) -> tuple[Any, Any]:
     """Paths of the members that are shown (m, d, T), and the medoid's (1, d, T)."""
     step = -(-len(proposal) // _SHOWN)
     return paths_of(demos[proposal.members[::step]], like), paths_of(demos[[proposal.medoid]], like)
 
 
-def overlay(axes: Any, recorded: Any, medoid: Any, like: Recognizer | None, thin: float = 0.9) -> None:
+def overlay(axes: Any, recorded: Any, medoid: Any, like: Compares | None, thin: float = 0.9) -> None:
     """Members (m, d, T) laid onto the medoid (1, d, T)."""
     laid = flat(maps_onto(recorded, medoid[0], like).move(recorded), medoid[0])
     typical = flat(medoid, medoid[0])

@@ -7,24 +7,24 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from kineme.anchoring.align import paths_of
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.figures.proposal import overlay, shown_paths
 from kineme.anchoring.proposals.proposals import Proposals, check_members
+from kineme.comparison.alignment import paths_of
+from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import GRAY, ORANGE, new_figure
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
 _CELL = 1.35  # inches
 _LEFT_OVER = 24  # of those left over, drawn at most
 
 
-def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None = None) -> Figure:
+def draw_proposals(movements: Any, proposals: Proposals, like: Compares | None = None) -> Figure:
     """One small drawing for each proposal, with its number, size and stability; last, what is left over.
 
-    The number is the index into `proposals`; members, medoid and start are drawn as by `draw_proposal`.
+    Number k is ``proposals[k - 1]``; members, medoid and start are drawn as by `draw_proposal`.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Recognizer | None
     for k, proposal in enumerate(proposals.proposals):
         check_members(proposal, len(demos))
         overlay(cells[k], *shown_paths(demos, proposal, like), like, thin=0.6)
-        cells[k].set_title(f"{k}:  {len(proposal)} ×, stable {proposal.stability:.2f}", fontsize=7, pad=2)
+        cells[k].set_title(f"{k + 1}:  {len(proposal)} ×, stable {proposal.stability:.2f}", fontsize=7, pad=2)
     if len(alone):
         _side_by_side(cells[n - 1], paths_of(demos[alone[:_LEFT_OVER]], like))
         cells[n - 1].set_title(f"left over: {len(alone)}", fontsize=7, color=GRAY, pad=2)
     for empty in cells[n:]:
         empty.set_axis_off()
-    head = f"{len(proposals)} kinds of {len(demos)} movements"
+    head = f"{len(proposals)} clusters among {len(demos)} movements"
     key = "number: size, stability; bold: most typical; dot: start"
     figure.suptitle(f"{head} ({key})" if columns > 4 else f"{head}\n{key}", fontsize=8 if columns > 4 else 7)
     return figure

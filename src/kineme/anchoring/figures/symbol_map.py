@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from kineme.anchoring.align import paths_of
 from kineme.anchoring.figures.drawing import bare, flat, mark_start, plot_paths
 from kineme.anchoring.grounding.space import ConceptualSpace
+from kineme.comparison.alignment import paths_of
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.anchoring.align import moved
 from kineme.anchoring.grounding.prototypes import Prototype, prototype
+from kineme.comparison.alignment import moved
+from kineme.comparison.specification import Compares
 from kineme.errors import TrajectoryError
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.persistence import specification_to_dict
 from kineme.primitives.styles.learn import learn_styles
 from kineme.primitives.styles.metrics import compared
 from kineme.primitives.styles.model import StyleModel
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array, check_choice
 
 FORMAT = "kineme-grounding"
@@ -53,7 +53,7 @@ def ground(
     by: str = "medoid",
     units: Sequence[str] | str | None = None,
     medoid: int | None = None,
-    like: Recognizer | None = None,
+    like: Compares | None = None,
 ) -> dict[str, Any]:
     """What a symbol does, as plain data that JSON can hold; `grounding_schema` describes it.
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.anchoring.align import Maps, maps_onto, paths_of
+from kineme.comparison.alignment import Maps, maps_onto, paths_of
+from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.styles.parameters import check_primitives, from_numbers, to_numbers
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
 
-def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Recognizer | None = None) -> Primitives:
+def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None = None) -> Primitives:
     """Movements on the way from `a` to `b`, one for each share of the way: 0 is a, 1 is b.
 
     b is laid onto a, and ``theta = (1 - s) theta_a + s theta_b`` is the mean of their paths at equal phase (see

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from kineme.anchoring.align import Maps, maps_onto, moved, paths_of
-from kineme.anchoring.seen import see
-from kineme.anchoring.similarities import similarities
+from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
+from kineme.comparison.describe import describe
+from kineme.comparison.similarity import similarities
+from kineme.comparison.specification import Compares
+from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.styles.average import AveragePrimitive, average
 from kineme.primitives.styles.parameters import check_primitives
-from kineme.recognition.recognizer import Recognizer
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class Prototype:
         return self.average.primitive
 
 
-def prototype(primitives: Primitives, medoid: int | None = None, like: Recognizer | None = None) -> Prototype:
+def prototype(primitives: Primitives, medoid: int | None = None, like: Compares | None = None) -> Prototype:
     """The prototype of the members of one kind.
 
     Parameters
@@ -68,16 +67,13 @@ def prototype(primitives: Primitives, medoid: int | None = None, like: Recognize
     return Prototype(medoid, average(moved(primitives, maps)), maps)
 
 
-def medoid_of(movements: object, like: Recognizer | None = None) -> int:
+def medoid_of(movements: object, like: Compares | None = None) -> int:
     """The movement with the largest mean similarity to the others; the first of one or two."""
-    seen = see(movements, like)
-    if len(seen) < 3:
+    described = describe(movements, like)
+    if len(described) < 3:
         return 0
     # One width serves all of them: it only weighs the representations, by how much they differ within the kind.
-    spread = []
-    for one in seen.views:
-        squares = seen.procrustes.squared_distances(one, one)
-        spread.append(float(np.sqrt(np.median(squares[~np.eye(len(seen), dtype=bool)]))))
-    if min(spread) <= 0:
+    widths = median_distances(described)
+    if widths.min() <= 0:
         return 0
-    return int(similarities(seen, widths=spread).sum(axis=1).argmax())
+    return int(similarities(described, widths=widths).sum(axis=1).argmax())

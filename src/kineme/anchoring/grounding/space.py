@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.seen import Seen, see
-from kineme.anchoring.similarities import averaged
+from kineme.comparison.describe import Described, describe
+from kineme.comparison.similarity import averaged
+from kineme.comparison.specification import Compares
+from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array, check_count, check_number
 
 
@@ -85,7 +86,7 @@ class ConceptualSpace:
 
 
 def conceptual_space(
-    symbols: Sequence[Hashable], prototypes: Any, like: Recognizer | None = None, widths: ArrayLike | None = None
+    symbols: Sequence[Hashable], prototypes: Any, like: Compares | None = None, widths: ArrayLike | None = None
 ) -> ConceptualSpace:
     """Distances between symbols, by their prototypes.
 
@@ -98,7 +99,7 @@ def conceptual_space(
     Parameters
     ----------
     symbols : sequence of s symbols, all different
-    prototypes : Seen, or s movements
+    prototypes : Described, or s movements
         One for each symbol: its medoid, say.
     like : Recognizer, optional
         Whose representations and invariances to take.
@@ -110,25 +111,21 @@ def conceptual_space(
     SpecificationError
         Not one prototype for each symbol, or a symbol twice.
     """
-    seen = replace(see(prototypes, like), mean="geometric")
+    described = replace(describe(prototypes, like), mean="geometric")
     names = tuple(symbols)
-    if len(names) != len(seen) or len(set(names)) != len(names):
+    if len(names) != len(described) or len(set(names)) != len(names):
         raise SpecificationError(
-            f"expected one prototype for each of different symbols, got {len(seen)} prototypes for "
+            f"expected one prototype for each of different symbols, got {len(described)} prototypes for "
             f"{len(names)} symbols, {len(set(names))} of them different"
         )
-    similarity = averaged(seen, _typical(seen) if widths is None else widths)
-    d = np.sqrt(np.maximum(-2.0 * similarity.log_average(seen.views, seen.views), 0.0))
+    similarity = averaged(described, _typical(described) if widths is None else widths)
+    d = np.sqrt(np.maximum(-2.0 * similarity.log_average(described, described), 0.0))
     d = 0.5 * (d + d.T)
     np.fill_diagonal(d, 0.0)
     return ConceptualSpace(names, d)
 
 
-def _typical(seen: Seen) -> NDArray[np.float64]:
-    """Median distance of two movements in each representation."""
-    pairs = ~np.eye(len(seen), dtype=bool)
-    medians = []
-    for one in seen.views:
-        apart = seen.procrustes.squared_distances(one, one)[pairs]
-        medians.append(np.sqrt(np.median(apart)) if len(apart) and np.median(apart) > 0 else 1.0)
-    return np.array(medians)
+def _typical(described: Described) -> NDArray[np.float64]:
+    """Median distance of two movements in each representation; 1 where they do not differ."""
+    medians = median_distances(described)
+    return np.where(medians > 0, medians, 1.0)

@@ -14,9 +14,9 @@ from kineme.anchoring.clustering.tree import average_linkage, cut_at
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
 from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
-from kineme.anchoring.seen import Seen
-from kineme.anchoring.similarities import compare
+from kineme.comparison.describe import Described
 from kineme.comparison.sampling import evenly_spaced
+from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.answer import known_labels
 from kineme.recognition.conformal import REACH
@@ -94,18 +94,18 @@ def _among_unknown(known: Recognizer, demos: Demonstrations, unknown: NDArray[np
     if n < min_members:
         none = np.full(n, -1, dtype=np.intp)
         return _at(unknown, describe_clusters(np.eye(n), none, np.empty(0), known.widths_), len(demos))
-    seen = Seen(known.procrustes_, known.look_at(demos[unknown]), known.mean)
-    limit, similarity = largest_clustered(demos.n_dims), known.similarity_
+    described = known.describe(demos[unknown])
+    limit, similarity = largest_clustered(demos.n_dims), known.comparison_.similarity
     if n <= limit:
-        return _at(unknown, _that_agree(known, seen, min_members)[1], len(demos))
-    sample, _ = spread_sample(seen, limit)
-    K, found = _that_agree(known, seen.take(sample), min_members)
-    return _at(unknown, assign(seen, sample, K, found, similarity), len(demos))
+        return _at(unknown, _that_agree(known, described, min_members)[1], len(demos))
+    sample, _ = spread_sample(described, limit)
+    K, found = _that_agree(known, described.take(sample), min_members)
+    return _at(unknown, assign(described, sample, K, found, similarity), len(demos))
 
 
-def _that_agree(known: Recognizer, seen: Seen, min_members: int) -> tuple[Array, Proposals]:
+def _that_agree(known: Recognizer, described: Described, min_members: int) -> tuple[Array, Proposals]:
     """Similarities, and clusters by average linkage up to where movements of one symbol agree."""
-    K = compare(known.similarity_, seen, seen)
+    K = compare(known.comparison_.similarity, described, described)
     np.fill_diagonal(K, 1.0)
     order, height = own_order(K), 1.0 - agreement(known)
 
@@ -114,7 +114,7 @@ def _that_agree(known: Recognizer, seen: Seen, min_members: int) -> tuple[Array,
 
     distances = 1.0 - 0.5 * (K + K.T)[np.ix_(order, order)]
     found = without_small(cut(distances), min_members)
-    clusters = np.empty(len(seen), dtype=np.intp)
+    clusters = np.empty(len(described), dtype=np.intp)
     clusters[order] = found
     return K, describe_clusters(K, clusters, stabilities(distances, found, cut, _REPEATS), known.widths_)
 
@@ -125,10 +125,10 @@ def agreement(known: Recognizer) -> float:
     Half way from the typical mean similarity within a symbol to that with the nearest other symbol; where each symbol
     was shown once, that at 0.6 of the distance to the nearest other, as the recognizer's calibration takes.
     """
-    stored = Seen(known.procrustes_, known.views_, known.mean)
+    stored = known.references_.described
     some = evenly_spaced(len(stored), 500)
-    K = compare(known.similarity_, stored.take(some), stored.take(some))
-    own, member = known.labels_[some], np.unique(known.labels_[some], return_inverse=True)[1]
+    K = compare(known.comparison_.similarity, stored.take(some), stored.take(some))
+    own, member = known.references_.labels[some], np.unique(known.references_.labels[some], return_inverse=True)[1]
     np.fill_diagonal(K, 0.0)
     H = (member[:, None] == np.arange(member.max() + 1)).astype(float)
     sums, counts = H.T @ K @ H, H.sum(axis=0)

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring.clustering.resampling import Clusters, stabilities
 from kineme.anchoring.clustering.tree import average_linkage, cuts
 from kineme.anchoring.proposals.propose import own_order
-from kineme.anchoring.seen import Seen, see
-from kineme.anchoring.similarities import averaged, compare, similarities
+from kineme.comparison.describe import Described, describe
 from kineme.comparison.sampling import evenly_spaced
+from kineme.comparison.similarity import averaged, compare, similarities
+from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once
@@ -45,7 +45,7 @@ def suggest_merges(
     labels: ArrayLike,
     *,
     least: float = 0.5,
-    like: Recognizer | None = None,
+    like: Compares | None = None,
     widths: ArrayLike | None = None,
 ) -> tuple[Merge, ...]:
     """Pairs of symbols that overlap, those that do most first.
@@ -57,7 +57,7 @@ def suggest_merges(
 
     Parameters
     ----------
-    movements : Seen, or movements as `Demonstrations.of` accepts them
+    movements : Described, or movements as `Demonstrations.of` accepts them
     labels : array_like of shape (n,)
         The symbol of each.
     least : float, default 0.5
@@ -72,11 +72,11 @@ def suggest_merges(
     A symbol with one member is as cohesive as the others typically are. Of large symbols, evenly spaced members speak.
     """
     check_number("least", least, above=0.0)
-    seen, member, names = _labeled(movements, labels, like)
+    described, member, names = _labeled(movements, labels, like)
     if len(names) < 2:
         return ()
     chosen = _some_of_each(member, max(3, _LARGEST // len(names)))
-    K, own = similarities(seen.take(chosen), widths=widths), member[chosen]
+    K, own = similarities(described.take(chosen), widths=widths), member[chosen]
     counts = np.bincount(own)
     H = (own[:, None] == np.arange(len(names))).astype(float)
     means = (H.T @ K @ H - np.diag(counts)) / np.maximum(np.outer(counts, counts) - np.diag(counts), 1)
@@ -95,7 +95,7 @@ def suggest_splits(
     *,
     most: float = 0.25,
     min_members: int = 2,
-    like: Recognizer | None = None,
+    like: Compares | None = None,
     widths: ArrayLike | None = None,
 ) -> tuple[Split, ...]:
     """Symbols whose members fall into two kinds that come again, the most clearly apart first.
@@ -116,22 +116,22 @@ def suggest_splits(
     """
     check_number("most", most, least=0.0)
     check_count("min_members", min_members, 2)
-    seen, member, names = _labeled(movements, labels, like)
+    described, member, names = _labeled(movements, labels, like)
     if len(names) < 2 and widths is None:
         return ()
-    sigma = averaged(seen, widths).widths
+    sigma = averaged(described, widths).widths
     found = []
     for k, name in enumerate(names):
         places = np.flatnonzero(member == k)
         if len(places) >= 2 * min_members and len(places) > 3:
-            found.append(_in_two(name, seen.take(places), places, sigma))
+            found.append(_in_two(name, described.take(places), places, sigma))
     kept = (s for s in found if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members)
     return tuple(sorted(kept, key=lambda one: one.overlap))
 
 
-def _in_two(name: Any, seen: Seen, places: NDArray[np.intp], widths: Array) -> Split:
-    some = evenly_spaced(len(seen), _LARGEST // 5)
-    K = similarities(seen.take(some), widths=widths)
+def _in_two(name: Any, described: Described, places: NDArray[np.intp], widths: Array) -> Split:
+    some = evenly_spaced(len(described), _LARGEST // 5)
+    K = similarities(described.take(some), widths=widths)
     order = own_order(K)
     K = K[np.ix_(order, order)]
 
@@ -145,7 +145,7 @@ def _in_two(name: Any, seen: Seen, places: NDArray[np.intp], widths: Array) -> S
     within = _mean_within(a[:, found == 0]) * _mean_within(b[:, found == 1])
     parts = np.empty(len(some), dtype=np.intp)
     parts[order] = found
-    nearest = compare(averaged(seen, widths), seen, seen.take(some)).argmax(axis=1)
+    nearest = compare(averaged(described, widths), described, described.take(some)).argmax(axis=1)
     whole = parts[nearest]
     whole[some] = parts
     overlap = between / float(np.sqrt(max(within, np.finfo(float).tiny)))
@@ -158,12 +158,14 @@ def _mean_within(K: Array) -> float:
     return float((K.sum() - m) / (m * (m - 1))) if m > 1 else 1.0
 
 
-def _labeled(movements: Any, labels: ArrayLike, like: Recognizer | None) -> tuple[Seen, NDArray[np.intp], list[Any]]:
-    seen, known = see(movements, like), label_array(labels)
-    if len(known) != len(seen):
-        raise SpecificationError(f"expected one label for each of the {len(seen)} movements, got shape {known.shape}")
+def _labeled(movements: Any, labels: ArrayLike, like: Compares | None) -> tuple[Described, NDArray[np.intp], list[Any]]:
+    described, known = describe(movements, like), label_array(labels)
+    if len(known) != len(described):
+        raise SpecificationError(
+            f"expected one label for each of the {len(described)} movements, got shape {known.shape}"
+        )
     names, member = np.unique(known, return_inverse=True)
-    return seen, np.asarray(member, dtype=np.intp), names.tolist()
+    return described, np.asarray(member, dtype=np.intp), names.tolist()
 
 
 def _some_of_each(member: NDArray[np.intp], most: int) -> NDArray[np.intp]:

@@ -80,7 +80,7 @@ class Proposals:
         return self.proposals[index]
 
     def __repr__(self) -> str:
-        return f"Proposals({len(self)} kinds of {len(self.clusters)} movements, {len(self.left_over)} left over)"
+        return f"Proposals({len(self)} clusters among {len(self.clusters)} movements, {len(self.left_over)} left over)"
 
 
 def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, widths: Array) -> Proposals:

@@ -12,11 +12,10 @@ from kineme.anchoring.clustering.count import count_kinds
 from kineme.anchoring.clustering.resampling import Clusters, stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
-from kineme.anchoring.seen import see
-from kineme.anchoring.similarities import averaged, similarities
-from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.describe import describe
+from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
+from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
-from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array, check_choice, check_count
 
 _REPEATS = 20  # subsets that clusters must come again in
@@ -28,7 +27,7 @@ def propose(
     n_clusters: int | None = None,
     *,
     min_members: int = 3,
-    like: Recognizer | None = None,
+    like: Compares | None = None,
     max_clustered: int | None = None,
 ) -> Proposals:
     """Gather movements without labels into kinds.
@@ -37,7 +36,7 @@ def propose(
 
     Parameters
     ----------
-    movements : Seen, or movements as `Demonstrations.of` accepts them
+    movements : Described, or movements as `Demonstrations.of` accepts them
         At least three.
     method : {"agglomerative", "hdbscan"}, default "agglomerative"
         Average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN), which find their number themselves.
@@ -63,18 +62,18 @@ def propose(
     """
     check_choice("method", method, list(METHODS))
     check_count("min_members", min_members, 2)
-    seen = see(movements, like)
-    _check_count_of(n_clusters, method, len(seen))
-    limit = largest_clustered(seen.n_dims) if max_clustered is None else max_clustered
+    described = describe(movements, like)
+    _check_count_of(n_clusters, method, len(described))
+    limit = largest_clustered(described.n_dims) if max_clustered is None else max_clustered
     check_count("max_clustered", limit, 3)
-    if len(seen) <= limit:
-        similarity = averaged(seen)
-        K = similarities(seen, widths=similarity.widths)
+    if len(described) <= limit:
+        similarity = averaged(described)
+        K = similarities(described, widths=similarity.widths)
         return _propose(K, similarity, method, n_clusters, min_members)
-    sample, similarity = spread_sample(seen, limit)
-    K = similarities(seen.take(sample), widths=similarity.widths)
+    sample, similarity = spread_sample(described, limit)
+    K = similarities(described.take(sample), widths=similarity.widths)
     found = _propose(K, similarity, method, n_clusters, min_members)
-    return assign(seen, sample, K, found, similarity)
+    return assign(described, sample, K, found, similarity)
 
 
 def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:

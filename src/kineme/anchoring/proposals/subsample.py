@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.proposals.proposals import Proposals
-from kineme.anchoring.seen import Seen
-from kineme.anchoring.similarities import averaged, compare
-from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.describe import Described
+from kineme.comparison.similarity import AveragedSimilarity, averaged, compare
 from kineme.validation import Array
 
 _WITHIN = 0.95  # of the sampled members of all kinds are within the common radius of their nearest mate
@@ -22,7 +21,7 @@ def largest_clustered(n_dims: int) -> int:
     return 800 if n_dims == 3 else 5000
 
 
-def spread_sample(seen: Seen, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:
+def spread_sample(described: Described, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:
     """Places of `size` movements, rising, that leave no kind out; and the similarity at their widths.
 
     Half are drawn evenly. The others are drawn with probability proportional to ``1 - K`` to the nearest of these, the
@@ -30,34 +29,34 @@ def spread_sample(seen: Seen, size: int, seed: int = 0) -> tuple[NDArray[np.intp
     k-means++", PVLDB 5, 2012). A kind too rare for the first half is far from it, so the second half finds it.
     """
     random = np.random.default_rng(seed)
-    first = random.choice(len(seen), size - size // 2, replace=False)
-    far = 1.0 - nearest(averaged(seen.take(first)), seen, seen.take(first))[1]
+    first = random.choice(len(described), size - size // 2, replace=False)
+    far = 1.0 - nearest(averaged(described.take(first)), described, described.take(first))[1]
     far[first] = 0.0
     candidates = np.flatnonzero(far > 0)
     second = candidates  # usually more than are wanted
     if len(candidates) > size // 2:
         second = random.choice(candidates, size // 2, replace=False, p=far[candidates] / far.sum())
     sample = np.sort(np.concatenate((first, second))).astype(np.intp)
-    return sample, averaged(seen.take(sample))
+    return sample, averaged(described.take(sample))
 
 
-def nearest(similarity: AveragedSimilarity, seen: Seen, stored: Seen) -> tuple[NDArray[np.intp], Array]:
+def nearest(similarity: AveragedSimilarity, described: Described, stored: Described) -> tuple[NDArray[np.intp], Array]:
     """The most similar stored movement of each, and how similar it is."""
-    which, how = np.empty(len(seen), dtype=np.intp), np.empty(len(seen))
-    for start in range(0, len(seen), _TILE):
+    which, how = np.empty(len(described), dtype=np.intp), np.empty(len(described))
+    for start in range(0, len(described), _TILE):
         rows = slice(start, start + _TILE)
-        K = compare(similarity, seen.take(rows), stored)
+        K = compare(similarity, described.take(rows), stored)
         which[rows] = K.argmax(axis=1)
         how[rows] = K.max(axis=1)
     return which, how
 
 
 def assign(
-    seen: Seen, sample: NDArray[np.intp], K: Array, found: Proposals, similarity: AveragedSimilarity
+    described: Described, sample: NDArray[np.intp], K: Array, found: Proposals, similarity: AveragedSimilarity
 ) -> Proposals:
     """The proposals of a sample, joined by the movements that are within the radius of their nearest one's kind."""
     radius = np.append(radii(K, found), -np.inf)  # nothing joins what was left over
-    which, how = nearest(similarity, seen, seen.take(sample))
+    which, how = nearest(similarity, described, described.take(sample))
     clusters = found.clusters[which]
     clusters[1.0 - how > radius[clusters]] = -1
     clusters[sample] = found.clusters

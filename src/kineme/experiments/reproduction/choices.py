@@ -1,4 +1,4 @@
-"""What the paper leaves open and we had to choose. Apart, so that tables are written without loading scikit-learn."""
+"""Parameters that the paper does not print and we chose; in a file that does not load scikit-learn."""
 
 from __future__ import annotations
 

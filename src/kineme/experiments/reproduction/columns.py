@@ -1,4 +1,4 @@
-"""The columns of the paper's tables, and what the draws hold for them."""
+"""The columns of the paper's tables, and their values in the draws."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from kineme.experiments.reproduction import paper
 from kineme.experiments.reproduction.representations import READINGS
 
-Draws = list[dict[str, Any]]  # what `experiments.run_draw` returned, draw by draw
+Draws = list[dict[str, Any]]  # results of `experiments.run_draw`, one per draw
 
 CLOSEST, DEFAULT = READINGS
 
@@ -21,12 +21,12 @@ PRINTED = {"rbf": paper.SVM_RBF, "tre": paper.SVM_TRE}
 
 
 def over(draws: Draws, kind: str, key: str) -> list[float]:
-    """One number of each draw that has it."""
+    """One value from each draw that has it."""
     return [one[kind][key] for one in draws if kind in one]
 
 
 def columns_of(draws: Draws, kind: str, reading: str, rest: str = "") -> dict[str, list[float]]:
-    """Column -> the accuracies of a reading, draw by draw."""
+    """Column -> the accuracies of a reading, one per draw."""
     return {head: over(draws, kind, key + rest) for head, key in zip(COLUMNS, READINGS[reading], strict=True)}
 
 

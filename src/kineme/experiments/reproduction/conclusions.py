@@ -1,4 +1,4 @@
-"""What to read in a table, in sentences that follow from its numbers: other numbers, other sentences."""
+"""The conclusions below the tables: sentences that are computed from the numbers."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from kineme.output.table import spread
 #: Column -> the accuracy of each draw.
 ByColumn = Mapping[str, Sequence[float]]
 
-_DIGITS = 0.001  # the paper prints three digits, and cuts rather than rounds: 0.740 for 20/27
-_ALIKE = 1.5  # the largest factor between two widths that are alike
-_LOST = 0.1  # an accuracy that is lower by this much has fallen
-_MOST = 0.5  # share of the multipliers at their bound above which the bound is the reason
+_DIGITS = 0.001  # the paper prints three digits and truncates: 0.740 for 20/27
+_ALIKE = 1.5  # largest factor between two widths that count as alike
+_LOST = 0.1  # an accuracy has fallen if it is lower by this much
+_MOST = 0.5  # share of multipliers at their bound above which the bound is named as the reason
 _NUMBERS = ("no", "one", "two", "three", "four")
 
 
 class Printed(NamedTuple):
-    """One accuracy of the paper, and the draws of each convention that it can mean, by the name of the feature."""
+    """One accuracy of the paper, and our draws for each convention that it can stand for, by name of the feature."""
 
     name: str
     value: float
@@ -43,12 +43,12 @@ def alike(width: float, other: float) -> bool:
 
 
 def multiples(accuracies: Sequence[float], n: int) -> list[float]:
-    """Those that are k / n for a whole number k, within the digits printed."""
+    """The accuracies that are k / n for a whole number k, within the printed digits."""
     return [value for value in accuracies if abs(value - round(value * n) / n) <= _DIGITS]
 
 
 def read_counts(accuracies: Sequence[float], counted: int, drawn: int) -> str:
-    """How many movements the paper's accuracies speak of: those that it counts, or those of our draws."""
+    """Whether the paper's accuracies are shares of the number of movements it states, or of the number in our draws."""
     both = {n: multiples(accuracies, n) for n in (drawn, counted)}
     neither = [f"{value:.3f}" for value in accuracies if all(value not in some for some in both.values())]
     said = (
@@ -59,7 +59,7 @@ def read_counts(accuracies: Sequence[float], counted: int, drawn: int) -> str:
 
 
 def read_placement(what: str, printed: Mapping[str, float], ours: ByColumn) -> str:
-    """In which columns our draws contain the paper's number."""
+    """The columns in which the range of our draws contains the paper's number."""
     within = [column for column, value in printed.items() if inside(value, ours[column])]
     others = [
         f"{column} ({value:.3f} against {_range(ours[column])})"
@@ -73,7 +73,7 @@ def read_placement(what: str, printed: Mapping[str, float], ours: ByColumn) -> s
 
 
 def read_nearer(printed: Mapping[str, float], readings: Mapping[str, ByColumn]) -> str:
-    """Which reading's mean is nearest to the paper's number, where they differ."""
+    """The reading whose mean is nearest to the paper's number, for columns in which the readings differ."""
     nearest: dict[str, list[str]] = {}
     for column, value in printed.items():
         off = {name: abs(fmean(ours[column]) - value) for name, ours in readings.items()}
@@ -84,7 +84,7 @@ def read_nearer(printed: Mapping[str, float], readings: Mapping[str, ByColumn]) 
 
 
 def read_order(what: str, names: tuple[str, str], first: Sequence[float], second: Sequence[float]) -> str:
-    """Which of two is ahead, draw by draw."""
+    """In how many draws each of two is ahead."""
     ahead = sum(a > b for a, b in zip(first, second, strict=True))
     behind = sum(a < b for a, b in zip(first, second, strict=True))
     means = f"{fmean(first):.3f} against {fmean(second):.3f}"
@@ -94,7 +94,7 @@ def read_order(what: str, names: tuple[str, str], first: Sequence[float], second
 
 
 def read_ahead(what: str, names: tuple[str, str], first: ByColumn, second: ByColumn) -> str:
-    """In which columns the mean of one is above that of the other."""
+    """The columns in which the mean of one is above that of the other."""
     found: dict[str, list[str]] = {}
     for column, values in first.items():
         one, other = round(fmean(values), 3), round(fmean(second[column]), 3)
@@ -108,7 +108,7 @@ def read_ahead(what: str, names: tuple[str, str], first: ByColumn, second: ByCol
 
 
 def read_widths(what: str, printed: Mapping[str, float], ours: Mapping[str, float]) -> str:
-    """In which columns the paper's RBF width is like our median distance."""
+    """The columns in which the paper's RBF width is like our median distance."""
     others = [
         f"{column} ({value:.3g} against {ours[column]:.3g})"
         for column, value in printed.items()
@@ -120,7 +120,7 @@ def read_widths(what: str, printed: Mapping[str, float], ours: Mapping[str, floa
 
 
 def read_conventions(accuracies: Sequence[Printed]) -> str:
-    """Which accuracies of the paper lie within the draws of a convention, and of which; for the others the nearest."""
+    """The accuracies of the paper that lie within the draws of a convention, and of which; else the nearest one."""
     within: list[str] = []
     others: list[str] = []
     for name, value, conventions in accuracies:
@@ -135,7 +135,7 @@ def read_conventions(accuracies: Sequence[Printed]) -> str:
 
 
 def read_perfect(what: str, accuracies: ByColumn) -> str:
-    """Which features make no error in any draw."""
+    """The features that make no error in any draw."""
     perfect = [name for name, values in accuracies.items() if min(values) == 1.0]
     return f"{what}: {listed(perfect) or 'none'}."
 
@@ -143,7 +143,7 @@ def read_perfect(what: str, accuracies: ByColumn) -> str:
 def read_penalty(
     accuracies: Mapping[str, Mapping[float, Sequence[float]]], at_bound: Mapping[str, Sequence[float]], n_classes: int
 ) -> str:
-    """Which kernels lose their accuracy at the smallest penalty, and whether the bound of the multipliers is why."""
+    """The kernels that lose accuracy at the smallest penalty, and whether multipliers at their bound explain it."""
     said = []
     for kernel, by_penalty in accuracies.items():
         smallest, largest = min(by_penalty), max(by_penalty)
@@ -165,7 +165,7 @@ def read_penalty(
 
 
 def read_left_out(names: Sequence[str]) -> str:
-    """Which movements no draw contains, and why."""
+    """The movements that no draw contains, and the reason."""
     if not names:
         return ""
     return (

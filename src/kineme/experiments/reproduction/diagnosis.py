@@ -24,7 +24,7 @@ _PAPER_SAYS = (
 
 
 def diagnosis(draws: Draws) -> Table:
-    """1-NN under each convention, with the distances that give it away."""
+    """1-NN under each convention, with the distances that distinguish it."""
     rows: list[tuple[str, ...]] = [
         (
             row.formula,
@@ -56,7 +56,7 @@ def _conventions(draws: Draws, kind: str, column: tuple[str, str], rest: str = "
 
 
 def read_diagnosis(draws: Draws) -> str:
-    """Which conventions have the paper's accuracies, what division costs, and which features make no error."""
+    """The conventions with the paper's accuracies, the cost of the division, and the features without errors."""
     accuracies = [
         Printed(head, paper.NEAREST_NEIGHBOR[cell], _conventions(draws, "nearest", cell))
         for head, cell in zip(COLUMNS, paper.CELLS, strict=True)
@@ -73,7 +73,7 @@ def read_diagnosis(draws: Draws) -> str:
 
 
 def svm_diagnosis(draws: Draws) -> Table:
-    """The SVM under each convention, with the widths that the paper prints."""
+    """The SVM under each convention, with the printed widths."""
     rows = [
         (
             row.formula,
@@ -104,7 +104,7 @@ def svm_diagnosis(draws: Draws) -> Table:
 
 
 def penalty(draws: Draws) -> Table:
-    """The SVM by penalty."""
+    """The SVM for several penalties."""
     accuracies = {
         kernel: {
             **{C: over(draws, "penalty", f"original-sa/{name}/{C:g}") for C in PENALTIES[:-1]},

@@ -1,4 +1,4 @@
-"""One draw of one data set through every representation and classifier: the numbers behind all tables."""
+"""Run every representation and classifier on one draw of one data set: the numbers of all tables."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
 
 @lru_cache(maxsize=2)
 def _features(dataset: str) -> tuple[dict[str, Array], Any, list[str | None]]:
-    """Features of all usable recordings of a data set, per representation; labels as numbers; names of the others."""
+    """Features of all usable recordings per representation, labels as numbers, and names of unusable recordings."""
     demos = load_lasa(DATASETS[dataset])
     without = without_weights(demos)
     left_out = [name for name, missing in zip(demos.names or (), without, strict=False) if missing]
     demos = demos[~without]
     labels = np.unique(require_labels(demos), return_inverse=True)[1]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateMovementWarning)  # the point of the experiment
+        warnings.simplefilter("ignore", DegenerateMovementWarning)  # their effect is measured here
         return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels, left_out
 
 
 def without_weights(demos: Demonstrations) -> NDArray[np.bool_]:
-    """Movements with g = x0 in a dimension, so without w and f in the original formulation; shape (n,)."""
+    """Whether g = x0 in a dimension: w and f do not exist in the original formulation; shape (n,)."""
     x, first, last = demos.positions, demos.offsets[:-1], demos.offsets[1:] - 1
     return np.asarray((x[first] == x[last]).any(axis=1))
 

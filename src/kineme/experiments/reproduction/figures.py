@@ -42,7 +42,7 @@ def _terms(primitives: Primitives) -> tuple[Array, Array]:
     return primitives.weights, primitives.shape_attractor(paper.N_SAMPLES)
 
 
-_UNITS = {"original": ("1", "mm"), "bio-inspired": ("mm", "mm")}  # of w and of the term, time normalized
+_UNITS = {"original": ("1", "mm"), "bio-inspired": ("mm", "mm")}  # of w and of the term, in normalized time
 
 
 def _panels(formulation: str) -> tuple[Figure, Any, Any]:

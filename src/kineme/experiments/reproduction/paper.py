@@ -30,6 +30,6 @@ SVM_TRE = dict(zip(CELLS, (0.111, 0.111, 1.0, 0.778), strict=True))
 
 #: Section 4.2.
 STIFFNESS, N_BASIS, N_SAMPLES = 100.0, 80, 100
-#: Section 4.1: samples per movement; and three demonstrations of nine letters, which explain ten of its twelve
-#: accuracies, multiples of 1/27, although Table 1 counts thirty.
+#: Section 4.1: samples per movement. Three demonstrations of nine letters: ten of the twelve accuracies are multiples
+#: of 1/27, although Table 1 lists thirty movements.
 N_POINTS, PER_CLASS = 150, 3

@@ -1,7 +1,7 @@
 """The paper's protocol: three demonstrations per class, leave one out, by 1-NN and by SVM.
 
-The recordings of the paper (150 samples, 30 movements) are an earlier release that no package carries. So
-the experiment is repeated on many random draws from today's seven per class, and its spread reported.
+The recordings of the paper (150 samples, 30 movements) are an earlier release that no package contains. So the
+experiment is repeated on many random draws from the seven recordings per class of today, and the range is reported.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def draw(labels: NDArray[Any], per_class: int, seed: int, index: int) -> NDArray
 
 
 def nearest_neighbor_accuracy(rows: NDArray[Any], labels: NDArray[Any], metric: str = "euclidean") -> float:
-    """Leave-one-out accuracy of 1-NN: scikit-learn's neighbors of the training rows leave each row itself out."""
+    """Leave-one-out accuracy of 1-NN; `kneighbors` of the training rows excludes each row itself."""
     nearest = NearestNeighbors(n_neighbors=1, metric=metric).fit(rows).kneighbors(return_distance=False)[:, 0]
     return float(np.mean(labels[nearest] == labels))
 
@@ -45,7 +45,7 @@ def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENA
 
 
 def share_at_bound(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENALTY) -> float:
-    """Share of the multipliers at their bound C, among those of the class that lost a movement to the test.
+    """Share of the multipliers at their bound C, in the class that the test movement was taken from.
 
     Parameters as of `svm_accuracy`.
     """
@@ -60,7 +60,7 @@ def share_at_bound(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PE
 
 
 def _left_out(gram: NDArray[Any], labels: NDArray[Any], penalty: float) -> Iterator[tuple[SVC, NDArray[Any], Any]]:
-    """The SVM of each split, the similarities of the row that is left out to the others, and its label."""
+    """Of each split the SVM, the similarities of the test row to the training rows, and its label."""
     n = len(labels)
     for (train, test), similar in zip(LeaveOneOut().split(labels), np.broadcast_to(gram, (n, n, n)), strict=True):
         model = SVC(kernel="precomputed", C=penalty).fit(similar[np.ix_(train, train)], labels[train])

@@ -1,7 +1,7 @@
-"""What "weights" and "f(t)" can mean: one table of the conventions that papers mix.
+"""The conventions that "weights" and "f(t)" can stand for, in one table.
 
-Each row turns movements into feature rows. The first question of the reproduction is which rows give the
-paper's numbers; the second is which ones a user should take.
+Each row maps movements to features. The reproduction asks which rows give the paper's numbers, and which ones a user
+should take.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Representation:
     formulation, quantity : str
         The column of the paper's tables that the row can stand for.
     formula : str
-        What the feature is.
+        Formula of the feature.
     why : str
-        What sets it apart from the other rows of its column; what comes of it is computed.
+        How it differs from the other rows of its column.
     rows : callable
         Demonstrations -> features (n, p).
     """
@@ -162,8 +162,8 @@ REPRESENTATIONS = {
     )
 }
 
-#: Two readings of the four columns of Tables 2 to 4, in the order of `paper.CELLS`. The first takes in each column the
-#: row whose median distance is nearest to the RBF width that the paper prints; a test holds it.
+#: Two readings of the four columns of Tables 2 to 4, in the order of `paper.CELLS`. The first has in each column the
+#: row whose median distance is nearest to the printed RBF width; a test checks it.
 READINGS = {
     "closest in distances": ("original-w", "bio-w-over-s", "original-sa", "bio-f-over-s"),
     "kineme's default": ("original-w", "bio-w", "original-sa", "bio-sa"),

@@ -21,12 +21,12 @@ from kineme.runtime.parallel import n_threads
 Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
 _FORMAT = 1  # of results.json
-_LARGE_SVM_SHARE = 4  # the SVM sees one draw in four of the large data set: it takes most of the time there
+_LARGE_SVM_SHARE = 4  # on the large data set the SVM runs on one draw in four, since it takes most of the time
 _DPI = {True: 100, False: 200}  # quick or not
 
 
 class Reproduction(NamedTuple):
-    """What a run gives back: the tables, and the files written."""
+    """The result of a run: the tables, and the files written."""
 
     tables: list[Table]
     files: list[Path]
@@ -49,11 +49,11 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
     Raises
     ------
     OSError
-        The folder cannot be written; found out before the work begins.
+        The folder cannot be written; checked before the work begins.
     """
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
-    TemporaryFile(dir=out).close()  # find out now, not after the work, that the folder cannot be written
+    TemporaryFile(dir=out).close()  # a folder that cannot be written fails now, not after the work
     tasks = _tasks(draws, seed, quick)
     done = dict(progress(_in_processes(tasks), total=len(tasks)))
     from kineme.experiments.reproduction.tables import make_tables
@@ -77,7 +77,7 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
 
 
 def _tasks(draws: int, seed: int, quick: bool) -> dict[tuple[str, Any], Task]:
-    """What to do, longest first: the large data set, then figures, then letters."""
+    """All tasks, longest first: the large data set, then figures, then letters."""
     large = {
         ("lasa-26", k): (_draw, ("lasa-26", seed, k, k % _LARGE_SVM_SHARE == 0 and not quick)) for k in range(draws)
     }
@@ -103,7 +103,7 @@ def _figure(name: str, seed: int, dpi: int) -> tuple[str, dict[str, bytes]]:
 
 
 def _in_processes(tasks: dict[tuple[str, Any], Task]) -> Iterator[tuple[tuple[str, Any], Any]]:
-    """Results as they come. Processes, because most of the time is spent in small scikit-learn calls."""
+    """Yield results as they come. In processes, because most of the time is spent in small calls that hold the GIL."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(n_threads(), mp_context=context, initializer=_one_thread) as pool:
         waiting = {pool.submit(function, *arguments): key for key, (function, arguments) in tasks.items()}
@@ -112,7 +112,7 @@ def _in_processes(tasks: dict[tuple[str, Any], Task]) -> Iterator[tuple[tuple[st
 
 
 def _one_thread() -> None:
-    """A worker has one core: neither kineme nor BLAS should start more threads."""
+    """Prepare a worker process; it has one core, so neither kineme nor BLAS should start more threads."""
     os.environ["KINEME_NUM_THREADS"] = "1"
     os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1"))
 
@@ -142,7 +142,7 @@ def _versions() -> dict[str, str]:
 
 
 def _rounded(value: Any) -> Any:
-    """Six significant digits: what is left of the order of summation stays out of the file."""
+    """Round to six significant digits, which do not depend on the order of summation."""
     if isinstance(value, dict):
         return {key: _rounded(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):

@@ -10,10 +10,10 @@ from kineme.validation import Array
 
 
 def fit_by_split(kernel: RBF | TruncatedEuclidean, X: Array) -> list[Kernel]:
-    """``[kernel.fit(X without row i) for i in range(n)]``: what a classifier may know that is tested on row i.
+    """``[kernel.fit(X without row i) for i in range(n)]``: widths from the training rows of each split.
 
-    The differences of all pairs of rows are computed and sorted once; for up to about a hundred rows, as `fit` itself
-    looks at every pair.
+    The differences of all pairs of rows are computed and sorted once. For up to about a hundred rows, for which `fit`
+    uses every pair too.
     """
     first, second = np.triu_indices(len(X), 1)
     differences = np.abs(X[first] - X[second])
@@ -24,14 +24,14 @@ def fit_by_split(kernel: RBF | TruncatedEuclidean, X: Array) -> list[Kernel]:
 
 
 def medians_without_each(values: Array, n: int) -> list[float]:
-    """For each of n rows the median of the positive values of all pairs that it has no part in.
+    """For each of n rows, the median of the positive values of all pairs without that row.
 
     Parameters
     ----------
     values : ndarray of shape (n (n - 1) / 2, p)
-        Of the pairs ``np.triu_indices(n, 1)``.
+        Values of the pairs ``np.triu_indices(n, 1)``.
     """
-    place = np.full(values.size, -1)  # of each positive value among them all, sorted
+    place = np.full(values.size, -1)  # rank of each positive value among all of them
     order = np.argsort(values, axis=None, kind="stable")
     order = order[np.count_nonzero(values <= 0) :]
     place[order] = np.arange(len(order))
@@ -44,7 +44,7 @@ def medians_without_each(values: Array, n: int) -> list[float]:
         gone = gone[gone >= 0]
         left = len(ascending) - len(gone)
         middle = np.array([(left - 1) // 2, left // 2])
-        # What is k-th among those left was moved up by those that are gone and come before it.
+        # The k-th of the remaining values has a rank that is higher by the number of removed values before it.
         middle += np.searchsorted(gone - np.arange(len(gone)), middle, side="right")
         medians.append(float(ascending[middle].mean()))
     return medians

@@ -1,4 +1,4 @@
-"""The paper's Tables 1 to 4, ours beside the printed numbers, and what follows from both."""
+"""The paper's Tables 1 to 4: our numbers beside the printed ones, and the conclusions."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _nearest(draws: Draws, title: str, with_paper: bool) -> Table:
 
 
 def read_nearest(draws: Draws, with_paper: bool) -> str:
-    """What follows from the accuracies of 1-NN: where the paper's lie, which feature is ahead, and what is left out."""
+    """Conclusions from the accuracies of 1-NN: the paper's among ours, the feature that is ahead, omitted movements."""
     by_reading = {reading: columns_of(draws, "nearest", reading) for reading in READINGS}
     said = []
     if with_paper:
@@ -107,7 +107,7 @@ def _parameters(draws: Draws) -> Table:
 
 
 def read_parameters(draws: Draws) -> str:
-    """Where the paper's RBF widths are like the median distances of a reading, and like those of another."""
+    """The columns in which the paper's RBF widths are like the median distances of one reading, and of the other."""
     printed = {head: paper.KERNELS[cell].rbf.sigma or 0.0 for head, cell in zip(COLUMNS, paper.CELLS, strict=True)}
     medians = {
         reading: {head: fmean(values) for head, values in columns_of(draws, "width", reading, "/rbf").items()}
@@ -134,7 +134,7 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
 
 
 def read_svm(draws: Draws, with_paper: bool) -> str:
-    """What follows from the accuracies of the SVM: where the paper's lie, and which kernel is ahead."""
+    """Conclusions from the accuracies of the SVM: the paper's among ours, and the kernel that is ahead."""
     rbf, tre = (columns_of(draws, "svm", CLOSEST, f"/{name}/paper") for name in KERNELS)
     said = []
     if with_paper:

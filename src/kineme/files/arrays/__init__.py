@@ -1,1 +1,1 @@
-"""Arrays by name: NPZ, JSON, MATLAB."""
+"""Files of named arrays: NPZ, JSON, MATLAB."""

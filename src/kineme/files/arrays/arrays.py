@@ -1,4 +1,4 @@
-"""Arrays by name, from NPZ and JSON: which of them are times and positions, of one movement or of many."""
+"""Movements from named arrays of NPZ and JSON: which arrays are times and positions, of one movement or of many."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RAGGED = (
 
 
 def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Found:
-    """The movements that arrays hold.
+    """The movements in named arrays.
 
     - ``positions`` (T, d) or (T,), ``times`` (T,): one movement.
     - ``positions`` (n, T, d), ``times`` (T,) or (n, T): many of equal length.
@@ -93,7 +93,7 @@ def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 class _Joined(Mapping[str, Any]):
-    """Arrays with positions in place of their axes; the others are read when they are asked for, as before."""
+    """Named arrays with positions in place of their coordinates; the others are still read on first use."""
 
     def __init__(self, arrays: Mapping[str, Any], axes: Sequence[str], positions: Array) -> None:
         self._arrays, self._positions = arrays, positions
@@ -115,7 +115,7 @@ class _Joined(Mapping[str, Any]):
 
 
 def _numbers(values: Any) -> Array:
-    """As float64; dates and durations count in nanoseconds."""
+    """An array as float64; dates and durations as nanoseconds."""
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -131,7 +131,7 @@ def _numbers(values: Any) -> Array:
 
 
 def _no_number(array: NDArray[Any]) -> Any:
-    """The first entry that stands in the way."""
+    """The first entry that is not a number."""
     for one in array.ravel().tolist():
         try:
             float(np.float64(one))
@@ -194,7 +194,7 @@ def _labels(arrays: Mapping[str, Any], n: int) -> list[str | None]:
     given = arrays[key]
     if isinstance(given, np.ndarray):
         shape, labels = np.atleast_1d(given).shape, np.atleast_1d(given).tolist()
-    else:  # of JSON: one by one, as an array would turn numbers beside texts into texts
+    else:  # from JSON: converted one by one, since NumPy would convert numbers beside texts to texts
         labels = given if isinstance(given, list) else [given]
         shape = (len(labels),)
     if shape != (n,):

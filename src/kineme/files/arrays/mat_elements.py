@@ -1,8 +1,8 @@
-"""The structure of MATLAB files of version 5 to 7.2: tags, elements, matrices; every size is checked before it is used.
+"""The structure of MATLAB files of version 5 to 7.2: tags, elements, matrices. Every size is checked before use.
 
 Source: The MathWorks, "MAT-File Format", version 5. A file is a header of 128 bytes and elements, each a tag (type,
-number of bytes) and its data; a matrix is an element of elements: flags, dimensions, name, and what its class has.
-Nothing is read that is not asked for, and nothing by the sizes that a file claims.
+number of bytes) and its data; a matrix is an element of elements: flags, dimensions, name, and the content of its
+class. Only the requested variables are read, and no size in the file is trusted.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _MAX_DIMS = 32
 
 
 class Element(NamedTuple):
-    """Type and data of an element, and where the next one begins."""
+    """Type and data of an element, and the offset of the next one."""
 
     type: int
     data: memoryview
@@ -38,7 +38,7 @@ class Element(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """Head of a matrix, and the elements that follow: the content."""
+    """Header of a matrix, and the elements of its content."""
 
     kind: int  # its class
     is_complex: bool
@@ -48,7 +48,7 @@ class Matrix(NamedTuple):
 
 
 def byte_order(data: bytes) -> str:
-    """``"<"`` or ``">"``, as the header has it; a `ValueError` where this is no file of version 5."""
+    """The byte order ``"<"`` or ``">"`` of the header; a `ValueError` if this is not a file of version 5."""
     order = {b"\0\1IM": "<", b"\1\0MI": ">"}.get(data[HEADER - 4 : HEADER])
     if order is None:
         raise ValueError("something foreign or truncated")
@@ -56,14 +56,14 @@ def byte_order(data: bytes) -> str:
 
 
 def elements(data: memoryview, order: str) -> Iterator[Element]:
-    """The elements that stand one after the other; a `ValueError` where one ends beyond the data."""
+    """Consecutive elements; a `ValueError` if one ends beyond the data."""
     at = 0
     while at < len(data):
         if len(data) - at < 8:
             raise ValueError("a truncated tag")
         kind, size = struct.unpack_from(f"{order}II", data, at)
         start, end = at + 8, at + 8 + size
-        if kind >> 16:  # up to four bytes of data stand in the tag
+        if kind >> 16:  # a small element: up to four bytes of data within the tag
             kind, size = kind & 0xFFFF, kind >> 16
             start, end = at + 4, at + 4 + size
             if size > 4:
@@ -75,7 +75,7 @@ def elements(data: memoryview, order: str) -> Iterator[Element]:
 
 
 def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matrix]:
-    """The variables of those names; others are neither expanded nor read."""
+    """The variables with these names; others are neither decompressed nor read."""
     found = {}
     for element in elements(memoryview(data)[HEADER:], order):
         if element.type == _COMPRESSED:
@@ -90,7 +90,7 @@ def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matri
 
 
 def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:
-    """The matrix in a compressed element; only its head, if nobody wants it."""
+    """The matrix in a compressed element; only its header if its name is not wanted."""
     stream = zlib.decompressobj()
     head = stream.decompress(packed, _PEEK)
     if len(head) < 8:
@@ -109,7 +109,7 @@ def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:
 
 
 def as_matrix(element: Element, order: str) -> Matrix:
-    """An element as a matrix; without any data it is an empty one."""
+    """An element as a matrix; an element without data is an empty matrix."""
     if element.type != _MATRIX:
         raise ValueError(f"an element of type {element.type} in place of a matrix")
     return _matrix(element.data, order) if len(element.data) else Matrix(6, False, (0, 0), "", element.data)
@@ -121,7 +121,7 @@ def _matrix(data: memoryview, order: str) -> Matrix:
     if flags is None or flags.type != 6 or len(flags.data) != 8 or second is None:
         raise ValueError("a damaged head of a matrix")
     bits = struct.unpack_from(f"{order}I", flags.data)[0]
-    if bits & 0xFF == _OPAQUE:  # has no dimensions; nobody reads further
+    if bits & 0xFF == _OPAQUE:  # opaque objects have no dimensions and are not read
         return Matrix(_OPAQUE, False, (), bytes(second.data).decode("latin-1"), data[len(data) :])
     if second.type != 5 or len(second.data) % 4 or not 2 <= len(second.data) // 4 <= _MAX_DIMS:
         raise ValueError("damaged dimensions of a matrix")
@@ -132,7 +132,7 @@ def _matrix(data: memoryview, order: str) -> Matrix:
 
 
 def numbers(matrix: Matrix, order: str) -> Array:
-    """The content of a matrix of real numbers, axes of length 1 left out."""
+    """The content of a matrix of real numbers, squeezed."""
     if matrix.kind not in NUMBERS or matrix.is_complex:
         raise ValueError("complex numbers" if matrix.is_complex else "something else than numbers")
     content = next(elements(matrix.content, order), None)
@@ -146,7 +146,7 @@ def numbers(matrix: Matrix, order: str) -> Array:
 
 
 def text(matrix: Matrix, order: str) -> str | None:
-    """The content of a matrix that is one line of text, or None."""
+    """The content of a matrix that is one line of text, else None."""
     content = next(elements(matrix.content, order), None) if matrix.kind == TEXT else None
     if content is None or content.type not in _ENCODINGS or len(matrix.dims) != 2 or matrix.dims[0] != 1:
         return None

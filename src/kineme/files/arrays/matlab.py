@@ -1,4 +1,4 @@
-"""MATLAB files as LASA's: a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T)."""
+"""MATLAB files in the layout of LASA: a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FIELDS = ("t", "pos")
 
 
 class Demos(NamedTuple):
-    """Times (T,) and positions (T, d) of each demonstration, and the name that the file gives them, if any."""
+    """Times (T,) and positions (T, d) of each demonstration, and the name in the file, if any."""
 
     times: list[Array]
     positions: list[Array]
@@ -38,7 +38,7 @@ class Demos(NamedTuple):
 def read_demos(data: bytes) -> Demos:
     """Read all demonstrations of a MATLAB file of version 5 to 7.2.
 
-    ``demos`` is a structure, an array of structures or a cell array of them. All else in the file is passed over.
+    ``demos`` is a structure, an array of structures or a cell array of them. Other variables are ignored.
 
     Raises
     ------

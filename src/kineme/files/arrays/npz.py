@@ -1,4 +1,4 @@
-"""NumPy's archives: an array is read when it is asked for, checked before it is expanded, and never unpickled."""
+"""NumPy archives: an array is read on first use, checked before it is decompressed, and never unpickled."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 
 _ENDING = ".npy"
-_LONGEST_EMPTY = 1024  # samples of an array without numbers: more is no recording
+_LONGEST_EMPTY = 1024  # rows of an array without columns, at most
 _HEADS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
@@ -34,15 +34,15 @@ class Npz(Mapping[str, NDArray[Any]]):
     Raises
     ------
     DataError
-        Here: no archive, or two entries of one name. When an array is asked for: it is damaged, takes more memory than
-        `kineme.files.limits` allows (all arrays together), or holds Python objects.
+        On construction: not an archive, or two entries of one name. On access to an array: it is damaged, takes more
+        memory than `kineme.files.limits` allows (all arrays together), or holds Python objects.
     """
 
     def __init__(self, data: bytes, path: Path) -> None:
         self._path, self._taken = path, 0
         try:
             self._archive = zipfile.ZipFile(io.BytesIO(data))
-        except Exception as error:  # readers of archives raise many kinds on damaged files
+        except Exception as error:  # zipfile raises many exceptions on damaged files
             raise self._damaged(error) from error
         listed = [one for one in self._archive.infolist() if one.filename.endswith(_ENDING)]
         self._members = {one.filename.removesuffix(_ENDING): one for one in listed}
@@ -56,7 +56,7 @@ class Npz(Mapping[str, NDArray[Any]]):
             return self._decoded(name, content)
         except DataError:
             raise
-        except Exception as error:  # as above; and headers of arrays are Python literals of any depth
+        except Exception as error:  # as above; array headers are Python literals, which can raise more
             raise self._damaged(error) from error
 
     def __contains__(self, name: object) -> bool:
@@ -73,13 +73,13 @@ class Npz(Mapping[str, NDArray[Any]]):
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ValueError(f"an entry {member.filename!r} that is packed in an unusual way")
         with self._archive.open(member) as file:
-            content = file.read(member.file_size)  # a plain read() expands before it counts
+            content = file.read(member.file_size)  # read() without a size decompresses before it checks
         if len(content) != member.file_size:
             raise ValueError(f"a truncated entry {member.filename!r}")
         return content
 
     def _decoded(self, name: str, content: bytes) -> NDArray[Any]:
-        """The array; its header is believed only where the bytes behind it agree."""
+        """Decode an array; its header must agree with the number of bytes that follow."""
         file = io.BytesIO(content)
         shape, fortran_order, dtype = _HEADS[npy.read_magic(file)](file)
         if dtype.hasobject:

@@ -1,1 +1,1 @@
-"""What a set of recordings holds: counts, durations, rates, gaps, problems, and a picture."""
+"""Summaries of a set of recordings: counts, durations, rates, gaps, problems, and a figure."""

@@ -1,4 +1,4 @@
-"""Movements that occur more than once, sample for sample, wherever they start in time."""
+"""Duplicate movements: equal sample by sample, whatever time they start at."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
-_STAMP = 1e-6  # times since the start that differ by less than this share of the duration are the same
+_STAMP = 1e-6  # times since the start are equal if they differ by less than this share of the duration
 
 
 def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
     """Groups of indices of equal movements, each group in order.
 
-    Equal length, ends and sum pick candidates for all movements at once; these are compared sample by sample.
+    Candidates have equal lengths, ends and sums, computed for all movements at once; they are compared by sample.
     """
     x, offsets = demonstrations.positions, demonstrations.offsets
     key = np.column_stack(

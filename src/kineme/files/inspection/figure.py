@@ -1,4 +1,4 @@
-"""A picture of recordings: one panel per label, its movements over one another."""
+"""A figure of recordings: one panel per label, its movements on top of each other."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
 
 _PANELS = 30  # labels that are drawn
-_OVERLAID = 25  # movements of a label that are drawn, evenly chosen
+_OVERLAID = 25  # movements of a label that are drawn, evenly spaced
 _POINTS = 400  # samples of a movement that are drawn
 _COLUMNS = 6
 _NAME = 22  # letters of a label above its panel
@@ -74,10 +74,10 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
 
 
 def _tidy_space(axes: Any) -> None:
-    """Equal scales, no numbers, and planes that do not draw the eye."""
+    """Equal scales, no tick labels, and faint background planes."""
     axes.set_aspect("equal")
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 push the axes aside for empty labels
+        axis.set_major_formatter(NullFormatter())  # Matplotlib 3.9 and 3.10.0 reserve space for empty labels
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
         axis._axinfo["grid"].update(color="#DDDDDD", linewidth=0.5)
         axis._axinfo["tick"].update(inward_factor=0.0, outward_factor=0.0)
@@ -85,7 +85,7 @@ def _tidy_space(axes: Any) -> None:
 
 
 def _path(one: Trajectory) -> Any:
-    """What is drawn of a movement, (points, 2 or 3)."""
+    """The points of a movement that are drawn, (points, 2 or 3)."""
     kept = np.unique(np.linspace(0, len(one) - 1, min(len(one), _POINTS)).round().astype(int))
     x = one.positions[kept, :3]
     return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))

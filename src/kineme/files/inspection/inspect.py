@@ -1,4 +1,4 @@
-"""What a set of recordings holds, as numbers."""
+"""Summary of a set of recordings in numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kineme.files.tables.time_units import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
-_RATES = (2.0, 20_000.0)  # people and robots are sampled between these [Hz]
+_RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
 
 
 class Range(NamedTuple):
@@ -27,7 +27,7 @@ class Range(NamedTuple):
 
 
 class LabelSummary(NamedTuple):
-    """The movements of one label, or those without.
+    """Summary of the movements of one label, or of those without a label.
 
     `samples`, `duration` [s], `rate` [Hz] and `extent` (the longest side of the box around a movement) range over
     movements; `jitter` is their median, see `Sampling`; `gaps` counts all, `longest_gap` [s] is 0 without any.
@@ -45,7 +45,7 @@ class LabelSummary(NamedTuple):
 
 
 class Inspection(NamedTuple):
-    """What `inspect` finds.
+    """The result of `inspect`.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Inspection(NamedTuple):
         Names of movements that are the same, sample for sample.
     problems : tuple of Problem
     notes : tuple of str
-        What a person should look at.
+        Hints that a person should check.
     """
 
     movements: int
@@ -71,7 +71,7 @@ class Inspection(NamedTuple):
 
 
 def inspect(recordings: Recordings) -> Inspection:
-    """Count and measure what was read."""
+    """Summarize recordings."""
     demos = recordings.demonstrations
     sampling = sampling_of(demos)
     names = demos.names or ()

@@ -1,4 +1,4 @@
-"""An inspection in words for people, and as data for programs."""
+"""An inspection as text for people, and as plain data for programs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def as_data(found: Inspection) -> dict[str, Any]:
 
 
 def as_words(found: Inspection) -> str:
-    """A table of labels, how files were understood, what is double, what could not be read."""
+    """A table of labels, how files were read, duplicates, and what could not be read."""
     rows = [_row(one) for one in found.labels]
     title = (
         f"{counted(found.movements, 'movement')} of {counted(found.dimensions, 'dimension')} "
@@ -61,7 +61,7 @@ def _row(one: LabelSummary) -> tuple[str, ...]:
 
 
 def _range(values: Range) -> str:
-    """The median alone where all are alike, else also the least and the greatest."""
+    """The median alone if minimum and maximum are equal, else all three."""
     least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
     return median if least == greatest else f"{median} ({least} to {greatest})"
 

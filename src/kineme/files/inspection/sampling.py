@@ -1,4 +1,4 @@
-"""How evenly movements are sampled, for all of them at once."""
+"""Sampling rates, jitter and gaps of movements, for all of them at once."""
 
 from __future__ import annotations
 

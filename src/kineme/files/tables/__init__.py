@@ -1,1 +1,1 @@
-"""Tables of samples: text and Parquet, and what their columns mean."""
+"""Tables of samples, text and Parquet, and the roles of their columns."""

@@ -1,4 +1,4 @@
-"""Which column of a table is time, which coordinates, which tells movements apart, which names the action."""
+"""The roles of the columns of a table: time, coordinates, movement, label."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kineme.files.parsed_file import listed
 from kineme.files.tables.layout import Column, Layout
 from kineme.files.tables.time_units import PER_SECOND, words_of
 
-#: Words of heads. A head is of a kind if all its words are in the kind's lists and at least one in the first of them.
+#: Words of heads. A head has a role if all its words are in the role's lists and at least one is in the first list.
 TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "elapsed", "epoch"})
 MOVEMENT_WORDS = frozenset(
     {
@@ -22,12 +22,12 @@ MOVEMENT_WORDS = frozenset(
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
 _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
-_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # say nothing that time does not
+_COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
 class Roles(NamedTuple):
-    """Column numbers: what each is for, and those that are left aside."""
+    """Column numbers by role, and the columns that are ignored."""
 
     time: int | None
     positions: tuple[int, ...]
@@ -46,9 +46,9 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     kinds : sequence of {"number", "date", "text"}
         What the columns hold.
     layout : Layout
-        What the caller says; it wins.
+        The caller's choices; they take precedence.
     named : bool, default True
-        Whether the file has heads. Without, the first column that is no text is time, the others are coordinates.
+        Whether the file has heads. If not, the first column of numbers is time and the others are coordinates.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _number(heads: Sequence[str], column: Column) -> int:
 
 
 def _numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
-    """Columns by head or number; digits in a string count when no head reads so."""
+    """Column numbers from heads or numbers; a string of digits is a number if no head equals it."""
     exact, plain = _places(heads), _places(map(_plain, heads))
     return tuple(_place(heads, one, exact, plain) for one in columns)
 
@@ -164,7 +164,7 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """A counter of samples, or the velocity or acceleration of another column, whose plain heads these are."""
+    """Whether a column is redundant: a counter of samples, or the velocity or acceleration of another column."""
     words = words_of(head)
     if not head.strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
         return True

@@ -1,4 +1,4 @@
-"""Time stamps that are written as dates, such as 2024-05-06T07:08:09.25Z."""
+"""Time stamps written as dates, such as 2024-05-06T07:08:09.25Z."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
 
 
 def nanoseconds(stamps: NDArray[Any]) -> Array:
-    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN where there is none.
+    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN for missing ones.
 
     Raises
     ------
     DataError
-        Dates so far that nanoseconds cannot count them; NumPy before 2.5 would wrap them around silently.
+        Dates out of the range of nanoseconds; NumPy before 2.5 would wrap them around silently.
     """
     missing = np.isnat(stamps)
     try:

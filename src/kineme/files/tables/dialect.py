@@ -1,4 +1,4 @@
-"""How a table of samples is written: separator, decimal mark, heads, and what its columns hold."""
+"""The dialect of a table of samples: separator, decimal mark, heads, and types of the columns."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from kineme.files.tables.columns import is_time
 from kineme.files.tables.dates import is_date
 
 COMMENTS = ("#", "%", "//")
-_PEEK = 20  # samples to look at before deciding
-_CELL = 32  # bytes in Python that a cell may take, for each of its characters
+_PEEK = 20  # samples from which the dialect is detected
+_CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{_COMMA_NUMBER.pattern}(\s+{_COMMA_NUMBER.pattern})+\s*")  # between blanks
@@ -31,7 +31,7 @@ class Dialect(NamedTuple):
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
 
     def is_sample(self, line: str) -> bool:
-        """Whether a line holds a sample; a comment does not, but a name may begin as one.
+        """Whether a line holds a sample. A comment does not, but a name may begin like a comment.
 
         A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
         cells as there are columns, and those of numbers hold numbers.
@@ -62,9 +62,9 @@ def split(line: str, separator: str | None) -> list[str]:
 
 
 def _quoted_cells(line: str, separator: str | None) -> list[str]:
-    """Cells of which some begin with a quote: up to the next one, what follows it included; two in a row stand for one.
+    """The cells of a line with quoted cells; a doubled quote within them stands for one quote.
 
-    Not by Python's csv, which has a limit on the length of cells for the whole process.
+    Python's csv is not used: its limit on the length of cells holds for the whole process.
     """
     end = r"\s" if separator is None else re.escape(separator)
     cell = re.compile(rf'[^\S{end}]*"([^"]*(?:""[^"]*)*)(?:"([^{end}]*))?|([^{end}]*)')
@@ -80,7 +80,7 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
 
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
-    """How a table is written, from its first lines; no more are taken than needed."""
+    """The dialect of a table, from its first lines; no more lines are read than needed."""
     lines, kept, longest = [], [], 0
     for line in text:
         if len(line) > longest:
@@ -109,12 +109,12 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
 
 
 def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
-    """Also those lines below the first one kept that begin as comments and yet are rows: ``#1,0.0,0.25,0.75``.
+    """Add the lines below the first kept one that begin like comments but are rows: ``#1,0.0,0.25,0.75``.
 
-    As long as the first cells of all other rows are no numbers; else a row was commented out.
+    Only if the first cells of all other rows are not numbers; otherwise such a line is a row that was commented out.
     """
     separator = _separator([lines[kept[0]]])
-    if separator is None or len(kept) == len(lines) - kept[0]:  # none below is left out
+    if separator is None or len(kept) == len(lines) - kept[0]:  # no line below was skipped
         return kept
     rows = [split(lines[k], separator) for k in kept]
     if any(is_number(row[0], separator != ",") for row in rows):

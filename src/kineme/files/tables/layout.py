@@ -1,4 +1,4 @@
-"""What a caller says about the columns of a recording; what is left open is found out."""
+"""The caller's choices about the columns of a recording; what is not given is detected."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from kineme.errors import SpecificationError
 from kineme.files.tables.time_units import PER_SECOND, UNITS
 from kineme.validation import check_choice, check_number
 
-Column = str | int  # by its head, or counted from 0
+Column = str | int  # head, or number counted from 0
 
 SKIP = ("movement", "sample")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which columns hold what. None: find out from heads and numbers, and report it.
+    """The roles of the columns. None: detect them from heads and numbers, and report them.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Layout:
         Unit of the time stamps: one of `kineme.files.tables.time_units.UNITS`, or the number of seconds in one unit. As
         a number, it is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
-        What a missing or repeated sample costs: its whole movement, or itself alone.
+        What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
 
     Raises
     ------

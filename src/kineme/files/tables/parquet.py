@@ -1,4 +1,4 @@
-"""Parquet: columns with types; what they mean is decided as for text."""
+"""Parquet tables; the roles of the columns are found as in text tables."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kineme.files.tables.dates import nanoseconds
 from kineme.files.tables.layout import Layout
 from kineme.files.tables.table import Table
 
-_ROWS = 2**18  # that are expanded together
+_ROWS = 2**18  # rows that are decompressed at a time
 
 
 def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """Read the columns that are needed. Dates and durations count in nanoseconds; what is missing is NaN.
+    """Read the columns that have a role. Dates and durations are nanoseconds; missing values are NaN.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         texts = {*roles.movement, roles.label}
         if nested := [k for k in needed if k in texts and pa.types.is_nested(file.schema_arrow.types[k])]:
             raise DataError(f"expected names in {heads[nested[0]]!r}, got {file.schema_arrow.types[nested[0]]}")
-        named = [heads[k] for k in needed if k in texts]  # kept as they are stored: few different ones, many rows
+        named = [heads[k] for k in needed if k in texts]  # kept as dictionaries: few different texts in many rows
         file = parquet.ParquetFile(io.BytesIO(data), read_dictionary=named)
         table = pa.Table.from_batches(_batches(file, [heads[k] for k in needed]))
         read = {k: (_texts if k in texts else _numbers)(table.column(heads[k]), heads[k]) for k in needed}
@@ -67,9 +67,9 @@ def _kind(pa: Any, kind: Any) -> str:
 
 
 def _batches(file: Any, needed: Sequence[str]) -> list[Any]:
-    """The columns some rows at a time, until they take more memory than the limit.
+    """The columns, some rows at a time; refused once they take more memory than the limit.
 
-    What the metadata say about the columns' pages is not asked for: pyarrow ends the process where they are damaged.
+    The metadata about the pages of columns are not used: pyarrow ends the process if they are damaged.
     """
     batches, n_bytes = [], 0
     for batch in file.iter_batches(_ROWS, columns=list(needed)):
@@ -88,7 +88,7 @@ def _refuse_twins(heads: Sequence[str], needed: Sequence[int]) -> None:
 
 
 def _texts(column: Any, head: str) -> Any:
-    """Names as texts, empty where there is none."""
+    """Names as texts, empty for missing ones."""
     import pyarrow as pa
 
     if not pa.types.is_dictionary(column.type):
@@ -97,7 +97,7 @@ def _texts(column: Any, head: str) -> Any:
     for chunk in column.chunks:
         known = np.array([*(_text(one, head) for one in chunk.dictionary.to_pylist()), ""], dtype=object)
         which = chunk.indices.cast(pa.int64()).fill_null(len(known) - 1).to_numpy()
-        if len(which) and not 0 <= which.min() <= which.max() < len(known):  # pyarrow does not look
+        if len(which) and not 0 <= which.min() <= which.max() < len(known):  # pyarrow does not check the indices
             raise DataError(f"expected names in {head!r}, got numbers of names that are not there: damaged bytes")
         parts.append(known[which])
     return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""A table of samples in memory, whatever file it came from."""
+"""A table of samples in memory, from any file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Table:
     ----------
     heads : tuple of str
     columns : sequence of ndarray of shape (rows,)
-        float64 where numbers are expected, NaN where none is; objects elsewhere.
+        Columns of numbers as float64, NaN for missing ones; other columns as objects.
     n_rows : int
     line_of : callable
         Row -> its line in the file, counted from 1, or None.

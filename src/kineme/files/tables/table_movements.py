@@ -1,4 +1,4 @@
-"""From a table to movements: wide, one movement; or long, many of them told apart by columns."""
+"""The movements of a table: one in a wide table, several in a long one, told apart by columns."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from kineme.validation import Array
 def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Found:
     """The movements of a table.
 
-    With columns that tell movements apart, rows of equal texts in them, and of equal label, are one movement, wherever
-    they stand. With a column of labels alone, a new movement begins where the label changes or time begins anew. Else
-    the table is one.
+    With columns that tell movements apart, all rows with equal texts in them, and with equal labels, are one movement,
+    in any order. With a column of labels alone, a new movement begins where the label changes or the time decreases.
+    Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
@@ -51,7 +51,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Fo
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
-    """Times [s], their unit in the file, and how it is known."""
+    """Times [s], their unit in the file, and the source of the unit."""
     if roles.time is None:
         return np.zeros(table.n_rows), layout.units or 1.0, "given"
     stamps, head = table.columns[roles.time], table.heads[roles.time]
@@ -84,9 +84,9 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
 
 
 def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:
-    """The texts that tell movements apart as one text each, all different; with the label only where it is needed.
+    """A unique text for each movement from the columns that tell them apart, with the label if it is needed.
 
-    Where every action counts its movements from 1, the number alone says nothing.
+    It is needed where the movements of every label are counted from 1.
     """
     for some in ([key[labeled:] for key in keys], keys):
         places = ["/".join(map(str, key)) for key in some]

@@ -1,4 +1,4 @@
-"""CSV and its relatives, at the speed of NumPy's C parser."""
+"""CSV and similar text tables, read by NumPy's C parser."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kineme.files.tables.layout import Layout
 from kineme.files.tables.table import Table
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
 
-_NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes that a cell of a number, a cell of text and a column take
+_NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 
 def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
@@ -33,7 +33,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     Raises
     ------
     DataError
-        No text, no samples, or no columns to be found.
+        Not text, no samples, or no columns of numbers.
     """
     encoding = _encoding(data)
     dialect = detect_dialect(_lines(data, encoding))
@@ -72,12 +72,12 @@ def _encoding(data: bytes) -> str:
     try:
         data if data.isascii() else data.decode("utf-8")
     except UnicodeDecodeError:
-        return "latin-1"  # degree signs and the like of older programs
+        return "latin-1"  # degree signs of older programs, for example
     return "utf-8-sig"
 
 
 def _lines(data: bytes, encoding: str) -> Iterator[str]:
-    """The lines; of encodings that `_encoding` has checked, or that any bytes are, without a look at each."""
+    """The lines, decoded; `_encoding` has checked that all bytes are valid."""
     if encoding != "utf-16":
         return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding))
     return _checked_lines(data, encoding)
@@ -107,7 +107,7 @@ def _check_memory(data: bytes, dialect: Dialect) -> None:
 
 
 def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any]) -> Any:
-    """All samples as a structured array, or None if a line is not as the others; as `read_slowly`, or not at all."""
+    """All samples as a structured array, or None if a line differs from the others: then `read_slowly` is needed."""
     has_text = any(dtype[name].kind == "O" for name in dtype.names or ())
     if dialect.decimal_comma and has_text:
         return None  # a comma in a name is not a decimal mark

@@ -1,4 +1,4 @@
-"""In which unit time stamps count: by the column's head, by their size, or as the caller says."""
+"""The unit of time stamps: from the column's head, from their size, or given by the caller."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from kineme.validation import Array
 
-#: The units, and how many of each there are in a second.
+#: Unit -> number per second.
 UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 _ALSO = {
@@ -20,19 +20,19 @@ _ALSO = {
 }
 _NAMES = {name: unit for unit, names in _ALSO.items() for name in (unit, *names.split())}
 
-#: Every name of a unit -> how many there are in a second.
+#: Every name of a unit -> number per second.
 PER_SECOND = {name: UNITS[unit] for name, unit in _NAMES.items()}
 
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+")  # camelCase, snake_case, [units] apart
 
 _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds since 1970
 
-#: The shortest step between samples [stamps] from which on they count in that unit. A movement sampled every 5 s or
-#: more slowly is not one; 5 ms to 1 s, 1 ms to 1 s and 1 ms and more are usual rates.
+#: Shortest step between samples, in units of the stamps, at which they are taken to be in that unit. Movements are not
+#: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
 _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
 
 
-#: How a unit is known where it is a guess.
+#: Sources of a unit that are guesses.
 GUESSED = ("since 1970", "by its steps", "assumed")
 
 
@@ -49,10 +49,10 @@ def unit_in_head(head: str) -> str | None:
 
 
 def unit_by_size(stamps: Array) -> tuple[str, str]:
-    """The unit in which stamps (total,) count, and how one knows.
+    """The unit of stamps (total,), and the source of that knowledge.
 
-    Stamps that read as a date between 2000 and 2100 count from 1970; else the median step decides, because people
-    and robots are sampled between once and some thousand times a second.
+    Stamps that are dates between 2000 and 2100 in some unit are seconds since 1970 in that unit. Otherwise the median
+    step decides, because people and robots are sampled between once and some thousand times a second.
     """
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
@@ -68,5 +68,5 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
-    """Stamps (total,) in a unit, in seconds; divided, so that 100 ms are 0.1 s to the last bit."""
+    """Stamps (total,) of a unit in seconds; by division, so that 100 ms are exactly the float 0.1."""
     return stamps / PER_SECOND[units] if isinstance(units, str) else stamps * float(units)

@@ -1,4 +1,4 @@
-"""The same table where a line is not as the others: the good stretches at full speed, the bad lines one by one."""
+"""Text tables with irregular lines: regular stretches are read by NumPy's parser, the other lines one by one."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.tables.dialect import Dialect, split
 
-_STRETCH = 1000  # lines that are tried together
+_STRETCH = 1000  # lines that are parsed at a time
 
 
 def read_slowly(
     samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
 ) -> tuple[Any, dict[int, str]]:
-    """All samples, NaN where a number is missing, and row -> what is wrong there."""
+    """All samples, NaN for missing numbers, and row -> what is wrong there."""
     stretches, faults, n_rows = [], {}, 0
     samples = iter(samples)
     while lines := [line for _, line in islice(samples, _STRETCH)]:
@@ -38,7 +38,7 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
         known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
         if known and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
-        if not quoted and not any(texts) and dialect.separator:  # the usual fault is an empty cell
+        if not quoted and not any(texts) and dialect.separator:  # an empty cell is the usual fault
             filled = [_filled(line, dialect.separator) for line in plain]
             if (read := try_rows(filled, dialect, dtype)) is not None:
                 return read, _empty_cells(lines, dialect)
@@ -52,7 +52,7 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
 
 
 def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> Any:
-    """Lines by NumPy's parser, texts without blanks around them; None if one is not as the others."""
+    """Lines parsed by NumPy, texts stripped; None if a line differs from the others."""
     try:
         rows = np.loadtxt(lines, dtype, comments=None, delimiter=dialect.separator, quotechar='"', ndmin=1)
     except ValueError:
@@ -64,7 +64,7 @@ def try_rows(lines: Iterable[str], dialect: Dialect, dtype: np.dtype[Any]) -> An
 
 
 def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
-    """Whether all quotes stand around whole cells of one line, which every parser understands in the same way."""
+    """Whether all quotes enclose whole cells within one line, which all parsers read in the same way."""
     if dialect.separator is None:
         return False
     marks = np.frombuffer(b"\n" + text + b"\n", np.uint8)
@@ -80,14 +80,14 @@ def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
 def _filled(line: str, separator: str) -> str:
     """A line with nan in its empty cells."""
     line, empty = line.rstrip("\r\n"), separator + separator
-    if empty in line:  # twice, as of three separators in a row the first replacement sees two
+    if empty in line:  # twice: of three separators in a row, the first replacement finds one empty cell
         line = line.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
     line = f"nan{line}" if line.startswith(separator) else line
     return f"{line}nan" if line.endswith(separator) else line
 
 
 def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
-    """Row -> which number is missing."""
+    """Row -> the column whose number is missing."""
     cells = ((k, [cell.strip() for cell in line.split(dialect.separator)]) for k, line in enumerate(lines))
     return {k: f"expected a number in {dialect.heads[row.index('')]!r}, got nothing" for k, row in cells if "" in row}
 
@@ -107,7 +107,7 @@ def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[An
 
 
 def _number(cell: str, comma: bool) -> float | None:
-    if "_" in cell:  # Python takes 1_000 for a number, no table does
+    if "_" in cell:  # Python parses 1_000 as a number; tables do not write that
         return None
     try:
         return float(cell.replace(",", ".") if comma else cell)

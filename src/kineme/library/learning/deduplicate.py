@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from dataclasses import dataclass, field
 
-from kineme.library.learning.serialize import Packed
+from kineme.library.learning.serialize import SerializedRows
 from kineme.library.storage.rows import among, as_text, listed
 from kineme.library.storage.source import Source
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -20,20 +20,20 @@ class Batch:
     labels: list[str | None]
     sources: list[Source | None]
     places: list[str | None]
-    packed: Packed | None = None
-    packed_rows: dict[int, int] = field(default_factory=dict)  # movement of the batch -> row of `packed`
+    serialized: SerializedRows | None = None
+    row_of: dict[int, int] = field(default_factory=dict)  # movement of the batch -> row of `serialized`
 
 
 @dataclass(frozen=True)
-class Known:
-    """What the library has of a batch."""
+class Stored:
+    """Which movements and sources of a batch the library holds already, and their keys."""
 
     by_digest: dict[int, int]
     sources: dict[tuple[str, str], int]  # (sha256, options) -> source
     by_place: dict[tuple[int, str], int]  # (source, place) -> movement
 
     def id_of(self, batch: Batch, i: int) -> int | None:
-        """The movement that is there for movement i of the batch."""
+        """The id of movement i of the batch; None if it is new."""
         found, where = self.by_digest.get(batch.digests[i]), self.place_of(batch, i)
         return self.by_place.get(where) if found is None and where is not None else found
 
@@ -44,14 +44,14 @@ class Known:
         return None if key is None or place is None else (key, as_text(place))
 
     def remember(self, batch: Batch, i: int, key: int) -> None:
-        """Movement i has been stored: the same once more is not new."""
+        """Movement i has been stored: a copy of it later in the batch is not new."""
         self.by_digest[batch.digests[i]] = key
         if (where := self.place_of(batch, i)) is not None:
             self.by_place[where] = key
 
 
-def look_up(connection: sqlite3.Connection, batch: Batch) -> Known:
-    """Search the library for all movements of a batch."""
+def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
+    """Find the movements of a batch that the library holds already."""
     hashes = {source.sha256 for source in batch.sources if source is not None}
     query = f"SELECT sha256, options, id FROM source WHERE {among('sha256')}"
     rows = connection.execute(query, {"keys": listed(hashes)}) if hashes else ()
@@ -59,7 +59,7 @@ def look_up(connection: sqlite3.Connection, batch: Batch) -> Known:
     query = f"SELECT source, place, id FROM movement WHERE removed IS NULL AND source IS NOT NULL AND {among('source')}"
     rows = connection.execute(query, {"keys": listed(sources.values())}) if sources else ()
     by_place = {(source, place): key for source, place, key in rows}
-    return Known(_by_digest(connection, batch.digests), sources, by_place)
+    return Stored(_by_digest(connection, batch.digests), sources, by_place)
 
 
 def _by_digest(connection: sqlite3.Connection, digests: list[int]) -> dict[int, int]:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.library.learning.commit import commit, describe
-from kineme.library.learning.deduplicate import Batch, look_up
+from kineme.library.learning.commit import commit, serialize_new
+from kineme.library.learning.deduplicate import Batch, find_stored
 from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.validation import describe as name_of
 
 Progress = Callable[[int, int], object]
@@ -77,7 +77,7 @@ def learn(
         done = 0
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
-            batch = _describe(store, _part(demos, start, stop), (names[rows], sources[rows], where[rows]))
+            batch = _prepared(store, _part(demos, start, stop), (names[rows], sources[rows], where[rows]))
             if pending is not None:  # one batch is written while the next one is described
                 reports.append(pending.result())
                 done = _tell(progress, done + len(reports[-1].ids), len(demos))
@@ -94,15 +94,15 @@ def learn(
     )
 
 
-def _describe(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any]) -> Batch:
-    """A batch ready to be stored; what is known already is not described again."""
+def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any]) -> Batch:
+    """A batch ready to be committed; only what is new is serialized."""
     labels, sources, places = given
     batch = Batch(demos, digests(demos, evenly_sampled(demos)), labels, sources, places)
     with store.reading() as connection:
-        known = look_up(connection, batch)
-    new = [i for i in range(len(demos)) if known.id_of(batch, i) is None]
+        stored = find_stored(connection, batch)
+    new = [i for i in range(len(demos)) if stored.id_of(batch, i) is None]
     if new:
-        describe(store, demos, batch, new)
+        serialize_new(store, demos, batch, new)
     return batch
 
 

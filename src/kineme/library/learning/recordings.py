@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kineme.files.join_files import Recordings
 from kineme.files.join_files import Source as File
-from kineme.library.learning.learn import LearnReport, Progress
+from kineme.library.learning.learn import LearnReport, Progress, learn
 from kineme.library.storage.source import Source
-
-if TYPE_CHECKING:
-    from kineme.library.library import ActionLibrary
+from kineme.library.storage.store import Store
 
 
 def learn_recordings(
-    library: ActionLibrary,
+    store: Store,
     recordings: Recordings,
     options: Mapping[str, Any] | None = None,
     labels: Sequence[str | None] | None = None,
@@ -28,7 +26,8 @@ def learn_recordings(
 
     Parameters
     ----------
-    library : ActionLibrary
+    store : Store
+        The library, ``ActionLibrary.store``.
     recordings : Recordings
     options : mapping, optional
         What the reader was told. The same file read in another way is another source.
@@ -42,7 +41,8 @@ def learn_recordings(
     now = datetime.now(UTC).isoformat(timespec="seconds")
     told = {name: value for name, value in (options or {}).items() if value is not None}
     files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
-    return library.learn(
+    return learn(
+        store,
         recordings.demonstrations,
         list(recordings.labels) if labels is None else labels,
         [files[one.path] for one in recordings.sources],

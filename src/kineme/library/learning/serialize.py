@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import view
+from kineme.comparison.describe import feature_rows
 from kineme.errors import TrajectoryError
 from kineme.library.storage.specification import Specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -26,7 +26,7 @@ _SMALL, _LARGE = 1e-30, 1e30  # between which single precision keeps its relativ
 
 
 @dataclass(frozen=True)
-class Packed:
+class SerializedRows:
     """Rows of a batch, without their keys."""
 
     raw: list[tuple[bytes, bytes, bytes | None]]  # start, positions, times
@@ -87,7 +87,7 @@ def _relative_times(demos: Demonstrations) -> Array:
     return demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
 
 
-def pack(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> Packed:
+def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Specification) -> SerializedRows:
     """The rows of a batch that has been checked.
 
     Raises
@@ -95,7 +95,7 @@ def pack(demos: Demonstrations, even: NDArray[np.bool_], specification: Specific
     TrajectoryError
         Weights so large that single precision cannot hold them.
     """
-    return Packed(_raw(demos, even), _primitives(demos, specification), _features(demos, specification))
+    return SerializedRows(_raw(demos, even), _primitives(demos, specification), _features(demos, specification))
 
 
 def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, bytes, bytes | None]]:
@@ -135,8 +135,8 @@ def _primitives(demos: Demonstrations, specification: Specification) -> list[tup
 
 
 def _features(demos: Demonstrations, specification: Specification) -> list[bytes]:
-    seen = view(demos, specification.representations, specification.normalization, specification.cutoff)
-    return _cut(np.concatenate(seen, axis=1, dtype=np.float32))
+    rows = feature_rows(demos, specification.comparison)
+    return _cut(np.concatenate(rows, axis=1, dtype=np.float32))
 
 
 def _cut(block: NDArray[np.floating]) -> list[bytes]:

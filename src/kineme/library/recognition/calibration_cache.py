@@ -6,24 +6,23 @@ import hashlib
 import io
 import zlib
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.sampling import evenly_spaced
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.stored import StoredReferences
+from kineme.library.recognition.members import Members
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
 from kineme.recognition.conformal import Calibration
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
-from kineme.recognition.two_stage_search import Stored
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.library.recognition.recognize import Members
 
 FILE = "calibration.cache"
 
@@ -35,18 +34,18 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 def sample_recognizer(store: Store, members: Members) -> Recognizer:
     """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
     chosen = evenly_spaced(len(members.ids), _SAMPLE)
-    demos = read.movements(store, members.ids[chosen], [None] * len(chosen))
+    demos = read.movements(store, members.ids[chosen])
     recognizer = store.specification.recognizer().set_params(classifier="nearest")
     return recognizer.fit(demos, members.labels[chosen])
 
 
-def calibrate(store: Store, members: Members, recognizer: Recognizer, stored: Stored) -> Calibration:
-    """The calibration of a recognizer on all members, taken from the cache if that is of the same ones."""
+def calibrate(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
+    """The calibration on all members, taken from the cache if that is of the same ones."""
     path, key = store.folder / FILE, _key(store, members)
     if path.is_file():  # a pipe would keep us waiting
         with suppress(*_SPOILED):
             return _unpacked(path.read_bytes(), key, len(members.names))
-    made = calibrate_sample(recognizer, stored)
+    made = calibrate_sample(similarity, stored)
     if not store.read_only:
         with suppress(OSError):  # no room, no permission: it is made again next time
             write_atomically(path, _packed(made, key))

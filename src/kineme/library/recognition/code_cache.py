@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.bounds import N_CODES, Code, encode, fit_bases
+from kineme.comparison.bounds import N_REDUCED, ReducedFeatures, fit_bases, reduce_features
 from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage import read
 from kineme.library.storage.store import Store
-from kineme.output.atomic import replaced
+from kineme.output.atomic import whole_file
 from kineme.validation import Array
 
 FILE = "codes.cache"
@@ -45,7 +45,7 @@ class Index:
 
     ids: Ids
     bases: tuple[Array, ...]
-    blocks: tuple[tuple[Code, ...], ...]
+    blocks: tuple[tuple[ReducedFeatures, ...], ...]
 
     def rows(self, ids: Ids) -> NDArray[np.intp]:
         """Where the codes of those movements are."""
@@ -73,10 +73,10 @@ def open_index(store: Store) -> Index:
 
 def grown(store: Store, index: Index, later: Ids) -> Index:
     """The index with the codes of movements that came later."""
-    new = encode(index.bases, _features(store, later), store.n_dims or 0)
+    new = reduce_features(index.bases, _features(store, later), store.n_dims or 0)
     if len(index.blocks) > 1:
         pairs = zip(index.blocks[1], new, strict=True)
-        new = tuple(Code(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
+        new = tuple(ReducedFeatures(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
     return Index(np.concatenate((index.ids, later)), index.bases, (index.blocks[0], new))
 
 
@@ -105,7 +105,7 @@ def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]
     d = store.n_dims or 0
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
     for one in store.specification.representations:
-        k = min(N_CODES, one.n_points)
+        k = min(N_REDUCED, one.n_points)
         parts += [(np.float64, (one.n_points, k)), (np.float32, (n, d * k)), (np.float32, (n,)), (np.float32, (n,))]
     return parts, sum(_size(*part) for part in parts)
 
@@ -122,7 +122,7 @@ def _view(store: Store, buffer: Bytes, n: int) -> Index:
         arrays.append(np.frombuffer(buffer, kind, count, place).reshape(shape))
         place += _size(kind, shape)
     ids, *rest = arrays
-    block = tuple(Code(*rest[r + 1 : r + 4]) for r in range(0, len(rest), 4))
+    block = tuple(ReducedFeatures(*rest[r + 1 : r + 4]) for r in range(0, len(rest), 4))
     return Index(ids, tuple(rest[::4]), (block,))
 
 
@@ -135,14 +135,14 @@ def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
         to[:] = basis
     for start in range(0, len(ids), _ROWS):
         rows = slice(start, start + _ROWS)
-        codes = encode(index.bases, _features(store, ids[rows]), store.n_dims or 0)
+        codes = reduce_features(index.bases, _features(store, ids[rows]), store.n_dims or 0)
         for block, code in zip(index.blocks[0], codes, strict=True):
             for into, values in zip(block, code, strict=True):
                 into[rows] = values
 
 
 def _write(store: Store, path: Path, ids: Ids) -> None:
-    with replaced(path) as beside:
+    with whole_file(path) as beside:
         size = _HEADER + _layout(store, len(ids))[1]
         with beside.open("wb") as file:
             os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)
@@ -189,5 +189,5 @@ def _makes_sense(index: Index) -> bool:
         bool((index.ids == np.arange(1, len(index.ids) + 1)).all())
         and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in index.bases)
         and all(bool(np.isfinite(part).all()) for code in index.blocks[0] for part in code)
-        and all(bool((code.squares >= 0).all() and (code.rests >= 0).all()) for code in index.blocks[0])
+        and all(bool((code.squares >= 0).all() and (code.residual_norms >= 0).all()) for code in index.blocks[0])
     )

@@ -8,65 +8,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError
+from kineme.comparison.stored import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
+from kineme.library.recognition.members import Members, members_of
 from kineme.library.storage import read
-from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
+from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.labels import label_array
-from kineme.recognition.answer import Answer, Neighbor, answers, is_one
+from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.recognizer import Recognizer
-from kineme.recognition.two_stage_search import Shortlist, Stored
-
-Ids = NDArray[np.int64]
+from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
-#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred kinds take 6 s and, with support vectors, 105 ms.
+#: answer 3 ms (two stages: 0.4 s, 5 ms); 2000 of a hundred classes take 6 s and, with support vectors, 105 ms.
 EXHAUSTIVE = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class Members:
-    """Movements that show a symbol, ordered by the symbol's name, then by id."""
-
-    ids: Ids  # (m,)
-    names: NDArray[Any]  # (C,), sorted
-    first: NDArray[np.intp]  # (C,)
-
-    @property
-    def labels(self) -> NDArray[Any]:
-        """The name of each one's symbol, (m,)."""
-        return np.repeat(self.names, np.diff(self.first, append=len(self.ids)))
-
-
 @dataclass(eq=False)
-class Serving:
-    """Answers of a library to movements, by the state of its last change.
-
-    What an answer needs beyond the database is made when first asked for, and again after a change.
-    """
+class LibraryRecognizer:
+    """What recognizes the movements that a library holds: made when first asked for, and again after a change."""
 
     store: Store
     exhaustive: int = EXHAUSTIVE
     _version: int | None = None
     _index: Index | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: Recognizer | Shortlist | None = None
+    _model: Recognizer | TwoStageSearch | None = None
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Any:
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
         demos = Demonstrations.of([X] if is_one(X) else X)
-        if isinstance(model, Shortlist):
+        if isinstance(model, TwoStageSearch):
             found = model.recognize(demos, error_rate)
         else:
-            found = answers(model, demos, error_rate)
+            found = model.recognize(demos, error_rate)
         found = self._named(found)
         return found[0] if is_one(X) else found
 
-    def model(self) -> Recognizer | Shortlist:
+    def model(self) -> Recognizer | TwoStageSearch:
         """The recognizer of the library as it is now: an ordinary one, or one in two stages."""
         version = self.store.version
         if self._model is None or version != self._version:
@@ -77,10 +58,10 @@ class Serving:
 
     def _small(self, members: Members) -> Recognizer:
         self._ids = members.ids  # `fit` orders by label, and keeps the order within
-        demos = read.movements(self.store, members.ids, [None] * len(members.ids))
+        demos = read.movements(self.store, members.ids)
         return self.store.specification.recognizer().fit(demos, members.labels)
 
-    def _large(self, members: Members) -> Shortlist:
+    def _large(self, members: Members) -> TwoStageSearch:
         self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
         self._ids = self._index.ids
         return two_stages(self.store, self._index, members)
@@ -97,56 +78,23 @@ class Serving:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
-def members_of(store: Store) -> Members:
-    """Movements that show a symbol.
-
-    Raises
-    ------
-    SpecificationError
-        There is none.
-    """
-    with store.reading() as connection:
-        query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
-        try:
-            pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
-        except (TypeError, ValueError, OverflowError) as error:
-            raise damage(
-                "movements and symbols as whole numbers in table member", f"something else ({error})"
-            ) from error
-        if not len(pairs):
-            raise SpecificationError(
-                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
-                "learn some with labels, or name a proposal"
-            )
-        keys, which = np.unique(pairs[:, 1], return_inverse=True)
-        query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
-        named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
-    if lost := set(keys.tolist()) - named.keys():
-        raise damaged("symbol", (min(lost),))
-    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
-    owner = place[which]
-    order = np.lexsort((pairs[:, 0], owner))
-    return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
-
-
-def two_stages(store: Store, index: Index, members: Members) -> Shortlist:
+def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
-    recognizer = sample_recognizer(store, members)
-    looks = store.specification.representations
-    kept = [looks.index(one) for one in recognizer.looks()]
+    comparison = sample_recognizer(store, members).comparison_
+    kept = [store.specification.representations.index(one) for one in comparison.representations]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
-    def views(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
+    def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
         blocks = np.split(read.features(store, index.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in kept)
 
-    stored = Stored(
+    stored = StoredReferences(
         tuple(index.bases[r] for r in kept),
         tuple(tuple(block[r] for r in kept) for block in index.blocks),
         index.rows(members.ids),
         members.first,
-        views,
-        lambda rows: read.movements(store, index.ids[rows], [None] * len(rows)),
+        features,
+        lambda rows: read.movements(store, index.ids[rows]),
     )
-    recognizer.calibration_ = calibrate(store, members, recognizer, stored)
-    return Shortlist(recognizer, members.names, stored)
+    calibration = calibrate(store, members, comparison.similarity, stored)
+    return TwoStageSearch(comparison, calibration, members.names, stored)

@@ -12,7 +12,7 @@ from kineme.library.storage.read import as_ids
 from kineme.library.storage.rows import Row, among, check_text, listed, next_key, parsed_column, select
 from kineme.library.storage.schema import COLUMNS, MAX_DOCUMENT
 from kineme.library.storage.store import NOW, Store
-from kineme.library.storage.symbols import HOW, check_name, join, make, state_of
+from kineme.library.storage.symbols import HOW, add_members, check_name, make, state_of
 from kineme.library.storage.versions import Change
 from kineme.validation import check_choice, check_number
 
@@ -92,7 +92,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> None:
             )
         for state in merged:
             members = _leave(change, "symbol = :key", {"key": state[1]})
-            _rejoin(change, members, key)
+            _move_members(change, members, key)
             change.retire("symbol_state", [state])
 
 
@@ -110,7 +110,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> None:
             strange = sorted(set(wanted.tolist()) - {row[1] for row in members})
             raise SpecificationError(f"expected movements of {name!r}, got {strange[0]}, which is not one of them")
         _forget_prototypes(change, members)
-        _rejoin(change, members, key)
+        _move_members(change, members, key)
 
 
 def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
@@ -122,7 +122,7 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
         key = make(change, check_name(who)) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])
-        join(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
+        add_members(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
 
 
 def release(store: Store, ids: Any) -> None:
@@ -156,9 +156,9 @@ def _forget_prototypes(change: Change, left: Sequence[Row]) -> None:
             _replace_state(change, state, prototype=None)
 
 
-def _rejoin(change: Change, members: Sequence[Row], key: int) -> None:
+def _move_members(change: Change, members: Sequence[Row], key: int) -> None:
     for how in HOW:
-        join(change, [(row[1], key) for row in members if row[3] == how], how)
+        add_members(change, [(row[1], key) for row in members if row[3] == how], how)
 
 
 def _find(connection: sqlite3.Connection, who: str) -> Row | None:

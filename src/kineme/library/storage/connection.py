@@ -17,14 +17,13 @@ from pathlib import Path
 from urllib.parse import quote
 
 from kineme.errors import DataError
-from kineme.library.storage.guard import defend
-from kineme.library.storage.over_forks import Connection, open_connection
-from kineme.library.storage.placing import LOGS, placed
+from kineme.library.storage.defense import defend
+from kineme.library.storage.folder import LOGS, new_database
+from kineme.library.storage.fork_safety import Connection, open_connection
 from kineme.library.storage.rows import Row, damage, insert, select
 from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIONS, PAGE_SIZE, SCHEMA_VERSION
 from kineme.library.storage.sqlite_errors import in_plain_words
 
-FILE = "library.sqlite"
 _WRITER_CACHE_KIB = 65536
 _LOG_BYTES = 1 << 26  # what the write-ahead log is cut back to
 _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
@@ -67,7 +66,7 @@ def create(path: Path, meta: dict[str, str]) -> None:
     with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may make it at the same time
         path.parent.mkdir(parents=True, exist_ok=True)
         check_alone(path)
-        with placed(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
+        with new_database(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
             connection.execute(f"PRAGMA page_size = {PAGE_SIZE}")
             connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             connection.execute("PRAGMA journal_mode = WAL")

@@ -14,9 +14,9 @@ from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array
 
@@ -93,8 +93,8 @@ def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
     return [dict(zip(COLUMNS["movement"], rows[i], strict=True)) for i in order.tolist()]
 
 
-def movements(store: Store, ids: Ids, labels: Sequence[str | None]) -> Demonstrations:
-    """The recordings, in the order of `ids`."""
+def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Demonstrations:
+    """The recordings, in the order of `ids`; without labels unless every one has a label."""
     wanted, order = _sorted(ids)
     about = records(store, wanted)
     d, lengths = store.n_dims or 0, np.array([one["n_samples"] for one in about])
@@ -165,20 +165,20 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
     found = np.empty((len(wanted), width), dtype=np.float32)
     for rows in _chunks(store, "feature", "movement", wanted):
         block = found[done : done + len(rows)]
-        block[:] = _joined("feature", rows, 1, np.float32, width)
+        block[:] = _concatenated("feature", rows, 1, np.float32, width)
         _check_finite("feature", rows, block)
         done += len(rows)
     return found if np.array_equal(wanted, ids) else found[order]
 
 
-def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitives:
-    """The primitives, in the order of `ids`."""
+def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Primitives:
+    """The primitives, in the order of `ids`; without labels unless every one has a label."""
     wanted, order = _sorted(ids)
     dmp, d = store.specification.dmp, store.n_dims or 0
     about = records(store, ids)
     rows = [row for chunk in _chunks(store, "primitive", "movement", wanted) for row in chunk]
-    boundary = _joined("primitive", rows, 1, np.float64, 4 * d)
-    weights = _joined("primitive", rows, 2, np.float32, d * dmp.n_basis)
+    boundary = _concatenated("primitive", rows, 1, np.float64, 4 * d)
+    weights = _concatenated("primitive", rows, 2, np.float32, d * dmp.n_basis)
     for block in (boundary, weights):
         _check_finite("primitive", rows, block)
     boundary, weights = boundary.reshape(-1, 4, d)[order], weights.reshape(-1, d, dmp.n_basis)[order]
@@ -195,7 +195,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None]) -> Primitiv
     )
 
 
-def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
+def _concatenated(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
     """The bytes of a column, (rows, width)."""
     size = np.dtype(kind).itemsize * width
     for row in rows:
@@ -204,8 +204,8 @@ def _joined(table: str, rows: Sequence[Row], column: int, kind: Any, width: int)
     return np.frombuffer(b"".join(row[column] for row in rows), kind).reshape(-1, width)
 
 
-def _labels(labels: Sequence[str | None]) -> NDArray[Any] | None:
-    return label_array(labels) if all(label is not None for label in labels) else None
+def _labels(labels: Sequence[str | None] | None) -> NDArray[Any] | None:
+    return None if labels is None or any(label is None for label in labels) else label_array(labels)
 
 
 def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:

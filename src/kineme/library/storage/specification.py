@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.library.storage.rows import parsed
 from kineme.movements.preparation.smooth import Smooth
@@ -66,6 +67,11 @@ class Specification:
         """What is taken out of place and size."""
         return Normalization(self.translation, self.scale)
 
+    @property
+    def comparison(self) -> ComparisonSpecification:
+        """How movements are described and compared."""
+        return ComparisonSpecification(self.representations, self.normalization, self.cutoff, self.max_angle, self.mean)
+
     def widths(self, n_dims: int) -> tuple[int, ...]:
         """Numbers per movement in the rows of each representation."""
         return tuple(n_dims * one.n_points for one in self.representations)
@@ -111,7 +117,7 @@ class Specification:
         self._check_choices()
 
     def _check_choices(self) -> None:
-        from kineme.comparison.similarity import LOG_MEANS
+        from kineme.comparison.averages import LOG_MEANS
         from kineme.recognition.classifiers import CLASSIFIERS
 
         check_choice("mean", self.mean, list(LOG_MEANS))

@@ -14,15 +14,14 @@ from threading import Lock, RLock
 from typing import Any
 
 from kineme.errors import DataError, SpecificationError
-from kineme.library.storage import over_forks
+from kineme.library.storage import fork_safety
 from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
-from kineme.library.storage.guard import size_of
-from kineme.library.storage.readers import Readers
-from kineme.library.storage.rows import insert, select
+from kineme.library.storage.defense import size_of
+from kineme.library.storage.rows import insert, parsed_column, select
 from kineme.library.storage.schema import COUNTED, LARGEST_ID, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.library.storage.sqlite_errors import in_plain_words
-from kineme.library.storage.versions import Change, Moment, moment_at
+from kineme.library.storage.versions import Change, Moment, Version, moment_at
 
 NOW = LARGEST_ID  # later than every version: what is there now
 
@@ -57,13 +56,15 @@ class Store:
         self.wait = wait
         self._turn = RLock()
         # Threads share the connection to read from, one at a time: Python may hand a statement that it keeps to two
-        # threads that ask the same at the same moment, and each gets rows of the other.
+        # threads that ask the same at the same moment, and each gets rows of the other. Closing takes a turn
+        # too: SQLite frees what a statement needs, and the process would end.
         self._look = RLock()
+        self._n_reading = 0  # how many times over the thread whose turn it is to read does so
         self._writer: sqlite3.Connection | None = None
-        self._waking, self._asleep, self._readers = Lock(), False, Readers(path)
+        self._waking, self._asleep, self._closed = Lock(), False, False
         if not self.path.exists():
             self._create(specification)
-        with in_plain_words(self.path, wait), over_forks.awake():
+        with in_plain_words(self.path, wait), fork_safety.awake():
             self._reader = self._connect()
             try:
                 self._check_kind()
@@ -74,15 +75,15 @@ class Store:
             except BaseException:
                 self._reader.close()
                 raise
-            over_forks.register(self)
+            fork_safety.register(self)
 
     def _connect(self) -> sqlite3.Connection:
-        over_forks.refuse_if_lost(self.path)
+        fork_safety.refuse_if_lost(self.path)
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
 
     def sleep(self) -> None:
         """Close the connections for a fork; the next one to read or write opens them again."""
-        if not self._readers.closed and not self._asleep:
+        if not self._closed and not self._asleep:
             self._asleep = True
             for connection in (self._writer, self._reader):
                 if connection is not None:
@@ -90,13 +91,12 @@ class Store:
             self._writer = None
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """The connections that a fork found open; see `over_forks`."""
-        if self._readers.closed or self._asleep:
+        """The connections that a fork found open; see `fork_safety`."""
+        if self._closed or self._asleep:
             return []
         return [one for one in (self._writer, self._reader) if one is not None]
 
     def _wake(self) -> None:
-        over_forks.refuse_if_lost(self.path)
         with self._waking:
             if self._asleep:
                 self._check_there("read")
@@ -156,11 +156,28 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """The connection to read from. It sees committed versions only, also while this process writes."""
-        with over_forks.awake(), self._readers.one_more(), in_plain_words(self.path, self.wait):
-            self._wake()
+        """The connection to read from. It sees committed versions only, also while this process writes.
+
+        A thread that reads may begin to read again; no other one reads meanwhile.
+
+        Raises
+        ------
+        DataError
+            The library was closed, or is not to be used in this process.
+        """
+        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+            fork_safety.refuse_if_lost(
+                self.path
+            )  # first: in a child, the turn may be that of a thread that is not there
             with self._look:
-                yield self._reader
+                if not self._n_reading:
+                    self._check_open()
+                    self._wake()
+                self._n_reading += 1
+                try:
+                    yield self._reader
+                finally:
+                    self._n_reading -= 1
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
         """The version that is shown, which stays the same while others are added."""
@@ -176,10 +193,13 @@ class Store:
             Opened for reading only, the file vanished, the disk is full, another process writes for too long.
         """
         detail = {} if detail is None else detail
-        with over_forks.awake(), in_plain_words(self.path, self.wait):
-            self._wake()  # first: in a child, the turn may be that of a thread that is not there
+        with fork_safety.awake(), in_plain_words(self.path, self.wait):
+            fork_safety.refuse_if_lost(
+                self.path
+            )  # first: in a child, the turn may be that of a thread that is not there
             with self._turn:
-                self._readers.check_open()
+                self._check_open()
+                self._wake()
                 self.check_writable()
                 if self._writer is None:
                     self._writer = connect(self.path, "rw", self.wait).rest()
@@ -204,6 +224,10 @@ class Store:
             )
         self._check_there("written")
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise DataError(f"expected an open library, got {self.path}, which has been closed; open it again")
+
     def _check_there(self, done: str) -> None:
         try:
             there = self.path.stat().st_ino == self._file
@@ -221,9 +245,19 @@ class Store:
 
     def close(self) -> None:
         """Close both connections, once no other thread uses them; the last one to close leaves a single file."""
-        with over_forks.awake():
-            self._readers.close()  # before its turn: who reads may want to write
-        with over_forks.awake(), self._turn:
-            for connection in (self._writer, self._reader):
-                if connection is not None:
-                    connection.close()
+        if fork_safety.is_lost(self.path):
+            return
+        with fork_safety.awake():
+            self._closed = True  # nobody begins any more
+            with self._look:
+                self._reader.close()
+            with self._turn:  # not within the other: who reads may want to write
+                if self._writer is not None:
+                    self._writer.close()
+
+
+def history(store: Store) -> tuple[Version, ...]:
+    """Every change up to the version shown, the first one first."""
+    with store.reading() as connection:
+        rows = select(connection, "version", "id <= :v", {"v": store.as_of})
+    return tuple(Version(row[0], row[1], row[2], parsed_column("version", row, "detail", dict)) for row in rows)

@@ -38,7 +38,7 @@ HOW = ("label", "anchored", "recognized")
 
 @dataclass(frozen=True, eq=False)
 class Symbol:
-    """A name for movements of one kind.
+    """A name for movements of one class.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
     return key
 
 
-def join(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
+def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
     """Movements, which show no symbol, become members: pairs (movement, key of the symbol)."""
     first = next_key(change.connection, "member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]

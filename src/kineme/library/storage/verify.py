@@ -8,11 +8,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-from kineme.library.storage.checks import ALL_GOOD, CHECKS
+from kineme.library.storage.column_checks import ALL_GOOD, CHECKS
 from kineme.library.storage.connection import connect
-from kineme.library.storage.contents import CONTENTS, samples
-from kineme.library.storage.guard import limited
-from kineme.library.storage.lives import lives
+from kineme.library.storage.content_checks import CONTENTS, samples
+from kineme.library.storage.defense import limited
+from kineme.library.storage.lifetimes import lives
 from kineme.library.storage.rows import Row, row_name, sealed
 from kineme.library.storage.schema import BLOBS, COLUMNS, META
 from kineme.library.storage.store import Store

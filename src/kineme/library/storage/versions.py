@@ -1,13 +1,36 @@
-"""One version of a library: what is alive at it, and the transaction that makes the next one."""
+"""Versions of a library: what each changed, what is alive at it, and the transaction that makes the next one."""
 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from kineme.library.storage.rows import Row, damaged, insert, retire, select
 from kineme.library.storage.schema import COUNTED
+
+
+@dataclass(frozen=True)
+class Version:
+    """One change.
+
+    Attributes
+    ----------
+    id : int
+        Its number, from 1.
+    at : str
+        When it was committed, ISO 8601, UTC.
+    action : str
+        "learn", "rename", ...
+    detail : mapping
+        What there is to say about it.
+    """
+
+    id: int
+    at: str
+    action: str
+    detail: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

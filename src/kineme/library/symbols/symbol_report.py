@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from kineme.library.storage.read import records
+from kineme.library.storage.read import movements, records
 from kineme.library.storage.rows import among, listed, select
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
-
-if TYPE_CHECKING:
-    from kineme.library.library import ActionLibrary
+from kineme.library.storage.symbols import symbol
 
 
-def sheet(library: ActionLibrary, who: str) -> dict[str, Any]:
+def symbol_report(store: Store, who: str) -> dict[str, Any]:
     """A symbol as plain data.
 
     Returns
@@ -22,13 +20,12 @@ def sheet(library: ActionLibrary, who: str) -> dict[str, Any]:
         ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
         place in the file, n_samples, duration [s], start and goal.
     """
-    symbol = library[who]
+    shown = symbol(store, who)
     members = []
-    if len(symbol):
-        about = records(library.store, symbol.members)
-        files = _files(library.store, sorted({one["source"] for one in about if one["source"] is not None}))
-        movements = library.movements(ids=symbol.members)
-        for one, movement in zip(about, movements, strict=True):
+    if len(shown):
+        about = records(store, shown.members)
+        files = _files(store, sorted({one["source"] for one in about if one["source"] is not None}))
+        for one, movement in zip(about, movements(store, shown.members), strict=True):
             members.append(
                 {
                     "id": one["id"],
@@ -42,11 +39,11 @@ def sheet(library: ActionLibrary, who: str) -> dict[str, Any]:
                 }
             )
     return {
-        "id": symbol.id,
-        "name": symbol.name,
-        "description": symbol.description,
-        "prototype": symbol.prototype,
-        "parents": list(symbol.parents),
+        "id": shown.id,
+        "name": shown.name,
+        "description": shown.description,
+        "prototype": shown.prototype,
+        "parents": list(shown.parents),
         "members": members,
     }
 

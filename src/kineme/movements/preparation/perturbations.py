@@ -10,8 +10,8 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_phase
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Protocol
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements_like import MovementsLike
 
 
 class Step(Protocol):
@@ -34,7 +35,7 @@ def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     return found
 
 
-def preprocess(movements: Any, steps: Iterable[Step]) -> Demonstrations:
+def preprocess(movements: MovementsLike, steps: Iterable[Step]) -> Demonstrations:
     """Apply steps in order to movements; they are appended to the ``steps`` of the result."""
     demonstrations = Demonstrations.of(movements)
     for step in check_steps(steps):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kineme.movements.preparation.spline import spline_matrix, spline_rows
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import MIN_SAMPLES, Array, check_count
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kineme.movements.preparation.smoothing_spline import even_rows_of_spline, smoothing_spline
 from kineme.movements.preparation.spline import fits_lanes
-from kineme.movements.trajectories.collect import Movements
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, check_number

@@ -14,18 +14,21 @@ from kineme.movements.segmentation.onset import onset_rows
 from kineme.movements.segmentation.segmentation import Segmentation
 from kineme.movements.segmentation.table import SEGMENTERS, Segmenter
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import MIN_SAMPLES, check_choice, check_switch
 
 
-def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any) -> Segmentation:
+def segment(
+    recording: MovementsLike, by: str | Segmenter = "rest", *, cover: bool = False, **parameters: Any
+) -> Segmentation:
     """Cut a continuous recording into movements.
 
     Parameters
     ----------
-    recording : Trajectory or array_like of shape (T, d)
-        An array is taken as evenly sampled over one second; pass a `Trajectory` with its time stamps, so that
-        parameters in seconds mean something.
+    recording : MovementsLike
+        One movement, in any way that `Demonstrations.of` takes it. An array (T, d) is taken as evenly sampled over one
+        second; pass a `Trajectory` with its time stamps, so that parameters in seconds mean something.
     by : {"rest", "speed", "change-points"} or Segmenter, default "rest"
         Where to cut: at rests, at minima of speed, or at change points of the velocity (needs
         ``pip install kineme[segmentation]``). See `Rest`, `SpeedMinima` and `ChangePoints`.
@@ -37,7 +40,8 @@ def segment(recording: Any, by: str | Segmenter = "rest", *, cover: bool = False
     Returns
     -------
     Segmentation
-        ``cuts`` (n, 2) in seconds, ``trajectories``, the method and the rows.
+        ``cuts`` (n, 2) in seconds, the movements as ``demonstrations``, the method and the rows. It is taken wherever
+        movements are expected.
 
     Raises
     ------
@@ -83,12 +87,16 @@ def as_segmenter(by: str | Segmenter, parameters: dict[str, Any]) -> Segmenter:
     return chosen
 
 
-def as_recording(recording: Any) -> Trajectory:
-    """One recording as a `Trajectory`."""
+def as_recording(recording: MovementsLike) -> Trajectory:
+    """One recording as a `Trajectory`.
+
+    Raises
+    ------
+    TrajectoryError
+        Several movements, or what `Demonstrations.of` refuses.
+    """
     if isinstance(recording, Trajectory):
         return recording
-    if isinstance(recording, np.ndarray) and recording.ndim <= 2 and recording.dtype != object:
-        return Demonstrations.from_arrays([recording])[0]
     several = Demonstrations.of(recording)
     if len(several) != 1:
         raise TrajectoryError(f"expected one recording, got {len(several)} movements; pass them one by one")

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.trajectories.close_stamps import merge_close, spread_close
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import (
     Array,
@@ -24,94 +22,6 @@ from kineme.validation import (
     describe,
     refuse_lossy,
 )
-
-Names = tuple[str | None, ...] | None
-
-_EVEN = 1e-9  # stamps off an even grid by less than this share of a step count as even
-_SAMPLES_AT_ONCE = 65_536  # stamps checked at a time: uneven ones are found early, and temporaries stay in the cache
-
-
-@dataclass(frozen=True, eq=False)
-class Movements:
-    """The block behind `Demonstrations`: validated, contiguous, read-only.
-
-    `times` is None for movements evenly sampled over their `durations`; `stamps` writes them out.
-    """
-
-    positions: Array  # (total, d)
-    offsets: NDArray[np.intp]  # (n + 1,)
-    durations: Array  # (n,)
-    times: Array | None = None  # (total,)
-    labels: NDArray[Any] | None = None  # (n,)
-    names: Names = None
-
-    def __post_init__(self) -> None:
-        for field in ("positions", "offsets", "durations", "times", "labels"):
-            if (value := getattr(self, field)) is not None:
-                view = value.view()
-                view.setflags(write=False)
-                object.__setattr__(self, field, view)
-
-    @cached_property
-    def stamps(self) -> Array:
-        """Time stamps of all samples, (total,)."""
-        if self.times is not None:
-            return self.times
-        lengths = np.diff(self.offsets)
-        step = np.repeat(self.durations / (lengths - 1), lengths)
-        stamps: Array = step * (np.arange(len(self.positions)) - np.repeat(self.offsets[:-1], lengths))
-        stamps.setflags(write=False)
-        return stamps
-
-    @cached_property
-    def even_length(self) -> int | None:
-        """Samples per movement when all have equally many, evenly spaced; else None."""
-        lengths = np.diff(self.offsets)
-        if (lengths != lengths[0]).any():
-            return None
-        n_samples = int(lengths[0])
-        if self.times is None:
-            return n_samples
-        n_rows = max(1, _SAMPLES_AT_ONCE // n_samples)
-        tiles = (slice(start, start + n_rows) for start in range(0, len(lengths), n_rows))
-        return n_samples if all(map(self._is_even, tiles)) else None
-
-    def _is_even(self, some: slice) -> bool:
-        """Whether the stamps of some movements, all of one length, are evenly spaced."""
-        assert self.times is not None
-        t = self.times.reshape(len(self.durations), -1)[some]
-        step = self.durations[some, None] / (t.shape[1] - 1)
-        deviation = np.abs(t - t[:, :1] - step * np.arange(t.shape[1]))
-        return bool((deviation <= _EVEN * step + 2 * np.spacing(np.abs(t[:, -1:]))).all())
-
-    @cached_property
-    def separated(self) -> Movements:
-        """The same movements with close samples merged, for interpolation; usually there are none."""
-        merged = None if self.times is None else merge_close(self.times, self.positions, self.offsets)
-        if merged is None:
-            return self
-        return replace(self, times=merged[0], positions=merged[1], offsets=merged[2])
-
-    @cached_property
-    def spread(self) -> Array:
-        """Time stamps (total,), none so close to the next that a smoothing spline loses its digits."""
-        return self.stamps if self.times is None else spread_close(self.times, self.offsets)
-
-    def take(self, chosen: NDArray[np.intp]) -> Movements:
-        """The chosen movements, in that order, copied into a new block."""
-        if len(chosen) == 0:
-            raise TrajectoryError("expected at least one movement, got an empty selection")
-        lengths = np.diff(self.offsets)[chosen]
-        offsets = np.concatenate(([0], np.cumsum(lengths)))
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[:-1][chosen] - offsets[:-1], lengths)
-        return Movements(
-            self.positions[rows],
-            offsets,
-            self.durations[chosen],
-            None if self.times is None else self.times[rows],
-            None if self.labels is None else self.labels[chosen],
-            None if self.names is None else tuple(self.names[i] for i in chosen),
-        )
 
 
 def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
@@ -155,6 +65,8 @@ def collect_arrays(
     n = len(offsets) - 1
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
+    if times is None:
+        _refuse_transposed(offsets, positions.shape[1], names)
     check_finite(positions, offsets, names, "positions")
     check_extents(positions, offsets, names)
     stamps = None if times is None else _join_times(times, offsets, names)
@@ -170,20 +82,34 @@ def collect_arrays(
 
 
 def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp]]:
-    if block.ndim != 3:
+    if block.ndim not in (1, 2, 3):
         raise TrajectoryError(
-            f"expected an array of shape (n, T, d), movements by samples by dimensions, got shape {block.shape}; "
-            "pass one movement as [array]"
+            f"expected an array of shape (n, T, d), movements by samples by dimensions, or one movement of shape "
+            f"(T, d), got shape {block.shape}"
         )
+    is_many = block.ndim == 3
+    block = block if is_many else block[None] if block.ndim == 2 else block[None, :, None]
     if len(block) == 0:
         raise TrajectoryError("expected at least one movement, got none")
     if block.dtype.kind not in "biuf":
         raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
     refuse_lossy(block, "the block")
-    as_positions(block[0], "every movement of the block")
+    as_positions(block[0], "every movement of the block" if is_many else "the movement")
     n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
+
+
+def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[str | None] | None) -> None:
+    """Refuse a movement without time stamps that has more dimensions than samples; stamps say which axis is time."""
+    lengths = np.diff(offsets)
+    if (wide := lengths < n_dims).any():
+        i = int(np.argmax(wide))
+        raise TrajectoryError(
+            f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
+            f"({lengths[i]}, {n_dims}), more dimensions than samples; transpose the array, or, if it is right, pass "
+            "its time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
+        )
 
 
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:

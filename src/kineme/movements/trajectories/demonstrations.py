@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.trajectories.collect import Movements, collect_arrays, collect_trajectories
+from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
+from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.validation import Array
+from kineme.validation import Array, describe
+
+_ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
 
 class Demonstrations(Sequence[Trajectory]):
@@ -51,7 +56,7 @@ class Demonstrations(Sequence[Trajectory]):
     @classmethod
     def from_arrays(
         cls,
-        arrays: Sequence[ArrayLike] | Array,
+        arrays: ArrayLike | Sequence[ArrayLike],
         labels: ArrayLike | None = None,
         times: Sequence[ArrayLike] | Array | None = None,
         names: Sequence[str | None] | None = None,
@@ -62,7 +67,7 @@ class Demonstrations(Sequence[Trajectory]):
         Parameters
         ----------
         arrays : sequence of n arrays (T_i, d), or one array (n, T, d)
-            Positions.
+            Positions. One array (T, d) or (T,) is one movement.
         labels : array_like of shape (n,), optional
             The action that each movement shows.
         times : sequence of n arrays (T_i,), or one array (T,) shared by all, optional
@@ -75,19 +80,39 @@ class Demonstrations(Sequence[Trajectory]):
         return cls.of_movements(collect_arrays(arrays, labels, times, names, copy))
 
     @classmethod
-    def of(cls, movements: Any) -> Demonstrations:
+    def of(cls, movements: MovementsLike) -> Demonstrations:
         """Whatever public functions accept as movements, as `Demonstrations`.
 
-        `Demonstrations` themselves, one `Trajectory`, a sequence of them, a sequence of (T_i, d) arrays
-        or one (n, T, d) array; the last is used without a copy.
+        Parameters
+        ----------
+        movements : MovementsLike
+            - `Demonstrations`, or what has them as its ``demonstrations``: what `read_recordings` and `segment` return,
+              and rollouts.
+            - One `Trajectory`, or one array of shape (T, d) or (T,): one movement.
+            - One array of shape (n, T, d): n movements, used without a copy.
+            - A list of `Trajectory`, of (T_i, d) arrays, or of anything above. A list is always many movements, also
+              one of plain numbers in lists.
+
+            Movements without time stamps are taken as evenly sampled over one second.
+
+        Raises
+        ------
+        TrajectoryError
+            What is none of these; no movement at all; movements of different dimensions; an array without time stamps
+            of more dimensions than samples, which is taken for a transposed one.
         """
         if isinstance(movements, Demonstrations):
             return movements
         if isinstance(movements, Trajectory):
             return cls([movements])
-        if isinstance(movements, Sequence) and len(movements) and isinstance(movements[0], Trajectory):
-            return cls(movements)
-        return cls.from_arrays(movements, copy=False)
+        if isinstance(movements, np.ndarray):
+            return cls.from_arrays(movements, copy=False)
+        held = getattr(movements, "demonstrations", None)
+        if held is not None:
+            return cls.of(held)
+        if isinstance(movements, Sequence) and (held := _held_by_each(movements)) is not None:
+            return cls(held)
+        return cls.from_arrays(cast("ArrayLike", movements), copy=False)
 
     @classmethod
     def of_movements(cls, movements: Movements, steps: tuple[Any, ...] = ()) -> Demonstrations:
@@ -172,6 +197,16 @@ class Demonstrations(Sequence[Trajectory]):
         return f"Demonstrations({len(self)} movements, {self.n_dims} dims, {samples} samples each{n_labels})"
 
 
+def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
+    """The movements of a list of trajectories and of what holds them, one by one; None of a list of arrays."""
+    if set(map(type, several)) <= _ARRAYS:
+        return None
+    held = [one if isinstance(one, Demonstrations) else getattr(one, "demonstrations", None) for one in several]
+    if not any(some is not None or isinstance(one, Trajectory) for one, some in zip(several, held, strict=True)):
+        return None
+    return [each for one, some in zip(several, held, strict=True) for each in ([one] if some is None else some)]
+
+
 def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
     """The labels, or an error that says how to give them."""
     if demonstrations.labels is None:
@@ -180,3 +215,27 @@ def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
             "pass labels= to Demonstrations.from_arrays or label= to each Trajectory"
         )
     return demonstrations.labels
+
+
+def check_labels(demos: Demonstrations, y: Any) -> NDArray[Any]:
+    """Labels `y`, or those of the demonstrations: one per movement, texts or numbers, none of them empty.
+
+    Raises
+    ------
+    TrajectoryError
+        No labels, another number of them, an empty or missing one; the message names the movement.
+    """
+    labels = require_labels(demos) if y is None else label_array(y, len(demos), demos.names)
+    for i, label in enumerate(labels.tolist()):
+        if isinstance(label, (list, tuple, dict)) or (isinstance(label, str) and not label.strip()):
+            raise TrajectoryError(
+                f"{describe(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
+                "name the action, or leave the movement out"
+            )
+    try:
+        np.sort(labels)
+    except TypeError as error:
+        raise TrajectoryError(
+            f"expected labels that are texts or numbers, as classes have an order, got {error}"
+        ) from None
+    return labels

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.validation import describe
 
+#: What names the action of a movement.
+Label = str | int | float
+
 _NUMBERS = (Number, np.bool_)
 _ADVICE = "name the action, or leave the movement out"
 
@@ -39,8 +42,11 @@ def label_array(labels: Any, n: int | None = None, names: Sequence[str | None] |
     """
     array = labels if isinstance(labels, np.ndarray) else _as_objects(labels)
     if array.ndim != 1 or (n is not None and len(array) != n):
-        many = f"each of the {n} movements" if n is not None else "each movement"
-        raise TrajectoryError(f"expected one label for {many}, got labels of shape {array.shape}")
+        many = "each movement" if n is None else "the one movement" if n == 1 else f"each of the {n} movements"
+        raise TrajectoryError(
+            f"expected one label for {many}, got labels of shape {array.shape}"
+            + ("; one array (T, d) is one movement: pass many as a list or as one array (n, T, d)" if n == 1 else "")
+        )
     known = array.tolist() if array.dtype.kind in "USTOfc" else []  # other dtypes have no missing values
     kinds = set(map(type, known))
     if kinds == {str}:

@@ -1,4 +1,4 @@
-"""Where the original formulation divides by g - x0: refuse zero, warn when it is close."""
+"""The divisions by g - x0 of the original formulation: refuse zero, warn if it is close to zero."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
 from kineme.primitives.discrete.formulations import ZERO
 from kineme.validation import Array, describe
 
-_NEAR = 1e-2  # of it: the division magnifies noise a hundredfold
+_NEAR = 1e-2  # of the extent: the division magnifies noise a hundredfold
 
 
 def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | None] | None, feature: str) -> Array:
-    """Return `amplitudes` g - x0 (n, d) if all can be divided by.
+    """Return `amplitudes` g - x0 (n, d) if none is zero.
 
     Raises
     ------

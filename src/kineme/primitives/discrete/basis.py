@@ -12,7 +12,7 @@ from kineme.primitives.discrete.phase import ExponentialPhase
 from kineme.validation import Array, check_choice, check_count, check_number
 
 GATINGS = ("none", "phase")
-MOST_BASIS = 2_000  # the response to N functions is made of 32 N^2 numbers
+MOST_BASIS = 2_000  # the response to N functions takes 32 N^2 numbers
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class GaussianBasis:
     def gate(self, u: Array) -> Array:
         """The factor that f carries besides the basis, shape (T,): s if gated, else 1.
 
-        Eq. (2) says nothing of u > 1, phases that no demonstration has seen; there the last weight would hold the
-        movement off its goal for ever. So past the end an ungated f fades with the phase, as ``s / s(tau)``.
+        Eq. (2) leaves f for u > 1 open, past the end of the demonstration; there the last weight would keep the
+        movement away from its goal forever. So past the end an ungated f decays with the phase, as ``s / s(tau)``.
         """
         s = self.phase(u)
         return s if self.gating == "phase" else np.minimum(1.0, s / self.phase.end)

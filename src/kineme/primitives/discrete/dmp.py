@@ -1,4 +1,4 @@
-"""The specification of a DMP: every choice that a set of weights depends on."""
+"""The specification of a DMP: every parameter that the weights depend on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kineme.validation import check_choice, check_count
 if TYPE_CHECKING:
     from kineme.primitives.discrete.primitives import Primitives
 
-MOST_POINTS = 10_000  # a fit with T points is made of matrices of T^2 numbers
+MOST_POINTS = 10_000  # a fit with T points needs matrices of T^2 numbers
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Learning a batch of movements: resample, subtract the start, multiply."""
+"""Learn a batch of movements: resample, subtract the start, multiply by the encode matrix."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kineme.primitives.discrete.primitives import Primitives
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 
-_TILE_SAMPLES = 200_000  # in one tile: larger ones leave the cache, of smaller ones threads wait for each other
+_TILE_SAMPLES = 200_000  # in one tile: larger ones do not fit the cache, with smaller ones threads wait for each other
 
 
 def encode(dmp: DMP, movements: Any) -> Primitives:
@@ -29,9 +29,9 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
     velocities, extents = np.empty((n, n_dims)), np.empty((n, n_dims))
 
     def learn_tile(start: int, stop: int) -> None:
-        # Even movements are multiplied as they are: their operator contains the resampling.
+        # Evenly sampled movements are multiplied directly: their matrix contains the resampling.
         rows = even_rows(demos, start, stop) if demos.even_length else relative_rows(demos, start, stop, n_samples)
-        flat = rows.reshape(-1, n_samples)  # a stack of matrices would become as many small products
+        flat = rows.reshape(-1, n_samples)  # one product; a stack of matrices would be as many small products
         np.matmul(flat, operator.weights, out=weights[start:stop].reshape(len(flat), -1))
         np.matmul(flat, operator.velocity, out=velocities[start:stop].reshape(-1))
         extents[start:stop] = extents_of(demos, start, stop)

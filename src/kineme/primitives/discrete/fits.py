@@ -33,7 +33,7 @@ def local_regression(basis: GaussianBasis, u: Array) -> Array:
     ``w_i = sum_t psi_i(s_t) q_t y_t / sum_t psi_i(s_t) q_t^2`` with the gate q = 1 or s.
     """
     exponents, gate = basis.exponents(u), basis.gate(u)[:, None]
-    psi = np.exp(exponents - exponents.max(axis=0))  # a factor per function cancels, and none underflows everywhere
+    psi = np.exp(exponents - exponents.max(axis=0))  # a factor per function cancels; this one prevents underflow
     return np.asarray((psi * gate / (psi * gate**2).sum(axis=0)).T)
 
 
@@ -41,7 +41,7 @@ def ridge_regression(design: Array, ridge: float) -> Array:
     """Least squares with a penalty on ``||w||^2`` (N, T), relative to the mean square of a design column."""
     n_points, n_basis = design.shape
     penalty = math.sqrt(ridge * np.sum(design**2) / n_basis)
-    rows = np.vstack((design, penalty * np.eye(n_basis)))  # not the normal equations: they square the condition
+    rows = np.vstack((design, penalty * np.eye(n_basis)))  # not the normal equations, which square the condition number
     return np.asarray(np.linalg.lstsq(rows, np.eye(n_points + n_basis, n_points), rcond=None)[0])
 
 

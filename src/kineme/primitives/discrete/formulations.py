@@ -1,10 +1,10 @@
-"""The formulations: what the forcing term is multiplied by, and how the goal enters besides the spring.
+"""The formulations: the factor of the forcing term, and how the goal enters besides the spring.
 
 In normalized time u = t / tau every formulation is one linear spring-damper,
 
     x'' = K (g - x) - D x' + scale f(s) + coupling(s) (g - x0),        ' = d/du,
 
-and differs in two places only. Encoding, decoding and features are written once for all of them.
+and only scale and coupling differ. Encoding, decoding and features are written once for all of them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from kineme.validation import Array
 
-#: Share of its largest extent within which the goal of a movement is the same place as its start.
+#: Share of its largest extent within which the goal of a movement counts as equal to its start.
 ZERO = 1e-9
 
 
@@ -50,7 +50,8 @@ class Formulation:
 
 
 def _per_dimension(new: Array, learned: Array, extents: Array) -> Array:
-    nothing = ZERO * extents.max(axis=-1, keepdims=True)  # rounding alone would mirror and magnify
+    # A g - x0 that is rounding error would mirror and magnify the shape.
+    nothing = ZERO * extents.max(axis=-1, keepdims=True)
     closed = np.abs(learned) <= nothing
     ratio = np.where(np.abs(new) <= nothing, 1.0, np.inf)
     return np.divide(new, learned, out=ratio, where=~closed)
@@ -70,7 +71,7 @@ def _isotropic(new: Array, learned: Array, extents: Array) -> Array:
 #: Share of its extent within which a movement that ends there counts as closed for the amplitude-scaled formulation.
 CLOSED = 0.05
 
-#: Phase at which the decoupled formulation hands over from shape to goal, at 35 % of the time for s(tau) = 0.01.
+#: Phase at which shape and goal have equal weight in the decoupled formulation; 35 % of the time for s(tau) = 0.01.
 HANDOVER = 0.2
 
 
@@ -78,7 +79,7 @@ def late_shape_weight(s: Array) -> Array:
     """Weight of the shape-attractor in the decoupled formulation: 1 at the start, 0 in the end.
 
     ``w_s(s) = (1 + c^3) s^3 / (s^3 + c^3)`` with c = `HANDOVER`. As s decays exponentially this is a logistic curve in
-    time, ``1 / (1 + exp(3 alpha (u - u_c)))`` with ``s(u_c) = c``, up to the factor that makes it start from 1.
+    time, ``1 / (1 + exp(3 alpha (u - u_c)))`` with ``s(u_c) = c``, up to the factor that makes it 1 at the start.
 
     With K = 100 a change of the goal has gone through to 7 % at 30 % of the time, against 39 % in Eq. (4), to 20 % at
     40 % of the time, against 56 %, and to 98 % at the end, against 97 %, with a smaller largest acceleration. Later or
@@ -115,11 +116,11 @@ FORMULATIONS = {
             coupling=lambda K, s: -K * s,
             ratio=_isotropic,
         ),
-        # Prada and Remazeilles (2012), the paper's [9], part the weights of the two attractors, s and 1 - s in Eq. (4).
-        # What we take: each attractor has a weight of a shape of its own, so that the goal can act later than s
-        # lets it. What we choose: a logistic curve in time, and weights whose sum stays 1, which keeps the spring
-        # constant. Multiplied out, K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0):
-        # nothing divides by w_s, and w_s vanishes with s, so the goal is reached.
+        # Prada and Remazeilles (2012), the paper's [9], decouple the weights of the two attractors, s and 1 - s in
+        # Eq. (4). Taken from there: each attractor has a weight of its own, so that the goal can act later than with s.
+        # Chosen here: a logistic curve in time, and weights whose sum is 1, which keeps the spring constant.
+        # Multiplied out, K f + w_s K (x0 - x) + (1 - w_s) K (g - x) = K (g - x) + K f - K w_s (g - x0): nothing is
+        # divided by w_s, and w_s vanishes with s, so the goal is reached.
         Formulation(
             name="decoupled",
             equation="tau v' = w_s K (f(s)/w_s + x0 - x) + w_g K (g - x) - D v,  w_g = 1 - w_s, w_s logistic in time",

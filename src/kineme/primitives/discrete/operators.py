@@ -16,9 +16,9 @@ from kineme.validation import Array
 
 
 class Encoder(NamedTuple):
-    """From positions relative to the start, at T even times, to a primitive's numbers."""
+    """Matrices from positions relative to the start, at T even times, to weights and initial velocity."""
 
-    weights: Array  # (T, N), to W: the weights times the formulation's scale
+    weights: Array  # (T, N), to W = scale w
     velocity: Array  # (T,), to dx/du at the start
 
 

@@ -1,4 +1,4 @@
-"""The canonical system: the phase s that runs from 1 to almost 0 and replaces time."""
+"""The canonical system: the phase s, which decays from 1 to almost 0 and replaces time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_number
 
-# Beyond these the centers c_i, or the squares of their distances, are no longer different numbers.
+# Beyond these limits the centers c_i, or squares of their distances, are equal after rounding.
 _SMALLEST, _LARGEST = 1e-100, 0.999
 
 

@@ -1,4 +1,4 @@
-"""A batch of learned primitives: what they hold, what they look like as features, how they replay."""
+"""A batch of learned primitives: their arrays, features, rollouts and controllers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Primitives(Batch):
     durations : ndarray of shape (n,)
         tau [s].
     extents : ndarray of shape (n, d)
-        Largest minus smallest position of each demonstration, the yardstick for "g is close to x0".
+        Largest minus smallest position of each demonstration; g counts as close to x0 relative to it.
     labels : ndarray of shape (n,) or None
     names : tuple of str or None
     """
@@ -102,7 +102,7 @@ class Primitives(Batch):
             term += coupling * self._relative_path(n_samples)
         return term.transpose(0, 2, 1)
 
-    def rollout(  # noqa: PLR0913 - a wish per parameter
+    def rollout(  # noqa: PLR0913 - one parameter per option
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
@@ -113,9 +113,9 @@ class Primitives(Batch):
         n_samples: int | None = None,
         settle: float | None = None,
     ) -> Rollout:
-        """Move again, as demonstrated or with another start, goal and duration; all movements in one product.
+        """Generate movements, as demonstrated or with another start, goal and duration; all in one matrix product.
 
-        One primitive goes with many goals, many primitives with one goal, or as many with as many.
+        One primitive can have many goals, many primitives one goal, or as many primitives as many goals.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Primitives(Batch):
         n_samples : int, optional
             Samples per movement; by default the specification's `n_points`. Give this or `rate`.
         settle : float, optional
-            Go on past the duration until every dimension stays within this distance of the goal.
+            Continue past the duration until every dimension stays within this distance of the goal.
 
         Returns
         -------
@@ -141,7 +141,7 @@ class Primitives(Batch):
         Raises
         ------
         TrajectoryError
-            A start, goal or velocity of the wrong shape; numbers of movements that do not go together.
+            A start, goal or velocity of the wrong shape; numbers of movements that do not match.
         SpecificationError
             A duration of 0 or less, a rate too low to follow the dynamics.
         DegenerateMovementError

@@ -12,7 +12,7 @@ from kineme.primitives.discrete.formulations import Formulation
 from kineme.primitives.spring_damper import NODE_WEIGHTS, NODES, transitions
 from kineme.validation import Array
 
-_NUMBERS_AT_ONCE = 500_000  # of the forcing term: eight nodes of each stay far from filling the memory
+_NUMBERS_AT_ONCE = 500_000  # of the forcing term at a time; a limit on memory
 _STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at least
 
 
@@ -33,9 +33,8 @@ def spring_damper_response(
 ) -> Response:
     """Solve ``x'' = K (g - x) - D x' + F(u)`` for every basis function, the goal and the initial velocity.
 
-    The state is carried from one time to the next by the matrix exponential, which is exact for any step; the
-    forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval,
-    that is with order 16.
+    The state is propagated from one time to the next by the matrix exponential, which is exact for any step; the
+    forcing enters by Gauss-Legendre quadrature of the convolution integral with 8 nodes per interval, of order 16.
 
     Parameters
     ----------
@@ -49,12 +48,12 @@ def spring_damper_response(
     # An acceleration at a node reaches the end of the step through the second column.
     impulse = transitions(stiffness, damping, h - nodes)[:, :, 1] * (h * NODE_WEIGHTS)[:, None]  # (8, 2)
     starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
-    driven = np.empty((len(starts), 2, basis.n_basis + 1))  # what each step adds to (x, x')
+    driven = np.empty((len(starts), 2, basis.n_basis + 1))  # the term that each step adds to (x, x')
     for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * basis.n_basis // _NUMBERS_AT_ONCE)):
         forcing = _forcing(basis, formulation, stiffness, (starts[some, None] + nodes).ravel())
         driven[some] = np.einsum("qz,kqf->kzf", impulse, forcing.reshape(len(some), len(nodes), -1))
     at_end = np.flatnonzero((starts < 1.0) & (starts + h > 1.0))
-    for k in at_end:  # one step at most: an ungated f has a kink at u = 1, which quadrature must not straddle
+    for k in at_end:  # one step at most: an ungated f has a kink at u = 1, where quadrature must be split
         driven[k] = 0.0
         for left, right in ((starts[k], 1.0), (1.0, starts[k] + h)):
             inside = left + (right - left) * NODES
@@ -75,5 +74,5 @@ def spring_damper_response(
 
 
 def _forcing(basis: GaussianBasis, formulation: Formulation, stiffness: float, u: Array) -> Array:
-    """What acts besides spring and damper, per unit of each W and of g - x0, shape (T, N + 1)."""
+    """Accelerations besides spring and damper, per unit of each W and of g - x0, shape (T, N + 1)."""
     return np.column_stack((basis.design(u), stiffness + formulation.coupling(stiffness, basis.phase(u))))

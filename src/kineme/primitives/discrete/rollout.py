@@ -1,4 +1,4 @@
-"""Moving again, in batch: any start, goal, duration and rate, as one matrix product."""
+"""Generated movements in a batch: any start, goal, duration and rate, as one matrix product."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from kineme.primitives.discrete.primitives import Primitives
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
-_LONGEST = 10.0  # durations after which a movement that has not settled will not
+_LONGEST = 10.0  # durations after which a movement that has not settled is given up
 _SETTLING_SAMPLES = 400
 
 
@@ -132,7 +132,7 @@ def rollout(
     duration: ArrayLike | None,
     velocity: ArrayLike | None,
 ) -> Rollout:
-    """Broadcast the wishes over the primitives and check them; see `Primitives.rollout`."""
+    """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
     d = primitives.n_dims
     wishes = {
         "start": per_movement(start, "start", d),
@@ -150,7 +150,7 @@ def rollout(
     durations = fill("duration", primitives.durations)
     check_durations("duration", durations)
     starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
-    # A faster movement starts faster, unless the user says how it starts.
+    # The demonstrated velocity scales with the tempo; a given velocity does not.
     tempo = primitives.durations / durations
     velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if wishes["velocity"] is None else 1.0)
     return Rollout(
@@ -169,7 +169,7 @@ def check_durations(name: str, durations: Array) -> None:
 
 
 def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
-    """A wish as (1, d) or (n, d), durations as (1,) or (n,); a number serves a movement of one dimension."""
+    """An option as (1, d) or (n, d), durations as (1,) or (n,); a number suits a movement of one dimension."""
     if wish is None:
         return None
     try:
@@ -197,13 +197,13 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
 
 
 def _first(value: Array, bad: NDArray[np.bool_]) -> str:
-    """The first bad wish, and whose it is where there are many."""
+    """The first invalid value, with the index of its movement if there are several."""
     k = int(bad.reshape(len(value), -1).any(axis=1).argmax())
     return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
 
 
 def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
-    """How many movements the wishes make, one or equally many of each."""
+    """Number of movements from the lengths of all options, which must be 1 or equal."""
     lengths = {"primitives": n_primitives} | {name: len(value) for name, value in wishes.items() if value is not None}
     n = max(lengths.values())
     if any(length not in (1, n) for length in lengths.values()):
@@ -241,7 +241,7 @@ def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
 
 
 def settled_end(movement: Rollout, tolerance: float) -> float:
-    """How far to go, in durations from 1 on, until every movement stays within `tolerance` of its goal."""
+    """Time, in durations from 1 on, at which every movement stays within `tolerance` of its goal."""
     check_number("settle", tolerance, above=0.0)
     far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
     outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))

@@ -1,1 +1,1 @@
-"""From a recording or a saved primitive to a new movement in a file."""
+"""Generate a new movement from a recording or a saved primitive."""

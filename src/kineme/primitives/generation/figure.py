@@ -39,6 +39,6 @@ def _draw_path(figure: SubFigure, demonstrated: Array, generated: Array, obstacl
     if obstacles is not None:
         axes.plot(*obstacles.T, "X", color=ORANGE, markersize=8, linestyle="none", label="obstacle")
     axes.set(xlabel="x", ylabel="y")
-    axes.set_aspect("equal", adjustable="datalim")  # a flat movement leaves no hole between the legend and itself
+    axes.set_aspect("equal", adjustable="datalim")  # no empty space between the legend and a flat movement
     axes.margins(0.1)
     figure.legend(loc="outside upper center", ncols=2)

@@ -1,4 +1,4 @@
-"""One new movement of one primitive: by the decode matrix, or step by step around obstacles."""
+"""Generate one movement of one primitive: by the decode matrix, or step by step around obstacles."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array
 
-SAVED = ".kineme"  # file ending of saved primitives
-_LONGEST = 10.0  # durations to wait for a movement that steers around obstacles
+SAVED = ".kineme"  # file extension of saved primitives
+_LONGEST = 10.0  # durations after which a movement around obstacles is given up
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Wishes:
     rate : float
         Samples per second, at least.
     settle : float, optional
-        Go on until within this distance of the goal.
+        Continue until within this distance of the goal.
     obstacles : ndarray of shape (m, d), optional
         Points to steer around.
     """

@@ -1,1 +1,1 @@
-"""Rhythmic DMPs: find the period, fold the recording into one cycle, learn a limit cycle, move on for ever."""
+"""Rhythmic DMPs: estimate the period, fold the recording into one cycle, learn a limit cycle, generate movements."""

@@ -64,8 +64,8 @@ class VonMisesBasis:
     def spectrum(self) -> Array:
         """Fourier coefficients F of one column of `design`, the one centered at 0: ``sum_h F_h e^(i h phi)``.
 
-        Real, because the function is even; shape (H + 1,), h = 0 ... H. The other columns are this one turned by
-        their center: ``F_h e^(-i h c_i)``. The function is analytic, so the coefficients fall exponentially, and those
+        Real, because the function is even; shape (H + 1,), h = 0 ... H. The other columns are this one shifted by
+        their center: ``F_h e^(-i h c_i)``. The function is analytic, so the coefficients decay exponentially, and those
         below the rounding error are left out.
         """
         n_samples = _PER_GAP * self.n_basis

@@ -1,4 +1,4 @@
-"""One cycle from a recording of many: folded, and turned so that cycles of the same movement start alike."""
+"""Fold a recording of several periods into one cycle that starts at a defined phase."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Cycles(NamedTuple):
 def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimension: int | None) -> Cycles:
     """Average over periods by the least-squares Fourier series, then set the phase.
 
-    On whole periods the series is the Fourier series of the average period. On a fractional number it still uses every
-    sample, has no seam where the recording begins and ends, and its mean is that of whole periods.
+    For a whole number of periods the series is the Fourier series of the average period. For a fractional number it
+    still uses every sample, has no jump where the recording begins and ends, and its mean is that of whole periods.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimen
     lengths : ndarray of shape (n,)
         Recorded samples; no harmonic above the sampling of a period is used.
     most : int
-        Harmonics H at most.
+        Largest number of harmonics H.
     dimension : int or None
-        Whose first harmonic sets the phase; None for the one with the largest.
+        Dimension whose first harmonic defines the phase; None for the one with the largest.
     """
     n_harmonics = np.clip(_SEEN * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
@@ -59,8 +59,8 @@ def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimen
 def start_phases(first: Complex) -> Array:
     """Phase of the first sample, from one first harmonic (n,): phase 0 is where it is largest.
 
-    A maximum has a sign, so unlike a principal axis it leaves no ambiguity of half a turn. A dimension without a first
-    harmonic says nothing.
+    Unlike a principal axis, a maximum has a sign, so the phase is not ambiguous by half a turn. A dimension without a
+    first harmonic defines no phase.
     """
     phases = np.angle(first) % (2 * np.pi)
-    return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up
+    return np.where(phases == 2 * np.pi, 0.0, phases)  # the remainder of a tiny negative angle rounds up to 2 pi

@@ -1,4 +1,4 @@
-"""Learning a batch of rhythmic movements: resample, find the period, fold, align, multiply."""
+"""Learn a batch of rhythmic movements: resample, estimate the period, fold, align, multiply."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
 def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Array], None]) -> None:
     """Call ``work(chosen, rows)`` on tiles of recordings, each at as many even samples as it has itself.
 
-    Recordings of one length go together: a recording must not be resampled as its company needs it.
+    Recordings of equal length are processed together, so that the result of one does not depend on the others.
     """
     for length in np.unique(demos.lengths).tolist():
         alike = np.flatnonzero(demos.lengths == length)
@@ -80,11 +80,11 @@ def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Arra
 
 
 def periodicity(dmp: RhythmicDMP, demos: Demonstrations) -> Periodicity:
-    """Periods per recording: from the given period, or found, or refused."""
+    """Periods per recording: from the given period, or estimated; refused if there is none."""
     n = len(demos)
     if dmp.period is not None:
         cycles = demos.durations / dmp.period
-        # A period may be recorded without the sample that closes it.
+        # The recording of one period may lack its last sample, which equals the first.
         short = cycles * demos.lengths / (demos.lengths - 1) < _ALMOST
         if short.any():
             i = int(np.argmax(short))

@@ -15,7 +15,7 @@ from kineme.validation import Array
 
 Complex = NDArray[np.complex128]
 
-_JITTER = 1e-12  # of the Gram matrix's diagonal: keeps a period with a gap solvable, far below any noise
+_JITTER = 1e-12  # of the Gram matrix's diagonal: keeps the system regular for a period with a gap; far below any noise
 
 
 class HarmonicFit(NamedTuple):

@@ -23,7 +23,7 @@ def encoder(dmp: RhythmicDMP) -> Array:
     H = dmp.n_harmonics
     phases = even_phases(dmp.n_points)
     synthesis = waves(phases, H)
-    synthesis[:, 0] = 0.0  # the baseline is no part of the shape
+    synthesis[:, 0] = 0.0  # the baseline is not part of the shape
     if dmp.fit == "trajectory":
         return _frozen((trajectory_regression(dmp) @ synthesis).T)
     impedance = 1 / transfer(dmp, H)

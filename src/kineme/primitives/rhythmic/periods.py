@@ -1,7 +1,7 @@
-"""The period of a recording: candidates from its self-similarity, the choice and the digits from a harmonic fit.
+"""Estimate the period of a recording: candidates from its self-similarity, choice and refinement by a harmonic fit.
 
-All dimensions speak together, in the user's unit: the widest says most. The unknown is called `cycles`: how many
-periods pass from the first to the last sample, whole or not.
+All dimensions are used together in the user's unit, so the widest has the largest weight. The unknown is `cycles`, the
+number of periods from the first to the last sample, whole or not.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from kineme.primitives.rhythmic.harmonics import fit_harmonics
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 
-FEWEST_CYCLES = 1.5  # with less, a movement and a part of it look the same
+FEWEST_CYCLES = 1.5  # with fewer, a period cannot be told from a part of it
 SAMPLES_PER_PERIOD = 4  # fewer cannot show a shape
 _CANDIDATES = 6
 _AVERAGED = 0.02  # of a lag, to either side
-_VALLEY = 0.1  # of a lag, to either side: a valley is the lowest place there
-_RISEN = 0.5  # dissimilarity that comes before a period; without, noise next to lag 0 looks like short ones
-_SLACK = 0.25  # self-dissimilarity by which a candidate may be worse than the best
+_VALLEY = 0.1  # of a lag, to either side: a valley is the minimum within it
+_RISEN = 0.5  # dissimilarity that must be reached before a period; otherwise noise next to lag 0 gives short ones
+_SLACK = 0.25  # dissimilarity by which a candidate may exceed the best one
 _HARMONICS = 8
 _PER_HARMONIC = 2.5  # samples per period that the highest harmonic needs
 _NEWTON_STEPS = 5
-_MUCH_BETTER = 0.5  # a longer period must leave at most this share of what a shorter one leaves unexplained
+_MUCH_BETTER = 0.5  # largest share of the unexplained variance of a shorter period that a longer one may leave
 _ROUNDING = 1e-9  # share of the variance below which nothing is left to explain
 
 
 class Periodicity(NamedTuple):
-    """What was found in n recordings."""
+    """Estimated periods of n recordings."""
 
     cycles: Array  # (n,), periods per recording; NaN where there is no candidate
     explained: Array  # (n,), share of the variance that one repeated cycle explains, corrected for its freedom
@@ -58,8 +58,8 @@ def dissimilarity(rows: Array) -> Array:
 def candidates(rows: Array, lengths: NDArray[np.intp]) -> Array:
     """Possible numbers of cycles, descending, (n, C), NaN where there are fewer: valleys of `dissimilarity`.
 
-    Noise makes a small valley of every few samples. What lies within a share of a lag is therefore averaged, so that
-    more samples of a period average more noise, and only the lowest valley within a tenth of a lag counts.
+    Noise makes a small valley every few samples. Values within a share of a lag are therefore averaged, so that more
+    samples per period average more noise, and only the lowest valley within a tenth of a lag counts.
     """
     n_samples = rows.shape[2]
     longest = min(int((n_samples - 1) / FEWEST_CYCLES) + 4, n_samples)
@@ -76,7 +76,7 @@ def candidates(rows: Array, lengths: NDArray[np.intp]) -> Array:
     valley &= here <= best + _SLACK
     valley &= np.cumsum(valley, axis=1) <= _CANDIDATES
     with np.errstate(invalid="ignore", divide="ignore"):
-        tip = 0.5 * reach * (left - right) / (left - 2 * here + right)  # of the parabola through three points
+        tip = 0.5 * reach * (left - right) / (left - 2 * here + right)  # vertex of the parabola through three points
         cycles = np.where(valley, (n_samples - 1) / (lag + np.clip(tip, -reach, reach)), np.nan)
     order = np.argsort(~valley, axis=1, kind="stable")[:, :_CANDIDATES]
     return np.take_along_axis(cycles, order, axis=1)
@@ -113,11 +113,11 @@ def _lowest_near(distance: Array, lag: NDArray[np.intp]) -> Array:
 
 
 def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
-    """How many periods each recording holds, all candidates refined and compared.
+    """The number of periods of each recording; all candidates are refined and compared.
 
-    Among the candidates the shortest period wins that no longer one beats clearly: a multiple of the period explains
-    everything that the period does, and a little of the noise. What a fit leaves is divided by the share of its freedom
-    that it had left, ``1 - 1 / cycles``.
+    The shortest candidate wins that no longer one beats clearly: a multiple of the period explains everything that the
+    period does, and a little of the noise. The residual variance of a fit is divided by its share of residual degrees
+    of freedom, ``1 - 1 / cycles``.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
     if len(owner) == 0:
         return result
     centered = rows - rows.mean(axis=2, keepdims=True)
-    with single_threaded_blas():  # products this small take many times as long where two threads wait for each other
+    with single_threaded_blas():  # products this small take many times as long in two threads
         cycles, left = refine(centered[owner], found[chosen], lengths[owner])
     residuals, refined = np.full(found.shape, np.inf), found.copy()
     residuals[owner, column] = left / np.maximum(1 - 1 / cycles, 1e-3) + _ROUNDING

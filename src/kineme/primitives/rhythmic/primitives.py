@@ -36,10 +36,10 @@ class RhythmicPrimitives(Batch):
     periods : ndarray of shape (n,)
         Seconds.
     phases : ndarray of shape (n,)
-        Where in the cycle the recording started, in [0, 2 pi). Phase 0 is where the first harmonic of the aligned
-        dimension is largest, so that recordings of one movement that start anywhere in it get the same weights.
+        Phase at which the recording started, in [0, 2 pi). At phase 0 the first harmonic of the aligned dimension is
+        largest, so that recordings of one movement get the same weights wherever they start.
     aligned_on : ndarray of shape (n,)
-        That dimension.
+        The aligned dimension.
     explained : ndarray of shape (n,)
         Share of the recording's variance that the folded cycle explains.
     labels : ndarray of shape (n,) or None
@@ -71,7 +71,7 @@ class RhythmicPrimitives(Batch):
 
     @property
     def weights(self) -> Array:
-        """Weights w, shape (n, N, d); they do not depend on place, amplitude and tempo."""
+        """Weights w, shape (n, N, d); they do not depend on baseline, amplitude and tempo."""
         return (self.scaled_weights / self.amplitudes[:, None, None]).transpose(0, 2, 1)
 
     def forcing(self, n_samples: int = 100) -> Array:
@@ -83,7 +83,7 @@ class RhythmicPrimitives(Batch):
         n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return (self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T).transpose(0, 2, 1)
 
-    def rollout(  # noqa: PLR0913 - a wish per parameter
+    def rollout(  # noqa: PLR0913 - one parameter per option
         self,
         n_periods: float = 1.0,
         *,
@@ -96,12 +96,12 @@ class RhythmicPrimitives(Batch):
         rate: float | None = None,
         n_samples: int | None = None,
     ) -> RhythmicRollout:
-        """Move, on the limit cycle or towards it, for any number of periods; all movements in one product.
+        """Generate movements on the limit cycle or towards it, for any number of periods; all in one product.
 
         Parameters
         ----------
         n_periods : float, default 1.0
-            How far to go; need not be whole.
+            Number of periods, not necessarily whole.
         period, amplitude : float or array_like of shape (n,), optional
             Seconds, and the user's unit; by default the demonstrated ones.
         baseline : array_like of shape (d,) or (n, d), optional
@@ -124,7 +124,7 @@ class RhythmicPrimitives(Batch):
         Raises
         ------
         TrajectoryError
-            A wish of the wrong shape; numbers of movements that do not go together.
+            An option of the wrong shape; numbers of movements that do not match.
         SpecificationError
             A period or n_periods of 0 or less, a rate too low to show a period.
         """

@@ -42,7 +42,7 @@ class RhythmicDMP(SpringDamper):
     ridge : float, optional
         Strength of the penalty, by default 1e-8 on the weights (forcing) and 1e-6 on their curvature (trajectory).
     n_points : int, default 200
-        Phases T at which the fit compares.
+        Number T of phases at which the fit compares paths.
     overlap : float, default 0.5
         Value of a basis function at its neighbor's center; sets the width h.
     period : float, optional
@@ -51,8 +51,8 @@ class RhythmicDMP(SpringDamper):
         Dimension whose first harmonic is largest at phase 0. By default that with the largest first harmonic, chosen
         for each movement; to compare movements in which two dimensions are alike, name one.
     aperiodic : {"raise", "accept"}, default "raise"
-        A recording in which no period is found: an error, or the best that there is, at worst the whole recording as
-        one period.
+        For a recording without a clear period: an error, or the best estimate, at worst the whole recording as one
+        period.
     preprocessing : tuple of steps, default ()
         Steps applied before learning; they are part of the specification.
 
@@ -113,7 +113,7 @@ class RhythmicDMP(SpringDamper):
 
     @property
     def n_harmonics(self) -> int:
-        """Harmonics that a recording is folded into: twice what the basis functions can hold."""
+        """Number of harmonics of the folded cycle: twice as many as the basis functions can represent."""
         return min(self.n_basis, (self.n_points - 1) // 2)
 
     def learn(self, movements: Any) -> RhythmicPrimitives:

@@ -1,4 +1,4 @@
-"""Moving on the limit cycle and towards it, in batch: any baseline, amplitude, period, phase and start."""
+"""Movements on the limit cycle and towards it, in a batch: any baseline, amplitude, period, phase and start."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def rollout(
     rate: float | None,
     n_samples: int | None,
 ) -> RhythmicRollout:
-    """Broadcast the wishes over the primitives and check them; see `RhythmicPrimitives.rollout`."""
+    """Check the options and broadcast them over the primitives; see `RhythmicPrimitives.rollout`."""
     vectors = ("baseline", "start", "velocity")
     given = {
         name: per_movement(wish, name, primitives.n_dims if name in vectors else None) for name, wish in wishes.items()

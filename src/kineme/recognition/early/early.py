@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.comparison.comparison import Comparison
+from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.early.hypotheses import Early, Hypotheses, as_early, known_hypotheses
+from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.prefixes import beginnings, smooth_paths
-from kineme.recognition.labels import check_labels
 from kineme.validation import MIN_SAMPLES, Array
-
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
 
 _TILE = 2_000_000  # hypotheses compared at a time
 _N_SAMPLES = 200  # of a whole movement, of which `cut` takes the first
 
 
-def partial_shares(recognizer: Recognizer, X: Any, early: Early | None = None) -> Array:
+def partial_shares(comparison: Comparison, stored: Hypotheses, X: Any) -> Array:
     """Share of each class, and, last, of an unknown movement, in the evidence of each beginning: (n, C + 1)."""
-    demos = Demonstrations.of(X)
-    if demos.n_dims != recognizer.n_dims_:
-        raise TrajectoryError(
-            f"expected movements of {recognizer.n_dims_} dimensions as in fit, got {demos.n_dims}; "
-            "select the dimensions"
-        )
-    stored = known_hypotheses(recognizer, as_early(early))
+    demos = comparison.checked(X)
     step = max(1, _TILE // len(stored.stored.lengths))
     return np.concatenate(
-        [_shares(stored, demos[start : start + step], recognizer.cutoff) for start in range(0, len(demos), step)]
+        [_shares(stored, demos[start : start + step], comparison.cutoff) for start in range(0, len(demos), step)]
     )
 
 
 def _shares(stored: Hypotheses, demos: Demonstrations, cutoff: float | None) -> Array:
-    seen = beginnings(smooth_paths(demos, cutoff), np.ones(1))
-    logs = stored.log_classes(stored.log_evidence(seen, demos.durations))
+    begun = beginnings(smooth_paths(demos, cutoff), np.ones(1))
+    logs = stored.log_classes(stored.log_evidence(begun, demos.durations))
     shares = np.exp(logs - logs.max(axis=1, keepdims=True))
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
@@ -60,8 +52,16 @@ def cut(movements: Any, fraction: float) -> Demonstrations:
     )
 
 
+class PredictsPartial(Protocol):
+    """A recognizer, or whatever else names movements by their beginnings."""
+
+    def predict_partial(self, X: Any) -> NDArray[Any]:
+        """The most likely class of each beginning, shape (n,)."""
+        ...
+
+
 def earliness(
-    recognizer: Recognizer, X: Any, y: Any = None, fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0)
+    recognizer: PredictsPartial, X: Any, y: Any = None, fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0)
 ) -> Array:
     """Share of movements recognized after each fraction of their path, shape (len(fractions),)."""
     demos = Demonstrations.of(X)

@@ -1,4 +1,4 @@
-"""The rest of a movement, from the stored movement that explains its beginning best."""
+"""The remaining part of a movement, from the stored movement that explains its beginning best."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.prefixes import Prefixes
 from kineme.validation import Array
 
-N_REST = 20  # samples of the predicted rest
+N_REMAINING = 20  # samples of the predicted path
 
 
 class Forecast(NamedTuple):
-    """Progress, seconds left, and the rest of the path relative to the present position, (20, d)."""
+    """Progress, seconds left, and the remaining path relative to the present position, (20, d)."""
 
     progress: float
     seconds: float
-    rest: Array
+    path: Array
 
 
-def forecast(stored: Hypotheses, evidence: Array, label: int, seen: Prefixes, duration: float) -> Forecast:
+def forecast(stored: Hypotheses, evidence: Array, label: int, begun: Prefixes, duration: float) -> Forecast:
     """Progress and time left on average over a class's hypotheses, the path from its best one.
 
     Parameters
@@ -35,8 +35,8 @@ def forecast(stored: Hypotheses, evidence: Array, label: int, seen: Prefixes, du
 
     Notes
     -----
-    If `duration` is the share e of the demonstrated time, ``duration (1 - e) / e`` is left. The stored rest is turned
-    and sized as the beginning was, and put to where the movement is now.
+    If `duration` is the share e of the demonstrated time, ``duration (1 - e) / e`` is left. The remaining part of the
+    stored path is turned and sized as the beginning was, and put to where the movement is now.
     """
     G = len(stored.progress)
     end = int(stored.first[label + 1]) if label + 1 < len(stored.first) else len(stored.durations)
@@ -49,13 +49,13 @@ def forecast(stored: Hypotheses, evidence: Array, label: int, seen: Prefixes, du
     movement = best // G
     path = stored.paths[movement]
     times = np.linspace(0.0, 1.0, path.shape[1])
-    rest_times = np.linspace(stored.stored.elapsed[best], 1.0, N_REST)
-    rest = np.stack([np.interp(rest_times, times, row) for row in path])
-    rest = rest - rest[:, :1]
-    R = stored.procrustes.rotations(seen.positions, stored.stored.positions[best : best + 1])[0]
-    size = seen.sizes[0] / stored.stored.sizes[best] if stored.stored.sizes[best] > 0 else 1.0
+    remaining_times = np.linspace(stored.stored.elapsed[best], 1.0, N_REMAINING)
+    remaining = np.stack([np.interp(remaining_times, times, row) for row in path])
+    remaining = remaining - remaining[:, :1]
+    R = stored.procrustes.rotations(begun.positions, stored.stored.positions[best : best + 1])[0]
+    size = begun.sizes[0] / stored.stored.sizes[best] if stored.stored.sizes[best] > 0 else 1.0
     return Forecast(
         float(weights @ np.tile(stored.progress, len(own) // G)),
         float(weights @ ((1.0 - elapsed) / elapsed)) * duration,
-        size * (R @ rest).T,
+        size * (R @ remaining).T,
     )

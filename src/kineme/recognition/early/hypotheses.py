@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.sampling import evenly_spaced
-from kineme.comparison.similarity import LOG_MEANS
+from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described
+from kineme.comparison.references import References
+from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
-from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.kernels.procrustes import Procrustes
 from kineme.recognition.early.prefixes import Prefixes, beginnings, smooth_paths
 from kineme.validation import Array, check_count, check_number
 
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
-
-_WIDTH = 0.35  # of the typical distance to a beginning of another class, as for whole movements
-_WIDTH_MOVEMENTS = 60  # that the widths are estimated from, at most
-_NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 #: An unknown movement is as far as a typical impostor, and as unlikely in size, duration and timing as a true one.
-_LOG_UNKNOWN = -0.5 / _WIDTH**2 - 1.5
+_LOG_UNKNOWN = -0.5 / SHARE**2 - 1.5
 _EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
 _MOST_PROGRESS = 1000  # beginnings of one movement
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
@@ -89,7 +86,7 @@ class Hypotheses(NamedTuple):
         The smoothed movements, minus their start.
     durations : ndarray of shape (m,)
     stored : Prefixes
-    views : tuple of Prepared
+    described : Described
         Positions and directions.
     widths : ndarray of shape (2,)
     log_lengths, log_durations : ndarray of shape (m * G,)
@@ -105,28 +102,28 @@ class Hypotheses(NamedTuple):
     paths: Array
     durations: Array
     stored: Prefixes
-    views: tuple[Prepared, ...]
+    described: Described
     widths: Array
     log_lengths: Array
     log_durations: Array
     timing_squares: Array
 
-    def log_evidence(self, seen: Prefixes, durations: Array) -> Array:
+    def log_evidence(self, begun: Prefixes, durations: Array) -> Array:
         """Logarithm of the evidence for each hypothesis, shape (n, m * G).
 
         ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over positions and directions, each after the best rotation, plus
         the logarithms of a normal density of log size and log duration ratio, and of a Cauchy density of timing, all
         up to constants.
         """
-        squares = zip(prepare(self.procrustes, seen), self.views, self.widths, strict=True)
+        squares = zip(prepare(self.procrustes, begun).blocks, self.described.blocks, self.widths, strict=True)
         near = LOG_MEANS["arithmetic"](
             np.stack([-self.procrustes.squared_distances(a, b) / (2.0 * w * w) for a, b, w in squares])
         )
-        sizes = np.log(_positive(seen.lengths))[:, None] - self.log_lengths
+        sizes = np.log(_positive(begun.lengths))[:, None] - self.log_lengths
         longer = np.log(_positive(durations))[:, None] - self.log_durations
         near -= 0.5 * (sizes / self.early.size_spread) ** 2 + 0.5 * (longer / self.early.duration_spread) ** 2
-        norms = (seen.timing**2).sum(axis=1)[:, None] + self.timing_squares
-        late = norms - 2.0 * (seen.timing @ self.stored.timing.T)
+        norms = (begun.timing**2).sum(axis=1)[:, None] + self.timing_squares
+        late = norms - 2.0 * (begun.timing @ self.stored.timing.T)
         return np.asarray(near - np.log1p(np.maximum(late, 0.0) / (2.0 * self.early.timing_spread**2)))
 
     def log_classes(self, evidence: Array) -> Array:
@@ -144,66 +141,38 @@ class Hypotheses(NamedTuple):
         return np.column_stack((known, np.full(len(evidence), _LOG_UNKNOWN)))
 
 
-def known_hypotheses(recognizer: Recognizer, early: Early) -> Hypotheses:
-    """The hypotheses of a fitted recognizer, kept from the last time that the same ones were asked for."""
-    known: dict[Early, Hypotheses] = recognizer.hypotheses_
-    if early not in known:
-        made = hypotheses(recognizer, early)
-        known.clear()  # one at a time: memory stays linear in the stored movements
-        known[early] = made
-    return known[early]
-
-
-def hypotheses(recognizer: Recognizer, early: Early) -> Hypotheses:
-    """Prepare the beginnings of a recognizer's stored movements."""
-    if recognizer.scale == "none" and early.size_spread == Early.size_spread:
-        early = Early(early.n_progress, _KNOWN_SIZE, early.duration_spread, early.timing_spread, early.max_angle)
-    procrustes = recognizer.procrustes_
+def hypotheses(comparison: Comparison, references: References, early: Early) -> Hypotheses:
+    """Prepare the beginnings of the references."""
+    if comparison.normalization.scale == "none" and early.size_spread == Early.size_spread:
+        early = replace(early, size_spread=_KNOWN_SIZE)
+    procrustes = comparison.procrustes
     if early.max_angle is not None:
-        procrustes = Procrustes(recognizer.n_dims_, early.max_angle)
+        procrustes = Procrustes(comparison.n_dims, early.max_angle)
     progress = np.arange(1, early.n_progress + 1) / early.n_progress
-    paths = smooth_paths(recognizer.demonstrations_, recognizer.cutoff)
+    demos = references.all_movements()
+    paths = smooth_paths(demos, comparison.cutoff)
     stored = beginnings(paths, progress)
-    views = prepare(procrustes, stored)
-    labels = np.searchsorted(recognizer.classes_, recognizer.labels_)
+    described = prepare(procrustes, stored)
     return Hypotheses(
         early,
         procrustes,
-        recognizer.first_,
+        references.first,
         progress,
         paths,
-        recognizer.demonstrations_.durations,
+        demos.durations,
         stored,
-        views,
-        _widths(procrustes, views, labels),
+        described,
+        beginning_widths(described, np.searchsorted(references.classes, references.labels)),
         np.log(_positive(stored.lengths)),
-        np.log(_positive(np.repeat(recognizer.demonstrations_.durations, len(progress)) * stored.elapsed)),
+        np.log(_positive(np.repeat(demos.durations, len(progress)) * stored.elapsed)),
         (stored.timing**2).sum(axis=1),
     )
 
 
-def prepare(procrustes: Procrustes, prefixes: Prefixes) -> tuple[Prepared, ...]:
+def prepare(procrustes: Procrustes, prefixes: Prefixes) -> Described:
     """Positions and directions ready for comparison; single precision, which is far finer than any width."""
-    return tuple(procrustes.prepare(rows.astype(np.float32)) for rows in (prefixes.positions, prefixes.directions))
-
-
-def _widths(procrustes: Procrustes, views: tuple[Prepared, ...], labels: NDArray[np.intp]) -> Array:
-    """A share of the typical distance from a beginning to the nearest one of another class, at any progress."""
-    m, G = len(labels), len(views[0].rows) // len(labels)
-    chosen = evenly_spaced(m, _WIDTH_MOVEMENTS)
-    rows = (chosen[:, None] * G + np.arange(G)).ravel()
-    own = np.repeat(labels[chosen], G)
-    if (own == own[0]).all():
-        own = np.repeat(chosen, G)
-    widths = []
-    for view in views:
-        some = view.take(rows)
-        squares = procrustes.squared_distances(some, some)
-        squares[own[:, None] == own] = np.inf
-        nearest = np.sqrt(squares.min(axis=1))
-        nearest = nearest[np.isfinite(nearest) & (nearest > 0)]
-        widths.append(_WIDTH * float(np.median(nearest)) if len(nearest) else _NO_IMPOSTOR)
-    return np.array(widths)
+    rows = (prefixes.positions, prefixes.directions)
+    return Described(tuple(procrustes.prepare(block.astype(np.float32)) for block in rows), procrustes)
 
 
 def _positive(values: Array) -> Array:

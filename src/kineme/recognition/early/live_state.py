@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from enum import Flag, auto
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from kineme.movements.trajectories.labels import Label
 from kineme.validation import Array
 
 
@@ -39,7 +40,7 @@ MESSAGES = {
 class Guess(NamedTuple):
     """A class and its share of the evidence; the shares of all classes and of "unknown" sum to 1."""
 
-    label: Any
+    label: Label
     confidence: float
 
 
@@ -57,9 +58,9 @@ class LiveState(NamedTuple):
     progress : float
         Share of the path of the most likely class that is done, 0 to 1. Does not fall while that class stays.
     path : ndarray of shape (20, d) or None
-        The rest of the movement, predicted, at even times from now to the arrival.
+        The remaining path, predicted, at even times from now to the arrival.
     goal : ndarray of shape (d,) or None
-        Its end.
+        Where it ends.
     arrival : float
         Predicted time stamp of the end [s].
     skipped : int
@@ -69,7 +70,7 @@ class LiveState(NamedTuple):
 
     ranked: tuple[Guess, ...]
     unknown: float
-    label: Any
+    label: Label | None
     progress: float
     path: Array | None
     goal: Array | None

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import N_POINTS
+from kineme.comparison.references import References
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.answer import Answer
 from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.forecast import forecast
-from kineme.recognition.early.hypotheses import Early, known_hypotheses
+from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.recognition.early.prefixes import beginnings, smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.validation import MIN_SAMPLES, Array
-
-if TYPE_CHECKING:
-    from kineme.recognition.recognizer import Recognizer
 
 CAPACITY = 4096  # samples kept as they come
 _WHOLE = np.ones(1)
@@ -33,19 +34,28 @@ class Live:
     counted and flagged. Up to 4096 samples are kept as they came, more as averages, so memory is bounded.
     """
 
-    def __init__(self, recognizer: Recognizer, decision: Decision, early: Early) -> None:
-        self._recognizer = recognizer
-        self._hypotheses = known_hypotheses(recognizer, early)
+    def __init__(
+        self,
+        comparison: Comparison,
+        references: References,
+        hypotheses: Hypotheses,
+        decision: Decision,
+        recognize: Callable[[Trajectory], Answer],
+    ) -> None:
+        self._comparison = comparison
+        self._references = references
+        self._hypotheses = hypotheses
         self._decision = decision
-        self._path = BoundedPath(CAPACITY, recognizer.n_dims_)
-        self._classes = recognizer.classes_.tolist()
+        self._recognize = recognize
+        self._path = BoundedPath(CAPACITY, comparison.n_dims)
+        self._classes = references.classes.tolist()
         self.reset()
         self._rehearse()
 
     def _rehearse(self) -> None:
         """Go through a stored movement once: what is loaded on first use would stall the stream for 0.3 s."""
         load_compiled()
-        known = self._recognizer.demonstrations_[0]
+        known = self._references.demonstrations[np.zeros(1, dtype=np.intp)]
         self.update(known.times, known.positions)
         self.reset()
 
@@ -72,10 +82,10 @@ class Live:
         kept = self._path.kept()
         if len(kept) < MIN_SAMPLES or not np.ptp(kept[:, 1:], axis=0).any():
             return self._nothing(status | LiveStatus.TOO_SHORT)
-        return self._judge(kept, status)
+        return self._estimate(kept, status)
 
-    def finish(self) -> Any:
-        """The answer of the recognizer on the whole movement: of `recognize`, where it has that, else the label.
+    def finish(self) -> Answer:
+        """The answer of `Recognizer.recognize` to the whole movement.
 
         Raises
         ------
@@ -83,9 +93,7 @@ class Live:
             Fewer than four samples could be used.
         """
         kept = self._path.kept()
-        movement = Trajectory(kept[:, 0].copy(), kept[:, 1:].copy())
-        recognize = getattr(self._recognizer, "recognize", None)
-        return recognize(movement) if callable(recognize) else self._recognizer.predict(movement)[0]
+        return self._recognize(Trajectory(kept[:, 0].copy(), kept[:, 1:].copy()))
 
     def _take_in(self, t: Any, x: Any) -> LiveStatus:
         status = LiveStatus(0)
@@ -94,7 +102,7 @@ class Live:
             positions = positions.reshape(len(times), -1) if np.ndim(t) == 0 else positions
         except (TypeError, ValueError, OverflowError):
             times, positions = np.empty(0), np.empty((0, 0))
-        if times.ndim != 1 or positions.shape != (len(times), self._recognizer.n_dims_):
+        if times.ndim != 1 or positions.shape != (len(times), self._comparison.n_dims):
             self.skipped += 1
             return LiveStatus.WRONG_SHAPE
         finite = np.isfinite(times) & np.isfinite(positions).all(axis=1)
@@ -109,10 +117,10 @@ class Live:
             self.skipped += 1
         return status
 
-    def _judge(self, kept: Array, status: LiveStatus) -> LiveState:
+    def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
         elapsed = float(kept[-1, 0] - kept[0, 0])
-        seen = beginnings(self._smooth(kept), _WHOLE)
-        evidence = self._hypotheses.log_evidence(seen, np.array([elapsed]))
+        begun = beginnings(self._smooth(kept), _WHOLE)
+        evidence = self._hypotheses.log_evidence(begun, np.array([elapsed]))
         logs = self._hypotheses.log_classes(evidence)[0]
         shares = np.exp(logs - logs.max())
         shares /= shares.sum()
@@ -120,10 +128,10 @@ class Live:
         leader = int(order[0])
         decided = self._decision.update(elapsed, leader, float(shares[leader]))
         shown = leader if decided is None else decided
-        ahead = forecast(self._hypotheses, evidence[0], shown, seen, elapsed)
+        ahead = forecast(self._hypotheses, evidence[0], shown, begun, elapsed)
         self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
         self._leader = shown
-        path = kept[-1, 1:] + ahead.rest
+        path = kept[-1, 1:] + ahead.path
         return LiveState(
             tuple(Guess(self._classes[c], float(shares[c])) for c in order.tolist()),
             float(shares[-1]),
@@ -140,7 +148,7 @@ class Live:
         """What has been seen so far, at even times and smoothed as the stored movements were: (1, d, T)."""
         times = np.linspace(kept[0, 0], kept[-1, 0], N_POINTS)
         even = np.stack([np.interp(times, kept[:, 0], column - column[0]) for column in kept[:, 1:].T])
-        cutoff = self._recognizer.cutoff
+        cutoff = self._comparison.cutoff
         return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
     def _nothing(self, status: LiveStatus) -> LiveState:

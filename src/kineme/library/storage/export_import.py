@@ -9,9 +9,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from kineme.errors import DataError
-from kineme.library.storage.connection import FILE, check_alone, check_kind, connect, migrate
-from kineme.library.storage.guard import defend_foreign, limited, limited_copy
-from kineme.library.storage.placing import LOGS, as_folder, placed
+from kineme.library.storage.connection import check_alone, check_kind, connect, migrate
+from kineme.library.storage.defense import defend_foreign, limited, limited_copy
+from kineme.library.storage.folder import FILE, LOGS, as_folder, new_database
 from kineme.library.storage.rows import damage
 from kineme.library.storage.schema import SCHEMA_VERSION
 from kineme.library.storage.sqlite_errors import in_plain_words
@@ -144,11 +144,11 @@ def _named(beside: Path, source: Path) -> Iterator[None]:
 
 @contextmanager
 def _new(target: Path) -> Iterator[Path]:
-    """As `placed`, with errors that users can act on."""
+    """As `new_database`, with errors that users can act on."""
     if not target.parent.is_dir():
         raise DataError(f"expected a folder {target.parent} to write {target.name} into, there is none; create it")
     try:
-        with in_plain_words(target, 0.0), placed(target) as beside:
+        with in_plain_words(target, 0.0), new_database(target) as beside:
             yield beside
     except FileExistsError as error:
         raise DataError(f"expected a new file, but {target} is there already; choose another, or move it") from error

@@ -26,7 +26,7 @@ from typing import Any, Protocol
 from weakref import WeakSet
 
 from kineme.errors import DataError
-from kineme.library.storage.guard import Watched
+from kineme.library.storage.defense import Watched
 from kineme.runtime import forks
 
 _PATIENCE = 10.0  # seconds
@@ -99,9 +99,14 @@ def open_connection(address: str | Path, **options: Any) -> Connection:
     return connection
 
 
+def is_lost(path: Path) -> bool:
+    """Whether a library file was open in the parent at the fork, and could not be closed."""
+    return bool(_lost) and path.exists() and _identity(path) in _lost
+
+
 def refuse_if_lost(path: Path) -> None:
-    """Refuse a library file that was open in the parent at the fork, and could not be closed."""
-    if _lost and path.exists() and _identity(path) in _lost:
+    """Refuse a library file that is lost to this process."""
+    if is_lost(path):
         raise DataError(
             f"expected a process that opens {path} itself, got one that was forked while the library was being read or "
             "written; start it with multiprocessing's 'spawn', or fork when no thread uses the library"

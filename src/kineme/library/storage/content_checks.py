@@ -1,7 +1,7 @@
 """What rows must hold that SQLite cannot judge: numbers inside bytes, and JSON.
 
-Each function gets rows that fit their seals and `checks.CHECKS`, and gives the keys of those that no library holds,
-with what was expected of them.
+Each function gets rows whose checksums are right and whose columns fit `column_checks.CHECKS`, and gives the keys of
+those that no library holds, with what is wrong with them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.storage.checks import GOOD
+from kineme.library.storage.column_checks import GOOD
 from kineme.library.storage.rows import Row, parsed
 from kineme.validation import Array
 

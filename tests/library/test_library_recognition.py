@@ -11,7 +11,7 @@ from library_samples import draw_movements
 from kineme import ActionLibrary, Demonstrations, Recognizer
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library.recognition import calibration_cache, code_cache
-from kineme.library.recognition.recognize import Serving
+from kineme.library.recognition.recognize import LibraryRecognizer
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):
@@ -77,7 +77,7 @@ def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
     """Classes of one size calibrate the same, whether sampled or not."""
     demos, asked = _kinds([count] * 6, d, seed=count), _questions([count] * 6, d, seed=count)
     library = make(demos)
-    ours = Serving(library.store, exhaustive=0)
+    ours = LibraryRecognizer(library.store, exhaustive=0)
     theirs = library.specification.recognizer().set_params(classifier="nearest").fit(demos)
     order = np.argsort(demos.labels, kind="stable")
     for a, b in zip(ours.recognize(asked), theirs.recognize(asked), strict=True):
@@ -95,7 +95,7 @@ def test_large_classes_keep_the_error_rate(make):
     rng = np.random.default_rng(0)
     known = rng.permutation(len(kinds))
     library = make(kinds[known[:640]])
-    answers = Serving(library.store, exhaustive=0).recognize(kinds[known[640:]], error_rate=0.1)
+    answers = LibraryRecognizer(library.store, exhaustive=0).recognize(kinds[known[640:]], error_rate=0.1)
     labels = kinds.labels[known[640:]]
     assert np.mean([a.label in {None, name} for a, name in zip(answers, labels, strict=True)]) == 1
     assert 0.03 < np.mean([a.label is None for a in answers]) < 0.2
@@ -120,7 +120,7 @@ def served(tmp_path_factory):
     asked = _questions([3] * 5)
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(_kinds([3] * 5))
-        before = _plain(Serving(library.store, exhaustive=0).recognize(asked))
+        before = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked))
         caches = {name: (library.folder / name).read_bytes() for name in (code_cache.FILE, calibration_cache.FILE)}
     return library.folder, asked, before, caches
 
@@ -135,7 +135,7 @@ def test_a_damaged_cache_is_made_again(served, name, damage, where):
     with ActionLibrary(folder) as library:
         whole = caches[name]
         DAMAGES[damage](folder / name, where)
-        _same(_plain(Serving(library.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked)), before)
         again = (folder / name).read_bytes()
         assert len(again) == len(whole)
         assert again == whole or name == calibration_cache.FILE  # whose archive holds the time of day
@@ -146,11 +146,11 @@ def test_the_caches_of_another_library_are_not_believed(make):
     counts = [3] * 5
     one, other = make(_kinds(counts, seed=1), "one"), make(_kinds(counts, seed=2), "other")
     asked = _questions(counts, seed=2)
-    before = _plain(Serving(other.store, exhaustive=0).recognize(asked))
-    Serving(one.store, exhaustive=0).recognize(asked)
+    before = _plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked))
+    LibraryRecognizer(one.store, exhaustive=0).recognize(asked)
     for name in (code_cache.FILE, calibration_cache.FILE):
         (other.folder / name).write_bytes((one.folder / name).read_bytes())
-    _same(_plain(Serving(other.store, exhaustive=0).recognize(asked)), before)
+    _same(_plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked)), before)
 
 
 def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_path):
@@ -160,19 +160,19 @@ def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_
     library.export(tmp_path / "backup")
     library.learn(_kinds(counts, seed=1)[8:])
     asked = _questions(counts, seed=1)
-    Serving(library.store, exhaustive=0).recognize(asked)
+    LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
     again = ActionLibrary.import_(tmp_path / "backup", tmp_path / "again")
     with again:
         again.learn(_kinds(counts, seed=5)[8:])
-        before = _plain(Serving(again.store, exhaustive=0).recognize(asked))
+        before = _plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked))
         (again.folder / code_cache.FILE).write_bytes((library.folder / code_cache.FILE).read_bytes())
-        _same(_plain(Serving(again.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked)), before)
 
 
 def test_answers_follow_every_change(make):
     demos, asked = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos[:8])
-    serving, fresh = Serving(library.store, exhaustive=0), []
+    serving, fresh = LibraryRecognizer(library.store, exhaustive=0), []
     for change in (
         lambda: library.learn(demos[8:16]),
         lambda: library.learn(demos[16:]),
@@ -184,7 +184,7 @@ def test_answers_follow_every_change(make):
     ):
         serving.recognize(asked)
         change()
-        fresh = Serving(library.store, exhaustive=0)
+        fresh = LibraryRecognizer(library.store, exhaustive=0)
         _same(_plain(serving.recognize(asked)), _plain(fresh.recognize(asked)))
     names = {name for answer in fresh.recognize(asked) for name in answer.p_values}
     assert names == {"kind 00", "wave", "both", "kind 05"}
@@ -193,12 +193,12 @@ def test_answers_follow_every_change(make):
 def test_an_earlier_version_answers_as_it_did(make):
     demos, asked = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos[:12])
-    before, version = _plain(Serving(library.store, exhaustive=0).recognize(asked)), library.version
+    before, version = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked)), library.version
     library.learn(demos[12:])
     library.rename(demos.labels[0], "wave")
-    Serving(library.store, exhaustive=0).recognize(asked)
+    LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
     with library.at(version) as past:
-        _same(_plain(Serving(past.store, exhaustive=0).recognize(asked)), before)
+        _same(_plain(LibraryRecognizer(past.store, exhaustive=0).recognize(asked)), before)
         _same(_plain(past.recognize(asked)), _plain(past.recognize(asked)))
 
 
@@ -206,7 +206,7 @@ def test_reading_only_leaves_nothing_behind(make):
     library = make(_kinds([4] * 6))
     reader = make(read_only=True)
     before = sorted(path.name for path in library.folder.iterdir())
-    assert len(Serving(reader.store, exhaustive=0).recognize(_questions([4] * 6))) == 6
+    assert len(LibraryRecognizer(reader.store, exhaustive=0).recognize(_questions([4] * 6))) == 6
     assert sorted(path.name for path in library.folder.iterdir()) == before
 
 
@@ -214,7 +214,7 @@ def test_one_movement_gets_one_answer_and_unlabeled_ones_give_none(make):
     demos = _kinds([3] * 4)
     library = make(demos)
     nameless = library.learn(_questions([3] * 4), labels=[None] * 4).ids
-    for serving in (library, Serving(library.store, exhaustive=0)):
+    for serving in (library, LibraryRecognizer(library.store, exhaustive=0)):
         for one in _questions([3] * 4):
             answer = serving.recognize(one)
             assert answer.ranked[0] == one.label
@@ -223,7 +223,7 @@ def test_one_movement_gets_one_answer_and_unlabeled_ones_give_none(make):
 
 def test_a_library_with_one_symbol_knows_it_from_others(make):
     library = make(_kinds([12]))
-    for serving in (library, Serving(library.store, exhaustive=0)):
+    for serving in (library, LibraryRecognizer(library.store, exhaustive=0)):
         (answer,) = serving.recognize(_questions([12]))
         assert list(answer.p_values) == ["kind 00"]
 
@@ -236,6 +236,6 @@ def test_what_cannot_be_answered_says_why(make):
     with pytest.raises(SpecificationError, match=r"expected training movements that differ, got one movement"):
         make(_kinds([1]), "one").recognize(_questions([1]))
     for exhaustive in (0, 1000):
-        serving = Serving(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
+        serving = LibraryRecognizer(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
         with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as in fit, got 3"):
             serving.recognize(_questions([1], d=3))

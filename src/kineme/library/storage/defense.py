@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from threading import get_ident
 from typing import Any
 
 _STEPS = 200_000  # of SQLite's virtual machine, between two looks at the clock: some milliseconds
@@ -56,12 +55,15 @@ def _switch(connection: sqlite3.Connection, names: tuple[str, ...], on: bool) ->
 
 
 class Watched(sqlite3.Connection):
-    """Interrupts a statement that takes more work than reading every byte of the file could."""
+    """Interrupts a statement that takes more work than reading every byte of the file could.
+
+    One thread uses it at a time.
+    """
 
     _path: Path
 
     def __init__(self, *database: Any, **options: Any) -> None:
-        self._looks: dict[int, int] = {}  # thread -> looks at its statement
+        self._looks = 0  # at the statement under way
         self._too_much: Callable[[], bool] = bool
         super().__init__(*database, **options)
 
@@ -72,14 +74,12 @@ class Watched(sqlite3.Connection):
 
     def execute(self, *statement: Any) -> sqlite3.Cursor:
         """As SQLite's."""
-        if self._looks:
-            self._looks[get_ident()] = 0
+        self._looks = 0
         return super().execute(*statement)
 
     def _is_endless(self) -> bool:
-        me = get_ident()
-        self._looks[me] = looks = self._looks.get(me, 0) + 1
-        more = _STEPS * looks - _WORK
+        self._looks += 1
+        more = _STEPS * self._looks - _WORK
         return self._too_much() or (more > 0 and more > _WORK_PER_BYTE * size_of(self._path))
 
     @contextmanager

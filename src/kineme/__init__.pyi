@@ -1,0 +1,59 @@
+# The table of public names, in the order of the flow; `kineme._lazy` loads from it, `docs/make_reference.py` prints it.
+
+# Movements
+from kineme.movements.trajectories.trajectory import Trajectory as Trajectory
+from kineme.movements.trajectories.demonstrations import Demonstrations as Demonstrations
+from kineme.movements.trajectories.movements_like import MovementLike as MovementLike
+from kineme.movements.trajectories.movements_like import MovementsLike as MovementsLike
+from kineme.movements.preparation.preprocess import preprocess as preprocess
+from kineme.movements.preparation.trim import TrimRest as TrimRest
+from kineme.movements.preparation.smooth import Smooth as Smooth
+from kineme.movements.preparation.resample import Resample as Resample
+from kineme.movements.preparation.perturbations import Perturbation as Perturbation
+from kineme.movements.segmentation.segment import segment as segment
+from kineme.movements.segmentation.segmentation import Segmentation as Segmentation
+
+# Recordings in files, and data sets
+from kineme.files.recordings import read_recordings as read_recordings
+from kineme.files.recordings import read_recording as read_recording
+from kineme.files.join_files import Recordings as Recordings
+from kineme.files.movements import write_movement as write_movement
+from kineme import datasets as datasets
+from kineme.datasets.lasa import load_lasa as load_lasa
+
+# Primitives
+from kineme.primitives.discrete.dmp import DMP as DMP
+from kineme.primitives.discrete.primitives import Primitives as Primitives
+from kineme.primitives.discrete.rollout import Rollout as Rollout
+from kineme import control as control
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
+from kineme.primitives.rhythmic.primitives import RhythmicPrimitives as RhythmicPrimitives
+from kineme import orientation as orientation
+from kineme import styles as styles
+
+# Features and kernels
+from kineme.features.dmp_features import DMPFeatures as DMPFeatures
+from kineme.features.rhythmic_features import RhythmicFeatures as RhythmicFeatures
+from kineme.features.random_binning import RandomBinning as RandomBinning
+from kineme import kernels as kernels
+
+# Recognition
+from kineme.recognition.recognizer import Recognizer as Recognizer
+from kineme.comparison.representation import Representation as Representation
+from kineme.recognition.answer import Answer as Answer
+from kineme.recognition.early.hypotheses import Early as Early
+
+# Symbols and the action library
+from kineme import anchoring as anchoring
+from kineme.library.library import ActionLibrary as ActionLibrary
+
+# Errors and warnings
+from kineme.errors import KinemeError as KinemeError
+from kineme.errors import TrajectoryError as TrajectoryError
+from kineme.errors import DegenerateMovementError as DegenerateMovementError
+from kineme.errors import SpecificationError as SpecificationError
+from kineme.errors import DataError as DataError
+from kineme.errors import DegenerateMovementWarning as DegenerateMovementWarning
+
+__version__: str
+__all__: list[str]

@@ -1,0 +1,114 @@
+"""Described movements beside the references: similarities and scores, each computed once and only if asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.averages import LOG_MEANS, SHARES
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described, Tile, for_described
+from kineme.comparison.references import References
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.runtime.parallel import for_tiles
+from kineme.validation import Array
+
+_TILE_PAIRS = 1_000_000  # similarities at a time: memory stays linear in the stored movements
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """n described movements, compared with m references of C classes.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    references : References
+    described : Described
+    """
+
+    comparison: Comparison
+    references: References
+    described: Described
+
+    def __len__(self) -> int:
+        return len(self.described)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Squared distances in each representation, (R, n, m)."""
+        return self.comparison.similarity.squared_distances(self.described, self.references.described)
+
+    @cached_property
+    def logs(self) -> Array:
+        """Logarithms of each representation's kernel times R times its weight, (R, n, m)."""
+        return self.comparison.similarity.logs_at(self.squares)
+
+    @cached_property
+    def log_average(self) -> Array:
+        """Logarithms of the averaged kernel, (n, m)."""
+        return LOG_MEANS[self.comparison.mean](self.logs)
+
+    @cached_property
+    def nearest(self) -> Array:
+        """Log similarity to the nearest reference of each class, (n, C)."""
+        return np.asarray(np.maximum.reduceat(self.log_average, self.references.first, axis=1))
+
+    def shares(self, chosen: NDArray[np.intp]) -> Array:
+        """Share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
+        return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])
+
+
+Score = Callable[[Compared], Array]
+
+
+def nearest(compared: Compared) -> Array:
+    """Log similarity to the nearest reference of each class, (n, C)."""
+    return compared.nearest
+
+
+def score(
+    comparison: Comparison, references: References, movements: Demonstrations | Described, *scores: Score
+) -> tuple[Array, ...]:
+    """Scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
+    found = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
+
+    def fill(start: int, stop: int, described: Described) -> None:
+        compared = Compared(comparison, references, described)
+        for array, by in zip(found, scores, strict=True):
+            array[start:stop] = by(compared)
+
+    if isinstance(movements, Described):
+        whole = movements
+        for_tiles(lambda a, b: fill(a, b, whole.take(slice(a, b))), len(whole), tile_rows(references))
+    else:
+        for_described(
+            movements,
+            comparison,
+            comparison.procrustes,
+            lambda tile: fill(tile.start, tile.stop, tile.described),
+            tile_rows(references),
+        )
+    return found
+
+
+def for_compared(
+    comparison: Comparison, references: References, demos: Demonstrations, work: Callable[[Tile, Compared], None]
+) -> None:
+    """Describe movements tile by tile, in threads, and hand each tile on with its comparison."""
+    for_described(
+        demos,
+        comparison,
+        comparison.procrustes,
+        lambda tile: work(tile, Compared(comparison, references, tile.described)),
+        tile_rows(references),
+    )
+
+
+def tile_rows(references: References) -> int:
+    """Movements to compare at a time."""
+    return max(1, _TILE_PAIRS // len(references))

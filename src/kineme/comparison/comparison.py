@@ -1,0 +1,88 @@
+"""How movements are compared, with widths and weights that were estimated from some."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.describe import Described, prepare
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import Representation
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.specification import ComparisonSpecification
+from kineme.errors import TrajectoryError
+from kineme.kernels.procrustes import Procrustes
+from kineme.movements.trajectories.demonstrations import Demonstrations
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What is needed to describe movements and to compare the descriptions; made by `fit_comparison`.
+
+    Attributes
+    ----------
+    representations : tuple of R Representation
+        Those with a weight above 0.
+    normalization : Normalization
+    cutoff : float or None
+        Movements are smoothed below this many cycles each; None for not at all.
+    similarity : AveragedSimilarity
+        With the distance, the widths, the weights and the average.
+    """
+
+    representations: tuple[Representation, ...]
+    normalization: Normalization
+    cutoff: float | None
+    similarity: AveragedSimilarity
+
+    @property
+    def procrustes(self) -> Procrustes:
+        """The distance between rows."""
+        return self.similarity.procrustes
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d of the movements."""
+        return self.procrustes.n_dims
+
+    @property
+    def mean(self) -> str:
+        """The A-average over representations."""
+        return self.similarity.mean
+
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """The same without widths and weights, so for other movements."""
+        angle = self.procrustes.max_angle
+        return ComparisonSpecification(self.representations, self.normalization, self.cutoff, angle, self.mean)
+
+    def checked(self, movements: Any) -> Demonstrations:
+        """The movements as `Demonstrations`.
+
+        Raises
+        ------
+        TrajectoryError
+            Movements of another number of dimensions.
+        """
+        demos = Demonstrations.of(movements)
+        if demos.n_dims != self.n_dims:
+            raise TrajectoryError(
+                f"expected movements of {self.n_dims} dimensions as in fit, got {demos.n_dims}; select the dimensions"
+            )
+        return demos
+
+    def prepared(self, rows: tuple[NDArray[np.floating[Any]], ...]) -> Described:
+        """Feature rows, one block (n, d * S) for each representation, ready for comparison."""
+        return prepare(rows, self, self.procrustes)
+
+    def select(self, representations: NDArray[np.intp]) -> Comparison:
+        """The comparison by some of the representations."""
+        one = self.similarity
+        weights = None if one.weights is None else one.weights[representations]
+        similarity = replace(one, widths=one.widths[representations], weights=weights)
+        return replace(
+            self, representations=tuple(self.representations[r] for r in representations), similarity=similarity
+        )

@@ -1,0 +1,91 @@
+"""How movements are to be compared, before any are known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.normalization import Normalization
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
+from kineme.errors import SpecificationError
+from kineme.kernels.procrustes import Procrustes
+from kineme.movements.preparation.smooth import Smooth
+from kineme.validation import check_choice, check_number
+
+
+@dataclass(frozen=True)
+class ComparisonSpecification:
+    """Representations, invariances, smoothing and average.
+
+    Kernel widths and weights are estimated from movements, see `Comparison`.
+
+    Parameters
+    ----------
+    representations : tuple of R Representation
+        By default positions over arc length, forcing term over arc length, forcing term over time.
+    normalization : Normalization
+        What is taken out of translation and size.
+    cutoff : float or None, default 10.0
+        Movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
+    max_angle : float, optional
+        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0.
+    mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
+        The A-average over representations.
+
+    Raises
+    ------
+    SpecificationError
+        A parameter out of its range.
+    """
+
+    representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
+    normalization: Normalization = field(default_factory=Normalization)
+    cutoff: float | None = 10.0
+    max_angle: float | None = None
+    mean: str = "arithmetic"
+
+    def __post_init__(self) -> None:
+        check_choice("mean", self.mean, list(LOG_MEANS))
+        if self.cutoff is not None:
+            Smooth(self.cutoff)  # checks its own parameter
+        object.__setattr__(self, "representations", check_representations(self.representations))
+        if self.max_angle is not None:
+            check_number("max_angle", self.max_angle, least=0.0)
+
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """The specification itself."""
+        return self
+
+    def procrustes(self, n_dims: int) -> Procrustes:
+        """The distance between rows of movements of `n_dims` dimensions."""
+        if self.max_angle is not None:
+            return Procrustes(n_dims, float(self.max_angle))
+        return Procrustes(n_dims, math.pi / 3 if n_dims in (2, 3) else 0.0)
+
+
+class Compares(Protocol):
+    """Whatever says how it compares movements: a specification, a `Comparison`, a recognizer."""
+
+    @property
+    def specification(self) -> ComparisonSpecification:
+        """How movements are compared."""
+        ...
+
+
+def specification_of(like: Compares | None) -> ComparisonSpecification:
+    """The specification that `like` is or has; the default one for None.
+
+    Raises
+    ------
+    SpecificationError
+        `like` has none, or one with a parameter out of its range.
+    """
+    found = ComparisonSpecification() if like is None else getattr(like, "specification", None)
+    if not isinstance(found, ComparisonSpecification):
+        raise SpecificationError(
+            f"expected like to be a kineme.Recognizer, a Comparison, a ComparisonSpecification or None, got {like!r}"
+        )
+    return found

@@ -1,0 +1,144 @@
+"""Kernel widths: how far apart movements typically are, with labels and without."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.describe import Described
+from kineme.comparison.sampling import evenly_spaced
+from kineme.errors import SpecificationError
+from kineme.validation import Array
+
+#: Width as a share of the typical distance to the nearest movement of another class, an impostor.
+SHARE = 0.35
+_LEAST = 0.01  # of the typical size: movements closer than that are the same, as recordings go
+_SAME = 1e-3  # of the size: what single precision leaves between a movement and itself is less
+_COPIES = 1e-5  # of the size: of movements without labels, nearer ones are copies, and rounding alone says how near
+_ROWS = 500  # movements that widths are estimated from, at most
+_BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
+_NO_IMPOSTOR = 0.1  # width where no two beginnings differ
+
+
+def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
+    """Width sigma_r of each representation: a share of the typical distance to the nearest movement of another class.
+
+    At 0.35 of it a movement as far as an impostor counts exp(-4), under two in a hundred: what is closer than the
+    nearest impostor decides, everything farther hardly counts. Where there is one class, any other movement is the
+    impostor. Where classes coincide, as N and Z do under any rotation, the width is at least a hundredth of the
+    movements' size. Estimated from at most 500 evenly spaced movements, so that its cost does not grow.
+
+    Returns
+    -------
+    ndarray of shape (R,)
+
+    Raises
+    ------
+    SpecificationError
+        All movements are the same, or there is only one.
+    """
+    chosen = evenly_spaced(len(labels), _ROWS)
+    some, owners = described.take(chosen), labels[chosen]
+    widths = []
+    for r, nearest in enumerate(_nearest_of_others(some, owners, chosen)):
+        size = _typical_size(some, r)
+        width = _share_of_median(nearest, _SAME * size)
+        if width is None:
+            raise SpecificationError(
+                "expected training movements that differ, got one movement or all the same; add demonstrations"
+            )
+        widths.append(max(width, _LEAST * size))
+    return np.array(widths)
+
+
+def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
+    """Widths (R,) for m movements with G beginnings each, which follow each other: rows (m * G).
+
+    The same share of the typical distance from a beginning to the nearest one of another class, at any progress. 0.1
+    where no two beginnings differ.
+    """
+    n_progress = len(beginnings) // len(labels)
+    chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
+    rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
+    owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
+    found = [_share_of_median(one, 0.0) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
+    return np.array([_NO_IMPOSTOR if width is None else width for width in found])
+
+
+def gap_widths(described: Described) -> Array:
+    """Width sigma_r of each representation: 0.35 of the typical distance to the first movement beyond a gap.
+
+    `impostor_widths` takes that share of the distance to the nearest movement of another class. Without labels the
+    class is told by its edge: sorted by distance, ``d_1 <= d_2 <= ...``, the neighbors of a movement are first those of
+    its own class, then the others, and where classes are apart the largest ratio ``d_{k+1} / d_k`` lies between them.
+    ``d_{k+1}`` stands for the nearest impostor; the median over movements forgives those whose gap lies elsewhere. k
+    runs from 1 to n / 2, so neither the number of classes nor their sizes are assumed. A fixed k would be within the
+    class for some sizes and beyond it for others.
+
+    This is the gap by which agglomerative clusterings are cut (the largest step of merge heights), looked for around
+    each movement by itself, where the scale is local.
+
+    Returns
+    -------
+    ndarray of shape (R,)
+
+    Raises
+    ------
+    SpecificationError
+        Fewer than three movements, or all the same.
+    """
+    n = len(described)
+    if n < 3:
+        raise SpecificationError(f"expected at least 3 movements to tell kinds apart without labels, got {n}; add some")
+    chosen = evenly_spaced(n, _ROWS)
+    widths = []
+    for r, block in enumerate(described.blocks):
+        squares = described.procrustes.squared_distances(block.take(chosen), block)
+        squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
+        same = _COPIES * _typical_size(described, r)
+        width = _share_of_median(_beyond_the_gap(np.sqrt(np.sort(squares, axis=1)[:, 1:]), same), same)
+        if width is None:
+            raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
+        widths.append(width)
+    return np.array(widths)
+
+
+def median_distances(described: Described) -> Array:
+    """Median distance of two different movements in each representation, (R,); NaN for one movement."""
+    pairs = ~np.eye(len(described), dtype=bool)
+    if not pairs.any():
+        return np.full(len(described.blocks), np.nan)
+    between = (described.procrustes.squared_distances(block, block)[pairs] for block in described.blocks)
+    return np.array([np.sqrt(np.median(squares)) for squares in between])
+
+
+def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: NDArray[np.generic]) -> list[Array]:
+    """Per representation, distances (n,) to the nearest row of another owner; of another `each` if all have one."""
+    own = owners[:, None] == owners
+    if own.all():
+        own = each[:, None] == each
+    found = []
+    for block in described.blocks:
+        squares = described.procrustes.squared_distances(block, block)
+        squares[own] = np.inf
+        found.append(np.sqrt(squares.min(axis=1, initial=np.inf)))
+    return found
+
+
+def _share_of_median(distances: Array, same: float) -> float | None:
+    """The share of the median of those distances that are finite and above `same`; None if none is."""
+    apart = distances[np.isfinite(distances) & (distances > same)]
+    return SHARE * float(np.median(apart)) if len(apart) else None
+
+
+def _typical_size(described: Described, r: int) -> float:
+    """Median norm of the rows of one representation."""
+    return float(np.sqrt(np.median(described.blocks[r].squares)))
+
+
+def _beyond_the_gap(ordered: Array, same: float) -> Array:
+    """First distance (k,) beyond the largest ratio, of distances (k, n - 1) in rising order."""
+    ordered = np.maximum(ordered, same)
+    last = max(2, (ordered.shape[1] + 1) // 2)
+    ratios = np.log(ordered[:, 1:last] / ordered[:, : last - 1])
+    return np.asarray(np.take_along_axis(ordered, ratios.argmax(axis=1)[:, None] + 1, axis=1)[:, 0])

@@ -1,0 +1,14 @@
+# Kernels
+from kineme.kernels.base import Kernel as Kernel
+from kineme.kernels.rbf import RBF as RBF
+from kineme.kernels.truncated import TruncatedEuclidean as TruncatedEuclidean
+from kineme.kernels.laplacian import Laplacian as Laplacian
+from kineme.kernels.canberra import Canberra as Canberra
+from kineme.kernels.distance import DistanceKernel as DistanceKernel
+from kineme.kernels.average import averaged as averaged
+from kineme.kernels.average import Averaged as Averaged
+
+# Tables
+from kineme.kernels.table import KERNELS as KERNELS
+from kineme.kernels.means import MEANS as MEANS
+from kineme.kernels.presets import PAPER_WIDTHS as PAPER_WIDTHS

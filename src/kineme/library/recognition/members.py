@@ -1,0 +1,62 @@
+"""The movements that show a symbol, by class, as recognition needs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.library.storage import read
+from kineme.library.storage.read import Ids
+from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
+from kineme.library.storage.store import Store
+from kineme.movements.trajectories.labels import label_array
+
+
+@dataclass(frozen=True, eq=False)
+class Members:
+    """Movements that show a symbol, ordered by the symbol's name, then by id."""
+
+    ids: Ids  # (m,)
+    names: NDArray[Any]  # (C,), sorted
+    first: NDArray[np.intp]  # (C,)
+
+    @property
+    def labels(self) -> NDArray[Any]:
+        """The name of each one's symbol, (m,)."""
+        return np.repeat(self.names, np.diff(self.first, append=len(self.ids)))
+
+
+def members_of(store: Store) -> Members:
+    """Movements that show a symbol.
+
+    Raises
+    ------
+    SpecificationError
+        There is none.
+    """
+    with store.reading() as connection:
+        query = f"SELECT movement, symbol FROM member WHERE {ALIVE}"
+        try:
+            pairs = np.fromiter(connection.execute(query, {"v": store.as_of}), dtype=np.dtype((np.int64, 2)))
+        except (TypeError, ValueError, OverflowError) as error:
+            raise damage(
+                "movements and symbols as whole numbers in table member", f"something else ({error})"
+            ) from error
+        if not len(pairs):
+            raise SpecificationError(
+                f"expected a library with movements that show a symbol, got none among its {read.count(store)}; "
+                "learn some with labels, or name a proposal"
+            )
+        keys, which = np.unique(pairs[:, 1], return_inverse=True)
+        query = f"SELECT symbol, name FROM symbol_state WHERE {ALIVE} AND {among('symbol')}"
+        named: dict[int, str] = dict(connection.execute(query, {"v": store.as_of, "keys": listed(keys)}))
+    if lost := set(keys.tolist()) - named.keys():
+        raise damaged("symbol", (min(lost),))
+    names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
+    owner = place[which]
+    order = np.lexsort((pairs[:, 0], owner))
+    return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))

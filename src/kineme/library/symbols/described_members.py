@@ -1,0 +1,33 @@
+"""Movements of symbols as anchoring compares them, from the features that are stored."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.comparison.describe import Described, describe_rows
+from kineme.comparison.sampling import evenly_spaced
+from kineme.library.storage import read
+from kineme.library.storage.read import Ids
+from kineme.library.storage.store import Store
+from kineme.library.storage.symbols import symbols
+from kineme.movements.trajectories.labels import label_array
+
+_MOST = 3000  # movements of symbols that are compared, evenly many of each symbol
+
+
+def described(store: Store, ids: ArrayLike) -> Described:
+    """Movements in the representations of the library, from their stored features."""
+    rows = read.features(store, np.asarray(ids, dtype=np.int64))
+    return describe_rows(rows, store.n_dims or 0, store.specification.comparison)
+
+
+def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
+    """At most 3000 movements that show a symbol, evenly many of each, and the names of their symbols."""
+    shown = [symbol for symbol in symbols(store) if len(symbol)]
+    share = max(1, _MOST // max(1, len(shown)))
+    some = [one.members[evenly_spaced(len(one), share)] for one in shown]
+    labels = np.repeat(label_array([one.name for one in shown]), [len(members) for members in some])
+    return np.concatenate([np.empty(0, dtype=np.int64), *some]), labels

@@ -1,0 +1,22 @@
+# Poses
+from kineme.primitives.pose.pose_dmp import PoseDMP as PoseDMP
+from kineme.primitives.pose.pose_primitives import PosePrimitives as PosePrimitives
+from kineme.primitives.pose.pose_rollout import PoseRollout as PoseRollout
+from kineme.primitives.pose.pose_controller import PoseController as PoseController
+from kineme.primitives.pose.pose_controller import PoseState as PoseState
+from kineme.features.pose_features import PoseFeatures as PoseFeatures
+from kineme.primitives.pose.tangent import to_tangent as to_tangent
+from kineme.primitives.pose.tangent import from_tangent as from_tangent
+
+# Quaternions (w, x, y, z)
+from kineme.primitives.pose.quaternions import normalized as normalized
+from kineme.primitives.pose.quaternions import continuous as continuous
+from kineme.primitives.pose.quaternions import product as product
+from kineme.primitives.pose.quaternions import conjugate as conjugate
+from kineme.primitives.pose.quaternions import angle_between as angle_between
+from kineme.primitives.pose.rotation_vectors import exp as exp
+from kineme.primitives.pose.rotation_vectors import log as log
+from kineme.primitives.pose.rotation_vectors import slerp as slerp
+from kineme.primitives.pose.rates import angular_velocity as angular_velocity
+from kineme.primitives.pose.rates import angular_acceleration as angular_acceleration
+from kineme.primitives.pose.rates import rotation_vector_rate as rotation_vector_rate

@@ -1,0 +1,113 @@
+"""`Demonstrations.of` is the one door: whatever holds movements is taken wherever movements are expected."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme import Demonstrations, Trajectory
+
+T = np.linspace(0.0, 2.0, 40)
+X = np.column_stack([np.sin(T), np.cos(3 * T), T**2])
+
+
+def _same(one, other):
+    np.testing.assert_array_equal(one.positions, other.positions)
+    np.testing.assert_array_equal(one.offsets, other.offsets)
+    np.testing.assert_array_equal(one.times, other.times)
+
+
+@pytest.mark.parametrize("one", [X, X[None], [X], np.asfortranarray(X), [X.tolist()]])
+def test_one_array_is_one_movement(one):
+    _same(Demonstrations.of(one), Demonstrations.from_arrays([X]))
+
+
+def test_one_flat_array_is_one_movement_of_one_dimension():
+    _same(Demonstrations.of(X[:, 0]), Demonstrations.from_arrays([X[:, :1]]))
+
+
+def test_a_list_is_always_many_movements():
+    assert len(Demonstrations.of([X[:, 0], X[:, 1]])) == 2
+    assert len(Demonstrations.of([X[:, 0].tolist(), X[:, 1].tolist()])) == 2
+
+
+def test_lists_of_what_holds_movements_are_one_after_the_other():
+    single = Trajectory(T, X, label="a", name="one")
+    pair = Demonstrations([single, Trajectory(T + 5, X[:20].repeat(2, 0), label="b", name="two")])
+    held = SimpleNamespace(demonstrations=pair)
+    demos = Demonstrations.of([single, pair, held])
+    assert demos.labels.tolist() == ["a", "a", "b", "a", "b"]
+    assert demos.names == ("one", "one", "two", "one", "two")
+    _same(demos[[3, 4]], pair)
+    _same(Demonstrations.of(held), pair)
+
+
+def test_more_dimensions_than_samples_are_taken_with_time_stamps():
+    wide = np.random.default_rng(0).normal(size=(20, 63))  # a hand of 21 joints, for less than a second
+    assert Demonstrations.of(Trajectory(np.arange(20) / 30, wide)).n_dims == 63
+    assert Demonstrations.from_arrays([wide], times=[np.arange(20) / 30]).n_dims == 63
+    assert Demonstrations.of(wide[:, :20]).n_dims == 20
+
+
+@pytest.fixture(scope="module")
+def letters():
+    return kineme.load_lasa(["GShape", "CShape", "Line", "NShape"])
+
+
+@pytest.fixture(scope="module")
+def folder(letters, tmp_path_factory):
+    """Four movements of each of four letters in CSV files, a folder for each letter."""
+    folder = tmp_path_factory.mktemp("recordings")
+    for i, one in enumerate(letters):
+        if i % 7 < 4:
+            path = folder / one.label / f"{i}.csv"
+            path.parent.mkdir(exist_ok=True)
+            np.savetxt(
+                path, np.column_stack((one.times, one.positions))[::8], "%.17g", ",", header="t,x,y", comments=""
+            )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recognizer(folder):
+    return kineme.Recognizer().fit(kineme.read_recordings(folder))
+
+
+def test_recordings_are_learned_recognized_and_described(folder, recognizer):
+    recordings = kineme.read_recordings(folder)
+    demos = recordings.demonstrations
+    assert recognizer.classes_.tolist() == ["CShape", "GShape", "Line", "NShape"]
+    assert (recognizer.predict(recordings) == demos.labels).all()
+    np.testing.assert_array_equal(kineme.DMP().learn(recordings).weights, kineme.DMP().learn(demos).weights)
+    rows = kineme.DMPFeatures().fit_transform(recordings)
+    np.testing.assert_array_equal(rows, kineme.DMPFeatures().fit_transform(demos))
+
+
+def test_recordings_and_segmentations_are_sequences_of_movements(folder):
+    recordings = kineme.read_recordings(folder)
+    assert len(recordings) == len(list(recordings)) == 16
+    assert recordings[3].name == recordings.sources[3].path
+    assert recordings[2:5].labels.tolist() == list(recordings.labels[2:5])
+
+
+def test_a_segmentation_is_recognized(letters, recognizer):
+    shown = [letters[4], letters[11], letters[25]]
+    pauses, start, parts, times = np.arange(60) / 100, 0.0, [], []
+    for one in shown:
+        x = one.positions - one.positions[0] + (parts[-1][-1] if parts else 0.0)
+        parts += [x, np.repeat(x[-1:], len(pauses), axis=0)]
+        times += [start + one.times - one.times[0], start + one.duration + 0.01 + pauses]
+        start = times[-1][-1] + 0.01
+    pieces = kineme.segment(Trajectory(np.concatenate(times), np.concatenate(parts)))
+    assert recognizer.predict(pieces).tolist() == [one.label for one in shown]
+    assert [one.name for one in pieces] == list(pieces.demonstrations.names)
+    _same(pieces[1:], pieces.demonstrations[1:])
+
+
+def test_a_library_learns_recordings(folder, tmp_path):
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(kineme.read_recordings(folder))
+        assert [symbol.name for symbol in library.symbols()] == ["CShape", "GShape", "Line", "NShape"]
