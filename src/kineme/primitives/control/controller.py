@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from kineme.errors import SpecificationError
 from kineme.primitives.control import inputs
 from kineme.primitives.control.clock import Clock
+from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.options import Options, limit
+from kineme.primitives.control.options import Options
 from kineme.primitives.control.plan import Influences, Plan
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
@@ -69,9 +70,8 @@ class Controller:
         if not self._fits(self.dt):
             most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
             raise SpecificationError(f"expected dt of at most {most} {self._tau:g} s, got {dt!r} s")
-        self._velocity_limit = limit("velocity_limit", options.velocity_limit, self._n_dims)
-        self._acceleration_limit = limit("acceleration_limit", options.acceleration_limit, self._n_dims)
-        self._limited = self._velocity_limit is not None or self._acceleration_limit is not None
+        self._limits = limits_from(options, self._n_dims)
+        self._limited = self._limits.exist
         self._settle = float(options.settle or plan.settle)
         self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
         self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
@@ -157,7 +157,7 @@ class Controller:
         self._move(dt, push, last)
         derivatives = self._derivatives()
         if self._limited:
-            self._check_limits(velocity_before, *derivatives, dt)
+            self._events |= self._limits.exceeded(velocity_before, *derivatives, dt)
         self.state = self._report(*derivatives)
 
     def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
@@ -271,14 +271,6 @@ class Controller:
         """Velocity and acceleration in time, as the state reports them."""
         return self._motion[1] * self._rate, self._motion[2] * (self._rate * self._rate)
 
-    def _check_limits(self, velocity_before: Array, velocity: Array, acceleration: Array, dt: float) -> None:
-        if self._velocity_limit is not None and (np.abs(velocity) > self._velocity_limit).any():
-            self._events |= Status.VELOCITY_LIMIT
-        if self._acceleration_limit is not None:
-            largest = np.maximum(np.abs(acceleration), np.abs(velocity - velocity_before) / dt)
-            if (largest > self._acceleration_limit).any():
-                self._events |= Status.ACCELERATION_LIMIT
-
     def _report(self, velocity: Array, acceleration: Array) -> State:
         x, clock = self._motion[0], self._clock
         origin, goal = self._origin, self._goal.now
@@ -290,7 +282,7 @@ class Controller:
             status = Status.PAUSED
         elif not self._plan.periodic and self._clock.u >= 1.0 and self._rests():
             status = Status.SETTLED
-        return status if self._events is _NOTHING else status | self._events
+        return status if not self._events else status | self._events
 
     def _rests(self) -> bool:
         distance, slope = self._motion[0] - self._goal.target, self._motion[1]

@@ -78,7 +78,7 @@ def one_vector(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
     """A start, goal or velocity of one movement as finite (d,)."""
     if value is None:
         return None
-    array = _numbers(name, value)
+    array = numbers(name, value)
     array = array[None] if array.ndim == 0 else array  # a number serves one dimension
     if array.shape != (n_dims,) or not np.isfinite(array).all():
         raise SpecificationError(f"expected {name} to be {n_dims} finite numbers, one per dimension, got {value!r}")
@@ -93,17 +93,8 @@ def check_one(n_primitives: int) -> None:
         )
 
 
-def limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
-    """A limit as positive (d,), from a number or one per dimension."""
-    if value is None:
-        return None
-    array = _numbers(name, value)
-    if array.shape not in ((), (n_dims,)) or not (array > 0).all():
-        raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
-    return np.broadcast_to(array, n_dims)
-
-
-def _numbers(name: str, value: ArrayLike) -> Array:
+def numbers(name: str, value: ArrayLike) -> Array:
+    """What a user typed as an array of numbers."""
     try:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
