@@ -282,7 +282,7 @@ class Controller:
             status = Status.PAUSED
         elif not self._plan.periodic and self._clock.u >= 1.0 and self._rests():
             status = Status.SETTLED
-        return status if not self._events else status | self._events
+        return status if self._events is _NOTHING else status | self._events
 
     def _rests(self) -> bool:
         distance, slope = self._motion[0] - self._goal.target, self._motion[1]
