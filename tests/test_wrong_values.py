@@ -131,7 +131,11 @@ def _rhythmic_controller(**wish):
 
 
 def _names(function):
-    return [name for name in inspect.signature(function).parameters if name != "self"]
+    return [
+        one.name
+        for one in inspect.signature(function).parameters.values()
+        if one.name != "self" and one.kind != one.VAR_KEYWORD
+    ]
 
 
 _ROLLOUT = ["start", "goal", "duration", "velocity", "rate", "n_samples", "settle"]

@@ -42,9 +42,9 @@ from kineme.comparison.normalization import SCALES, Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.similarity import compare
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
-from kineme.features.rows import FEATURES
 from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.preparation.arc_length import resample_by_arc_length
@@ -139,7 +139,7 @@ def feature_row(formulation: str, feature: str, fit: str, dtype: str = "float64"
     scales = not (formulation == "original" and feature != "shape-attractor")
 
     def call(demos: Demonstrations) -> list[dict[str, Any]]:
-        rows = DMPFeatures(feature, formulation, 20, fit_to=fit, n_points=50, dtype=dtype).fit(demos).transform(demos)
+        rows = DMPFeatures(feature, DMP(formulation, 20, fit=fit, n_points=50), dtype=dtype).fit(demos).transform(demos)
         assert rows.dtype == dtype
         return each(len(demos), rows=by_extent(demos, rows) / 100 if scales else rows)
 
@@ -361,7 +361,8 @@ def rhythms_live(demos: Demonstrations) -> list[dict[str, Any]]:
 
 def rhythmic_features(demos: Demonstrations) -> list[dict[str, Any]]:
     shape, forcing = (
-        RhythmicFeatures(feature, align_on=0).fit(demos).transform(demos) for feature in ("shape-attractor", "forcing")
+        RhythmicFeatures(feature, RhythmicDMP(align_on=0)).fit(demos).transform(demos)
+        for feature in ("shape-attractor", "forcing")
     )
     return each(len(demos), shape=by_extent(demos, shape) / 100, forcing=forcing / 100)
 

@@ -65,7 +65,7 @@ def test_the_chosen_quadrature_has_converged():
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_learning_a_generated_path_converges_with_the_points(make_movement, formulation):
     """The path is one of the basis, so what is left is the differences': first order, from the ends."""
-    dmp = DMP(formulation, 8, phase_end=0.2, regression="ridge", ridge=0.0)
+    dmp = DMP(formulation, 8, phase_end=0.2, fit="forcing", regression="ridge", ridge=0.0)
     path = dmp.learn([make_movement(3)[1]]).rollout(n_samples=3201).positions
     errors = []
     for n_points in (201, 401, 801):

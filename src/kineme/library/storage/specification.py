@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 _MOST = 100_000  # dimensions
 
-#: The default primitives of a library: a fit of the path itself, which replays the demonstration.
-DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
-
 
 @dataclass(frozen=True)
 class Specification:
@@ -41,7 +38,7 @@ class Specification:
     mean: str = "arithmetic"
     classifier: str = "auto"
     weights: str | tuple[float, ...] = "auto"
-    dmp: DMP = DEFAULT_DMP
+    dmp: DMP = field(default_factory=DMP)
 
     @classmethod
     def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
@@ -58,7 +55,7 @@ class Specification:
         chosen["representations"] = DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
         if not isinstance(weights := chosen.get("weights", "auto"), str):
             chosen["weights"] = tuple(map(float, weights))
-        made = cls(**chosen, dmp=dmp or DEFAULT_DMP)
+        made = cls(**chosen, dmp=dmp or DMP())
         made.check()
         return made
 
