@@ -14,12 +14,13 @@ from kineme.anchoring.clustering.tree import average_linkage, cut_at
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
 from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
+from kineme.comparison.compared import nearest, score
 from kineme.comparison.describe import Described
 from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.answer import known_labels
-from kineme.recognition.conformal import REACH
+from kineme.recognition.conformal import REACH, check_error_rate
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array, check_count
@@ -81,26 +82,29 @@ def place(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members
     check_count("min_members", min_members, 2)
     known = symbols if isinstance(symbols, Recognizer) else Recognizer().fit(symbols)
     demos = Demonstrations.of(movements)
-    p = known.p_values(demos, error_rate)
-    labels = known_labels(known.classes_, known.decision_function(demos), p, error_rate)
+    check_error_rate(error_rate)
+    described = known.describe(demos)
+    near, scores = score(known.comparison_, known.references_, described, nearest, known.classifier_.scores)
+    p = known.calibration().p_values(near, error_rate)
+    labels = known_labels(known.classes_, scores, p, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
-    proposals = _among_unknown(known, demos, unknown, min_members)
+    proposals = _among_unknown(known, described, unknown, min_members)
     return Placement(labels, p.max(axis=1), proposals)
 
 
-def _among_unknown(known: Recognizer, demos: Demonstrations, unknown: NDArray[np.intp], min_members: int) -> Proposals:
+def _among_unknown(known: Recognizer, everything: Described, unknown: NDArray[np.intp], min_members: int) -> Proposals:
     """Kinds among the unknown; where they are many, among a spread sample, which the others join by their nearest."""
     n = len(unknown)
     if n < min_members:
         none = np.full(n, -1, dtype=np.intp)
-        return _at(unknown, describe_clusters(np.eye(n), none, np.empty(0), known.widths_), len(demos))
-    described = known.describe(demos[unknown])
-    limit, similarity = largest_clustered(demos.n_dims), known.comparison_.similarity
+        return _at(unknown, describe_clusters(np.eye(n), none, np.empty(0), known.widths_), len(everything))
+    described = everything.take(unknown)
+    limit, similarity = largest_clustered(everything.n_dims), known.comparison_.similarity
     if n <= limit:
-        return _at(unknown, _that_agree(known, described, min_members)[1], len(demos))
+        return _at(unknown, _that_agree(known, described, min_members)[1], len(everything))
     sample, _ = spread_sample(described, limit)
     K, found = _that_agree(known, described.take(sample), min_members)
-    return _at(unknown, assign(described, sample, K, found, similarity), len(demos))
+    return _at(unknown, assign(described, sample, K, found, similarity), len(everything))
 
 
 def _that_agree(known: Recognizer, described: Described, min_members: int) -> tuple[Array, Proposals]:

@@ -1,4 +1,4 @@
-"""Movements without a symbol that are recognized as one."""
+"""Assign movements without a symbol to the symbols that they are recognized as."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from kineme.recognition.recognizer import Recognizer
 
 
 def recognizer_of_symbols(store: Store) -> Recognizer:
-    """A recognizer of the symbols, fitted to at most 3000 of their movements, evenly many of each symbol."""
+    """A recognizer of the symbols, fitted to at most 3000 of their members, equally many of each."""
     ids, labels = evenly_many_members(store)
     return store.specification.recognizer().fit(read.movements(store, ids), labels)
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> dict[str, Ids]:
-    """Name of a symbol -> the movements without one that are recognized as it."""
+    """Name of a symbol -> the unlabeled movements that are recognized as it."""
     unlabeled = read.unlabeled_ids(store)
     if not len(unlabeled) or not any(map(len, symbols(store))):
         return {}
@@ -33,7 +33,7 @@ def recognized(store: Store, error_rate: float = 0.05) -> dict[str, Ids]:
 
 
 def assign_recognized(store: Store, found: Mapping[str, Ids]) -> dict[str, int]:
-    """Assign movements to symbols, as `recognized` has found them; how many to each."""
+    """Assign the movements of `recognized` to their symbols; return the numbers per symbol."""
     for name, members in found.items():
         changes.assign(store, members, name, "recognized")
     return {name: len(members) for name, members in found.items()}
