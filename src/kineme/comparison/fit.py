@@ -1,4 +1,4 @@
-"""From labeled movements to a fitted comparison and the movements as references."""
+"""Fit a comparison to labeled movements, which become its references."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def fit_comparison(
     if fitted and candidates is not None:
         specification = replace(specification, representations=candidates)
     procrustes = specification.procrustes(demos.n_dims)
-    with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
+    with single_threaded_blas():  # products of few rows: a second thread mostly waits
         described = prepare(feature_rows(demos, specification), specification, procrustes)
         similarity = AveragedSimilarity(procrustes, impostor_widths(described, labels), specification.mean)
         if fitted:
