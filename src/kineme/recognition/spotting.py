@@ -27,9 +27,7 @@ _MIN_SAMPLES = 8
 _TEMPO = 1.5  # one standard deviation of the ratio of durations, for one person's movements of one class
 _MAX_TEMPO = 3.0  # largest ratio of durations that is considered
 _IMPOSTOR = -4.0  # log similarity of a typical impostor: the kernels' width is 0.35 of its distance
-_PER_MOVEMENT = (
-    0.5  # cost of a movement, in typical durations: it scores above 0 if closer than half way to an impostor
-)
+_PER_MOVEMENT = 0.5  # cost in typical durations: positive scores from half way to an impostor on
 
 
 class Spotted(NamedTuple):
