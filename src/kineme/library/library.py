@@ -345,8 +345,8 @@ class ActionLibrary:
         """Propose symbols for the movements without one, or for `ids`; a person names them.
 
         Where there are symbols, these measure how alike movements of one symbol are, see
-        `kineme.anchoring.proposals.assign.place`; else, and where `method` or `n_clusters` is given, the movements are
-        clustered, see `kineme.anchoring.proposals.propose.propose`. A proposal is left out if four fifths of its
+        `kineme.anchoring.assign`; else, and where `method` or `n_clusters` is given, the movements are
+        clustered, see `kineme.anchoring.propose`. A proposal is left out if four fifths of its
         movements were in one proposal that was rejected. Fewer than three movements make no proposal.
         """
         from kineme.library.symbols.proposals import propose
