@@ -60,7 +60,7 @@ def _exact(rows: Array, labels: Any, test: Array, truth: Any) -> float:
 def _rows() -> tuple[Array, Any]:
     """Forcing terms of the LASA movements, thinned, each column of unit spread."""
     lasa = kineme.load_lasa()
-    rows = kineme.DMPFeatures("forcing", formulation="bio-inspired", n_samples=N_SAMPLES).fit_transform(lasa)
+    rows = kineme.DMPFeatures("forcing", kineme.DMP(fit="forcing", n_basis=80), n_samples=N_SAMPLES).fit_transform(lasa)
     return (rows - rows.mean(axis=0)) / rows.std(axis=0), lasa.labels
 
 

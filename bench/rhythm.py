@@ -61,7 +61,7 @@ def _activities() -> list[Row]:
     euclidean = _accuracy(lambda demos: demos.positions.reshape(len(demos), -1), train, test)
     transformers: dict[str, Any] = {"discrete DMPFeatures": DMPFeatures()}
     for feature in ("shape-attractor", "forcing", "weights"):
-        transformers[f"RhythmicFeatures {feature}"] = RhythmicFeatures(feature, aperiodic="accept")
+        transformers[f"RhythmicFeatures {feature}"] = RhythmicFeatures(feature, RhythmicDMP(aperiodic="accept"))
     for name, transformer in transformers.items():
         ours = _accuracy(transformer.fit(train).transform, train, test)
         what = f"BasicMotions, 1-NN, 40 test: {name}"

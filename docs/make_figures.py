@@ -78,7 +78,7 @@ def many_goals() -> Figure:
 
 def around_obstacles() -> Figure:
     """A handwritten G and its replay around two obstacles."""
-    primitive = kineme.DMP("bio-inspired", fit="trajectory").learn(kineme.load_lasa(["GShape"])[3:4])
+    primitive = kineme.DMP().learn(kineme.load_lasa(["GShape"])[3:4])
     obstacles = np.array([[-27.0, 0.0], [10.0, -21.0]])
     figure = new_figure(4.2, 3.8)
     axes = figure.subplots()
@@ -96,7 +96,7 @@ def around_obstacles() -> Figure:
 
 def styles() -> Figure:
     """Movements between two styles that were recorded under one name."""
-    return draw_morph(kineme.DMP("bio-inspired").learn(kineme.load_lasa(["Multi_Models_3"])))
+    return draw_morph(kineme.DMP().learn(kineme.load_lasa(["Multi_Models_3"])))
 
 
 FIGURES = {

@@ -13,7 +13,7 @@ from kineme.primitives.discrete.formulations import FORMULATIONS
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_each_letter_is_nearest_to_one_of_its_own(formulation):
     demos = load_lasa(PAPER_LETTERS)
-    rows = DMPFeatures("shape-attractor", formulation).fit_transform(demos)
+    rows = DMPFeatures("shape-attractor", DMP(formulation)).fit_transform(demos)
     distances = np.linalg.norm(rows[:, None] - rows, axis=2)
     np.fill_diagonal(distances, np.inf)
     assert (demos.labels[distances.argmin(axis=1)] == demos.labels).all()
@@ -22,12 +22,12 @@ def test_each_letter_is_nearest_to_one_of_its_own(formulation):
 @pytest.mark.parametrize(
     ("dmp", "median", "worst"),
     [
-        (DMP(), 0.003, 0.006),
-        (DMP("original"), 0.003, 0.006),
-        (DMP(regression="ridge"), 0.0006, 0.003),
-        (DMP(fit="trajectory", n_basis=40), 0.0006, 0.0015),
+        (DMP(fit="forcing", n_basis=80), 0.003, 0.006),
+        (DMP("original", fit="forcing", n_basis=80), 0.003, 0.006),
+        (DMP(fit="forcing", n_basis=80, regression="ridge"), 0.0006, 0.003),
+        (DMP(), 0.0006, 0.0015),
     ],
-    ids=["local", "original", "ridge", "trajectory"],
+    ids=["local", "original", "ridge", "default"],
 )
 def test_lasa_is_reconstructed_within_the_stated_share_of_its_extent(dmp, median, worst):
     demos = load_lasa()

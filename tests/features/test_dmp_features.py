@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -42,7 +44,7 @@ def demos(make_movement):
 
 @pytest.mark.parametrize("feature", FEATURES)
 def test_rows_are_eq_9_dimension_after_dimension(demos, feature):
-    rows = DMPFeatures(feature, n_basis=12, n_samples=20).fit_transform(demos)
+    rows = DMPFeatures(feature, DMP(n_basis=12), n_samples=20).fit_transform(demos)
     learned = DMP(n_basis=12).learn(demos)
     values = {
         "weights": learned.weights,
@@ -54,13 +56,56 @@ def test_rows_are_eq_9_dimension_after_dimension(demos, feature):
         np.testing.assert_array_equal(row, [*x, *y])
 
 
-def test_every_parameter_of_the_specification_is_passed_on(demos):
-    choices = {
-        "formulation": "original", "n_basis": 9, "stiffness": 50.0, "damping": 9.0, "gating": "phase",
-        "regression": "ridge", "ridge": 1e-3, "phase_end": 0.02, "overlap": 0.5, "n_points": 70,
-        "preprocessing": (TrimRest(), Smooth(9.0)),
+CHOICES = {
+    "formulation": "original", "n_basis": 9, "stiffness": 50.0, "damping": 9.0, "gating": "phase", "fit": "forcing",
+    "regression": "ridge", "ridge": 1e-3, "phase_end": 0.02, "overlap": 0.5, "n_points": 70,
+    "preprocessing": (TrimRest(), Smooth(9.0)),
+}  # fmt: skip
+
+
+def test_every_field_of_the_specification_is_a_parameter(demos):
+    assert list(CHOICES) == [field.name for field in fields(DMP)]
+    features = DMPFeatures().set_params(**{f"dmp__{name}": value for name, value in CHOICES.items()})
+    assert features.fit(demos).dmp_ == DMP(**CHOICES)
+    assert features.get_params() == {
+        "feature": "shape-attractor", "dmp": DMP(**CHOICES), "n_samples": 100, "dtype": "float64",
+        **{f"dmp__{name}": value for name, value in CHOICES.items()},
     }  # fmt: skip
-    assert DMPFeatures(fit_to="trajectory", **choices).fit(demos).dmp_ == DMP(fit="trajectory", **choices)
+
+
+def test_keywords_of_earlier_versions_are_understood(demos):
+    old = {"fit_to" if name == "fit" else name: value for name, value in CHOICES.items()}
+    with pytest.warns(DeprecationWarning, match=r"fit_to.* of DMPFeatures .*write DMPFeatures\(dmp=kineme.DMP\(.*fit="):
+        assert DMPFeatures(**old).fit(demos).dmp_ == DMP(**CHOICES)
+    with pytest.warns(DeprecationWarning, match="dmp__n_basis in set_params and searches"):
+        assert DMPFeatures(dmp=DMP("original")).set_params(n_basis=7).dmp == DMP("original", 7)
+    with pytest.warns(DeprecationWarning, match="formulation of DMPFeatures"):
+        assert DMPFeatures("weights", "original").dmp == DMP("original")
+
+
+def test_setting_a_field_leaves_the_specification_that_was_given():
+    dmp = DMP("original")
+    first, second = DMPFeatures(dmp=dmp), DMPFeatures(dmp=dmp)
+    first.set_params(dmp__n_basis=7)
+    assert (first.dmp.n_basis, second.dmp.n_basis, dmp.n_basis) == (7, 40, 40)
+
+
+def test_names_that_are_no_parameters_are_refused():
+    with pytest.raises(TypeError, match="DMPFeatures has no parameter 'basis'"):
+        DMPFeatures(basis=9)
+    with pytest.raises(ValueError, match="Invalid parameter 'basis'"):
+        DMPFeatures().set_params(basis=9)
+    with pytest.raises(ValueError, match=r"DMP has no parameter 'basis'; it has \['formulation', 'n_basis'"):
+        DMPFeatures().set_params(dmp__basis=9)
+    with pytest.raises(SpecificationError, match=r"expected dmp to be a kineme.DMP, got 80; write DMPFeatures"):
+        DMPFeatures(dmp=80).fit([np.eye(5)])
+
+
+def test_rows_come_as_a_data_frame_where_asked(demos):
+    pytest.importorskip("pandas")
+    frame = DMPFeatures(n_samples=6).set_output(transform="pandas").fit_transform(demos)
+    assert frame.shape == (15, 12)
+    assert list(frame.columns[[0, 6]]) == ["x_1", "y_1"]
 
 
 def test_defaults_are_those_of_the_specification(demos):
@@ -68,14 +113,14 @@ def test_defaults_are_those_of_the_specification(demos):
 
 
 def test_cloning_keeps_parameters_and_forgets_the_fit(demos):
-    features = DMPFeatures("weights", "original", 7, preprocessing=(TrimRest(0.02),)).fit(demos)
+    features = DMPFeatures("weights", DMP("original", 7, preprocessing=(TrimRest(0.02),))).fit(demos)
     copy = clone(features)
     assert copy.get_params() == features.get_params()
     assert not hasattr(copy, "dmp_")
 
 
 def test_parameters_are_set_by_name(demos):
-    features = DMPFeatures().set_params(feature="weights", n_basis=11)
+    features = DMPFeatures().set_params(feature="weights", dmp__n_basis=11)
     assert features.fit_transform(demos).shape == (15, 22)
 
 
@@ -83,8 +128,8 @@ def test_a_grid_search_over_features_formulations_and_sizes_runs(demos):
     model = Pipeline([("features", DMPFeatures()), ("classify", KNeighborsClassifier(1))])
     grid = {
         "features__feature": FEATURES,
-        "features__formulation": ["original", "bio-inspired"],
-        "features__n_basis": [8, 16],
+        "features__dmp__formulation": ["original", "bio-inspired"],
+        "features__dmp__n_basis": [8, 16],
     }
     search = GridSearchCV(model, grid, cv=2, error_score="raise").fit(demos, demos.labels)
     assert len(search.cv_results_["params"]) == 12
@@ -93,7 +138,7 @@ def test_a_grid_search_over_features_formulations_and_sizes_runs(demos):
 
 def test_demonstrations_and_a_list_of_arrays_cross_validate_alike(demos):
     block = [one.positions for one in demos]
-    model = make_pipeline(DMPFeatures(n_basis=15), KNeighborsClassifier(1))
+    model = make_pipeline(DMPFeatures(dmp=DMP(n_basis=15)), KNeighborsClassifier(1))
     scores = cross_val_score(model, demos, demos.labels, cv=3, error_score="raise")
     assert scores.tolist() == [1.0, 1.0, 1.0]
     assert cross_val_score(model, block, demos.labels, cv=3, error_score="raise").tolist() == [1.0, 1.0, 1.0]
@@ -102,7 +147,7 @@ def test_demonstrations_and_a_list_of_arrays_cross_validate_alike(demos):
 @pytest.mark.parametrize(("n_dims", "axes"), [(1, "x"), (2, "xy"), (3, "xyz"), (4, ["q1", "q2", "q3", "q4"])])
 @pytest.mark.parametrize("feature", FEATURES)
 def test_names_say_axis_and_number_of_each_column(make_movement, feature, n_dims, axes):
-    features = DMPFeatures(feature, n_basis=5, n_samples=6)
+    features = DMPFeatures(feature, DMP(n_basis=5), n_samples=6)
     rows = features.fit_transform([make_movement(0, n_dims)[1]])
     size = 5 if feature == "weights" else 6
     assert features.get_feature_names_out().tolist() == [f"{axis}_{k}" for axis in axes for k in range(1, size + 1)]
@@ -110,8 +155,8 @@ def test_names_say_axis_and_number_of_each_column(make_movement, feature, n_dims
 
 
 def test_names_belong_to_the_fit(demos):
-    features = DMPFeatures("weights", n_basis=5).fit(demos)
-    features.set_params(n_basis=50)
+    features = DMPFeatures("weights", DMP(n_basis=5)).fit(demos)
+    features.set_params(dmp__n_basis=50)
     assert len(features.get_feature_names_out()) == features.transform(demos).shape[1]
 
 
@@ -148,8 +193,6 @@ def test_single_precision_is_the_rounded_double(demos):
         ({"feature": "f"}, r"feature to be one of \['shape-attractor', 'forcing', 'weights'\], got 'f'"),
         ({"n_samples": 1}, "n_samples to be a whole number of at least 2, got 1"),
         ({"dtype": "int"}, r"dtype to be one of \['float64', 'float32'\], got 'int'"),
-        ({"formulation": "Original"}, r"formulation to be one of \['original', 'bio-inspired', .*got 'Original'"),
-        ({"fit_to": "path"}, r"fit to be one of \['forcing', 'trajectory'\], got 'path'"),
     ],
 )
 def test_parameters_out_of_range_are_refused_in_fit(demos, parameters, message):
@@ -168,8 +211,8 @@ def test_closed_movements_are_refused_where_the_feature_divides(demos):
     u = np.linspace(0, 2 * np.pi, 60)
     loop = [np.column_stack((np.sin(u), np.cos(u)))]
     with pytest.raises(DegenerateMovementError, match=r'trajectory 0: .*use feature "shape-attractor"'):
-        DMPFeatures("weights", "original").fit(demos).transform(loop)
-    assert np.isfinite(DMPFeatures("shape-attractor", "original").fit(demos).transform(loop)).all()
+        DMPFeatures("weights", DMP("original")).fit(demos).transform(loop)
+    assert np.isfinite(DMPFeatures("shape-attractor", DMP("original")).fit(demos).transform(loop)).all()
 
 
 def test_errors_are_those_of_kineme(demos):

@@ -32,7 +32,7 @@ def test_rhythms_are_told_apart_wherever_they_begin(demos, feature):
 
 
 def test_rows_are_the_primitives_features_dimension_after_dimension(demos):
-    transformer = RhythmicFeatures("forcing", n_samples=30, align_on=0)
+    transformer = RhythmicFeatures("forcing", RhythmicDMP(align_on=0), n_samples=30)
     rows = transformer.fit_transform(demos)
     learned = RhythmicDMP(align_on=0).learn(demos)
     np.testing.assert_array_equal(rows, learned.forcing(30).transpose(0, 2, 1).reshape(len(demos), -1))
@@ -51,10 +51,14 @@ def test_dimensions_that_are_alike_do_not_take_turns(demos):
 
 
 def test_parameters_are_passed_on_and_cloned(demos):
-    choices = {"n_basis": 9, "stiffness": 50.0, "damping": 9.0, "fit_to": "forcing", "ridge": 1e-3, "n_points": 70}
+    choices = {"n_basis": 9, "stiffness": 50.0, "damping": 9.0, "fit": "forcing", "ridge": 1e-3, "n_points": 70}
     choices |= {"overlap": 0.4, "align_on": 1, "aperiodic": "accept", "preprocessing": (), "period": 0.4}
-    dmp = clone(RhythmicFeatures(**choices)).fit(demos).dmp_
-    assert dmp == RhythmicDMP(fit=choices.pop("fit_to"), **choices)
+    assert clone(RhythmicFeatures(dmp=RhythmicDMP(**choices))).fit(demos).dmp_ == RhythmicDMP(**choices)
+    nested = {f"dmp__{name}": value for name, value in choices.items()}
+    assert clone(RhythmicFeatures().set_params(**nested)).fit(demos).dmp_ == RhythmicDMP(**choices)
+    choices["fit_to"] = choices.pop("fit")  # as in earlier versions
+    with pytest.warns(DeprecationWarning, match=r"RhythmicFeatures\(dmp=kineme.RhythmicDMP"):
+        assert RhythmicFeatures(**choices).fit(demos).dmp_.fit == "forcing"
 
 
 def test_other_dimensions_and_types(demos):

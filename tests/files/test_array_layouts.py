@@ -10,7 +10,7 @@ from scipy.io import savemat
 import kineme
 from kineme.files.arrays.arrays import arrays_movements
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.layout import Layout
 
 T = np.arange(5) / 10
 X = np.column_stack((T, T**2, 1 - T))

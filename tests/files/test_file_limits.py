@@ -15,7 +15,7 @@ import kineme
 from kineme.files import limits
 from kineme.files.limits import VARIABLE, max_file_bytes
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.layout import Layout
 from limited_child import MIB, LimitedChild
 
 T = np.arange(6) / 100

@@ -8,8 +8,8 @@ import pytest
 
 import kineme
 from kineme.files.recordings import read_recordings_from_bytes
-from kineme.files.tables.columns import choose_roles
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.columns import choose_roles
+from kineme.movements.tables.layout import Layout
 
 HEADS = ["t", *(f"v_{k}" for k in range(8000))]
 

@@ -10,8 +10,8 @@ from pyarrow import parquet
 
 import kineme
 from kineme.files.recordings import read_recordings_from_bytes
-from kineme.files.tables.layout import Layout
 from kineme.files.tables.parquet import _texts
+from kineme.movements.tables.layout import Layout
 
 T = np.arange(6) / 100
 X = T**2

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import kineme
 from kineme.files.recordings import read_recordings_from_bytes
 from kineme.files.tables import text_table, tolerant_table
-from kineme.files.tables.layout import Layout
 from kineme.files.tables.text_table import read_text_table
+from kineme.movements.tables.layout import Layout
 
 
 def outcome(data, layout=Layout()):  # noqa: B008 - frozen

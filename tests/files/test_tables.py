@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import kineme
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
-from kineme.files.tables.columns import choose_roles, is_time
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.columns import choose_roles, is_time
+from kineme.movements.tables.layout import Layout
 
 SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
 

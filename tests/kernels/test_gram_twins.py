@@ -9,8 +9,8 @@ from kernel_samples import ALL, KINDS, rows
 
 from kineme.kernels import averaged
 
-# Around the register block (4 features), the panel (128 columns) and the tile (256 rows).
-SHAPES = [(1, 1, 2), (1, 130, 6), (3, 1, 10), (127, 129, 8), (257, 5, 14), (300, 131, 2)]
+# Around the register block (4 rows, 2 features), the panel (64 or 128 columns) and the tile (256 rows).
+SHAPES = [(1, 1, 2), (1, 130, 6), (3, 1, 10), (127, 129, 8), (257, 5, 14), (300, 131, 2), (6, 65, 10), (5, 63, 14)]
 
 
 def both(kernel, A, B, monkeypatch):

@@ -42,9 +42,9 @@ from kineme.comparison.normalization import SCALES, Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.similarity import compare
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
-from kineme.features.rows import FEATURES
 from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.preparation.arc_length import resample_by_arc_length
@@ -139,7 +139,7 @@ def feature_row(formulation: str, feature: str, fit: str, dtype: str = "float64"
     scales = not (formulation == "original" and feature != "shape-attractor")
 
     def call(demos: Demonstrations) -> list[dict[str, Any]]:
-        rows = DMPFeatures(feature, formulation, 20, fit_to=fit, n_points=50, dtype=dtype).fit(demos).transform(demos)
+        rows = DMPFeatures(feature, DMP(formulation, 20, fit=fit, n_points=50), dtype=dtype).fit(demos).transform(demos)
         assert rows.dtype == dtype
         return each(len(demos), rows=by_extent(demos, rows) / 100 if scales else rows)
 
@@ -350,18 +350,10 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
     return Batched(f"RhythmicDMP.learn {dmp.fit}", call, 1e-6, draw=rhythms)
 
 
-def rhythms_live(demos: Demonstrations) -> list[dict[str, Any]]:
-    """Steps of a fiftieth of each period: a step is as long for all, so the recordings are given one duration."""
-    alike = Demonstrations.from_arrays([one.positions for one in demos])
-    primitives = RhythmicDMP(period=0.5).learn(alike)
-    controller = primitives.controller(0.01, phase=primitives.phases)
-    path = np.stack([np.array(controller.step()) for _ in range(30)], axis=1)
-    return each(len(demos), path=by_extent(alike, path - primitives.baselines[:, None]))
-
-
 def rhythmic_features(demos: Demonstrations) -> list[dict[str, Any]]:
     shape, forcing = (
-        RhythmicFeatures(feature, align_on=0).fit(demos).transform(demos) for feature in ("shape-attractor", "forcing")
+        RhythmicFeatures(feature, RhythmicDMP(align_on=0)).fit(demos).transform(demos)
+        for feature in ("shape-attractor", "forcing")
     )
     return each(len(demos), shape=by_extent(demos, shape) / 100, forcing=forcing / 100)
 
@@ -489,7 +481,6 @@ TABLE = [
     ),
     Batched("RandomBinning", binned, 1e-12, draw=rows),
     *(rhythm_row(RhythmicDMP(fit=fit)) for fit in FITS),
-    Batched("RhythmicPrimitives.controller", rhythms_live, 1e-8, draw=rhythms),
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),
     Batched("PoseDMP.learn", pose_numbers, 1e-6, draw=poses),
     Batched("to_tangent", tangents, 1e-12, draw=poses),

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from movement_samples import draw_shapes
 
 import kineme
 from kineme import Recognizer, SpecificationError, Trajectory, TrajectoryError
@@ -80,6 +81,15 @@ def test_segments_are_in_order_apart_and_say_how_sure_they_are():
     assert (np.diff(bounds) > -2 / RATE).all()
     assert all(0.0 <= one.confidence <= 1.0 for one in found)
     assert {one.label for one in found} <= {*KNOWN, None}
+
+
+@pytest.mark.parametrize("labels", [[3, 4, 5], ["a", "b", "c"], np.array(["a", "b", "c"])])
+def test_labels_are_plain_numbers_and_texts(labels):
+    demos = draw_shapes([1, 1, 1])
+    recording = Trajectory(np.linspace(0.0, 1.0, 80), demos[1].positions)
+    (found,) = Recognizer().fit(demos, labels).spot(recording)
+    assert found.label == labels[1]
+    assert type(found.label) is type(np.asarray(labels).tolist()[1])
 
 
 def test_unit_place_and_origin_of_time_do_not_matter():

@@ -8,7 +8,16 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from kineme.cli.options import Finite, Numbers, SymbolName, json_option, library_option_of, whole
+from kineme.cli.options import (
+    SPECIFICATION,
+    Finite,
+    Numbers,
+    SymbolName,
+    json_option,
+    library_option_of,
+    specification_options,
+    whole,
+)
 from kineme.cli.output import write_bytes
 from kineme.output.text import printable
 
@@ -29,8 +38,7 @@ from kineme.output.text import printable
     show_default=True,
     help="Number of the primitive in a file with several, from 0.",
 )
-@click.option("--formulation", default="bio-inspired", show_default=True, help="Formulation for a recording.")
-@click.option("--n-basis", type=int, default=40, show_default=True, help="Number of basis functions for a recording.")
+@specification_options
 @click.option(
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
 )
@@ -77,7 +85,7 @@ def _primitive(options: dict[str, Any]) -> Any:
             f"expected a recording or a saved primitive, found no file {printable(source)}; "
             "for a symbol, name its --library"
         )
-    dmp = DMP(options["formulation"], n_basis=options["n_basis"], fit="trajectory")
+    dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     primitives = primitives_from(Path(source), dmp)
     if options["index"] >= len(primitives):
         raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")

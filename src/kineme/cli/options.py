@@ -91,3 +91,31 @@ def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
 
 library_option = library_option_of(required=True, words="Folder of the action library.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")
+
+
+class SpecificationOption(click.Option):
+    """The option ``--n-basis`` and so on: a field of `kineme.DMP`, whose default it reads when it is asked for."""
+
+    def get_default(self, ctx: click.Context, call: bool = True) -> Any:
+        """The default of the field."""
+        from dataclasses import fields
+
+        from kineme.primitives.discrete.dmp import DMP
+
+        return next(field.default for field in fields(DMP) if field.name == self.name)
+
+
+#: Fields of `kineme.DMP` that are options, with their types and what the help says of them.
+SPECIFICATION: dict[str, tuple[type, str]] = {
+    "formulation": (str, "Formulation"),
+    "fit": (str, "What is fitted, trajectory or forcing,"),
+    "n_basis": (int, "Number of basis functions"),
+}
+
+
+def specification_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add an option for each field of `SPECIFICATION`."""
+    for name, (kind, words) in reversed(SPECIFICATION.items()):
+        flag, text = f"--{name.replace('_', '-')}", f"{words} for a recording."
+        command = click.option(flag, type=kind, cls=SpecificationOption, show_default=True, help=text)(command)
+    return command

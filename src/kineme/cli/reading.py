@@ -60,7 +60,7 @@ def read(path: Path, options: dict[str, Any]) -> Any:
     """Read recordings from a folder, a file, or - the standard input, with the `layout_options`."""
     from kineme.files.limits import read_limited
     from kineme.files.recordings import read_recordings, read_recordings_from_bytes
-    from kineme.files.tables.layout import Layout
+    from kineme.movements.tables.layout import Layout
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
     follow_links = known.pop("follow_links", False)

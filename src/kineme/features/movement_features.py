@@ -2,36 +2,100 @@
 
 from __future__ import annotations
 
-from typing import Any
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import TrajectoryError
-from kineme.features.rows import FEATURES, features_of
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.axes import axis_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 from kineme.validation import check_choice, check_count
 
+#: Feature name -> (primitives, S) -> array (n, size, d).
+FEATURES: dict[str, Callable[[Primitives | RhythmicPrimitives, int], NDArray[Any]]] = {
+    "shape-attractor": lambda primitives, n_samples: primitives.shape_attractor(n_samples),
+    "forcing": lambda primitives, n_samples: primitives.forcing(n_samples),
+    "weights": lambda primitives, _: primitives.weights,
+}
+_NESTED = "dmp__"
+#: Keywords of earlier versions that have another name in the specification; all other fields kept theirs.
+_RENAMED = {"fit_to": "fit"}
 
-class MovementFeatures(TransformerMixin, BaseEstimator):
+Specification = TypeVar("Specification", DMP, RhythmicDMP)
+
+
+def features_of(primitives: Primitives | RhythmicPrimitives, feature: str, n_samples: int) -> NDArray[Any]:
+    """Feature rows (n, d * size) of learned primitives, dimension-major as in Eq. (9)."""
+    by_time = FEATURES[feature](primitives, n_samples)
+    return by_time.transpose(0, 2, 1).reshape(len(primitives), -1)
+
+
+class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
     """Base of transformers that learn one primitive per movement and describe it by one feature.
 
-    A subclass has the parameters `feature`, `n_samples` and `dtype`; its `fit` sets `dmp_` and `n_dims_`.
+    The fields of `dmp` are parameters of the transformer too, as ``dmp__n_basis`` and so on: `set_params` replaces
+    the specification, which is itself never changed.
     """
 
-    feature: str
-    n_samples: int
-    dtype: str
-    dmp_: Any
+    _kind: ClassVar[type]  # of the specification
+    dmp_: Specification
     n_dims_: int
 
-    def _check_parameters(self) -> None:
-        check_choice("feature", self.feature, list(FEATURES))
-        check_count("n_samples", self.n_samples, 2)
-        check_choice("dtype", self.dtype, ("float64", "float32"))
+    def __init__(
+        self,
+        feature: str = "shape-attractor",
+        dmp: Specification | None = None,
+        *,
+        n_samples: int = 100,
+        dtype: str = "float64",
+        **fields_of_dmp: Any,
+    ) -> None:
+        self.feature = feature
+        self.dmp: Specification | None = dmp
+        self.n_samples = n_samples
+        self.dtype = dtype
+        if isinstance(dmp, str) and dmp in FORMULATIONS:  # the second parameter of earlier versions
+            self.dmp, fields_of_dmp = None, {"formulation": dmp} | fields_of_dmp
+        if fields_of_dmp:
+            nested, unknown = self._nested(fields_of_dmp)
+            if unknown:
+                raise TypeError(f"{type(self).__name__} has no parameter {', '.join(map(repr, unknown))}")
+            self.dmp = replace(self._specification(), **nested)
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters by name; with `deep` also the fields of `dmp`, as ``dmp__n_basis`` and so on."""
+        parameters = super().get_params(deep=False)
+        if deep:
+            dmp = self._specification()
+            parameters |= {_NESTED + field.name: getattr(dmp, field.name) for field in fields(self._kind)}
+        return parameters
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters by name; ``dmp__n_basis`` and so on replace a field of `dmp`.
+
+        Raises
+        ------
+        ValueError
+            A name that is no parameter.
+        SpecificationError
+            A value out of the range of a field.
+        """
+        nested, others = self._nested(parameters)
+        super().set_params(**others)
+        if nested:
+            self.dmp = replace(self._specification(), **nested)
+        return self
 
     def transform(self, X: Any) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
@@ -58,6 +122,50 @@ class MovementFeatures(TransformerMixin, BaseEstimator):
         size = self.dmp_.n_basis if self.feature == "weights" else self.n_samples
         names = [f"{axis}_{k + 1}" for axis in axis_names(self.n_dims_) for k in range(size)]
         return np.array(names, dtype=object)
+
+    def _checked(self) -> Specification:
+        """The specification, after a check of all other parameters."""
+        check_choice("feature", self.feature, list(FEATURES))
+        check_count("n_samples", self.n_samples, 2)
+        check_choice("dtype", self.dtype, ("float64", "float32"))
+        return self._specification()
+
+    def _specification(self) -> Specification:
+        dmp = self._kind() if self.dmp is None else self.dmp
+        if not isinstance(dmp, self._kind):
+            name = self._kind.__name__
+            raise SpecificationError(
+                f"expected dmp to be a kineme.{name}, got {dmp!r}; write {type(self).__name__}(dmp=kineme.{name}())"
+            )
+        return dmp  # type: ignore[return-value]
+
+    def _nested(self, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Split into fields of the specification, by their names there, and all other parameters."""
+        names = [field.name for field in fields(self._kind)]
+        nested: dict[str, Any] = {}
+        others: dict[str, Any] = {}
+        old: list[str] = []
+        for name, value in parameters.items():
+            field_name = _RENAMED.get(name, name)
+            if name.startswith(_NESTED):
+                nested[name.removeprefix(_NESTED)] = value
+            elif field_name in names and name != "fit":
+                nested[field_name] = value
+                old.append(name)
+            else:
+                others[name] = value
+        if unknown := [name for name in nested if name not in names]:
+            raise ValueError(f"{self._kind.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}")
+        if old:
+            this, kind = type(self).__name__, self._kind.__name__
+            warnings.warn(
+                f"{', '.join(old)} of {this} are now fields of its dmp; write "
+                f"{this}(dmp=kineme.{kind}({', '.join(f'{_RENAMED.get(name, name)}=...' for name in old)})), and "
+                f"{_NESTED}{_RENAMED.get(old[0], old[0])} in set_params and searches",
+                DeprecationWarning,
+                stacklevel=3,
+            )
+        return nested, others
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

@@ -25,7 +25,8 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
     Parameters
     ----------
     features : DMPFeatures, optional
-        What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_basis`` and so on.
+        What to compute; by default ``DMPFeatures()``. Its parameters are searched as ``features__n_samples``,
+        ``features__dmp__n_basis`` and so on.
     orientation_weight : float, default 0.2
         Weight of a radian beside the positions, in their unit per radian. With 0.2 m, about the length of a hand or a
         tool, a rotation counts as much as the displacement of the tip. Positions in millimeters need 200. Not used
@@ -56,8 +57,8 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
         demonstrations = Demonstrations.of(X)
         self.n_columns_ = demonstrations.n_dims
-        self.steps_ = tuple(self.features_.preprocessing)
-        self.features_.set_params(preprocessing=())  # preprocessing is applied in to_tangent, before the goal is read
+        self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
+        self.features_.set_params(dmp__preprocessing=())  # applied in to_tangent, before the goal is read
         self.features_.fit(self._tangent(demonstrations))
         return self
 

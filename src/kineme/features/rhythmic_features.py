@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any, Self
+from dataclasses import replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,19 +12,17 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
-class RhythmicFeatures(MovementFeatures):
+class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
     """Describe each recording by its rhythmic DMP: features of one cycle, wherever it started, rows as in Eq. (9).
 
     Parameters
     ----------
     feature : {"shape-attractor", "forcing", "weights"}, default "shape-attractor"
         ``r f``, which depends on the amplitude; f or w, which do not. None of them depends on translation and tempo.
-    n_basis, stiffness, damping, ridge, n_points, overlap, period, align_on, aperiodic, preprocessing
-        The specification; see `RhythmicDMP`.
+    dmp : RhythmicDMP, default RhythmicDMP()
+        How the recordings are learned. Its fields are searched as ``dmp__n_basis`` and so on.
     n_samples : int, default 100
-        Samples S of a cycle. Weights have n_basis instead.
-    fit_to : {"forcing", "trajectory"}, default "trajectory"
-        The `fit` of `RhythmicDMP`.
+        Samples S of a cycle. Weights have ``dmp.n_basis`` instead.
     dtype : {"float64", "float32"}, default "float64"
         Type of the result.
 
@@ -37,37 +35,7 @@ class RhythmicFeatures(MovementFeatures):
         Dimensions d of the training movements.
     """
 
-    def __init__(  # noqa: PLR0913, PLR0917 - one parameter per choice, as scikit-learn's searches need them
-        self,
-        feature: str = "shape-attractor",
-        n_basis: int = 25,
-        n_samples: int = 100,
-        stiffness: float = 100.0,
-        damping: float | None = None,
-        fit_to: str = "trajectory",
-        ridge: float | None = None,
-        n_points: int = 200,
-        overlap: float = 0.5,
-        period: float | None = None,
-        align_on: int | None = None,
-        aperiodic: str = "raise",
-        preprocessing: tuple[Any, ...] = (),
-        dtype: str = "float64",
-    ) -> None:
-        self.feature = feature
-        self.n_basis = n_basis
-        self.n_samples = n_samples
-        self.stiffness = stiffness
-        self.damping = damping
-        self.fit_to = fit_to
-        self.ridge = ridge
-        self.n_points = n_points
-        self.overlap = overlap
-        self.period = period
-        self.align_on = align_on
-        self.aperiodic = aperiodic
-        self.preprocessing = preprocessing
-        self.dtype = dtype
+    _kind: ClassVar[type] = RhythmicDMP
 
     def fit(self, X: Any, y: Any = None) -> Self:
         """Check the parameters and choose the dimension to align on; y is ignored.
@@ -77,9 +45,7 @@ class RhythmicFeatures(MovementFeatures):
         TrajectoryError
             Recordings that cannot be used; see `RhythmicDMP.learn`.
         """
-        self._check_parameters()
-        shared = {field.name for field in fields(RhythmicDMP)} - {"fit"}
-        dmp = RhythmicDMP(fit=self.fit_to, **{name: getattr(self, name) for name in shared})
+        dmp = self._checked()
         demonstrations = Demonstrations.of(X)
         if dmp.align_on is None:
             aligned_on = dmp.learn(demonstrations).aligned_on

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, TrajectoryError
-from kineme.files.parsed_file import Block, Problem
+from kineme.files.problem import Problem
+from kineme.movements.tables.parsed import Block
 from kineme.validation import (
     LARGEST_POSITION,
     LARGEST_STAMP,

@@ -6,7 +6,7 @@ import os
 from collections import deque
 from pathlib import Path
 
-from kineme.files.parsed_file import Problem
+from kineme.files.problem import Problem
 
 _OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
 

@@ -12,11 +12,11 @@ from kineme.files.arrays.arrays import arrays_movements, join
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz
 from kineme.files.limits import check_expanded
-from kineme.files.parsed_file import Found
-from kineme.files.tables.layout import Layout
 from kineme.files.tables.parquet import read_parquet_table
-from kineme.files.tables.table_movements import table_movements
 from kineme.files.tables.text_table import read_text_table
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.table_movements import table_movements
 
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
@@ -24,23 +24,23 @@ _NUMBER, _LIST = 32, 88  # bytes of a Python object
 class Format(NamedTuple):
     """The reader of a format, and whether the name of the file is the label of its movements."""
 
-    read: Callable[[bytes, Layout], Found]
+    read: Callable[[bytes, Layout], Parsed]
     label_is_stem: bool = False
 
 
-def _read_text(data: bytes, layout: Layout) -> Found:
+def _read_text(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_text_table(data, layout), layout, "CSV")
 
 
-def _read_parquet(data: bytes, layout: Layout) -> Found:
+def _read_parquet(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_parquet_table(data, layout), layout, "Parquet")
 
 
-def _read_npz(data: bytes, layout: Layout) -> Found:
+def _read_npz(data: bytes, layout: Layout) -> Parsed:
     return arrays_movements(Npz(data, Path("it")), layout, "NPZ")
 
 
-def _read_json(data: bytes, layout: Layout) -> Found:
+def _read_json(data: bytes, layout: Layout) -> Parsed:
     lists = data.count(b"[") + data.count(b"{")
     check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
     try:
@@ -60,12 +60,12 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return entries
 
 
-def _read_matlab(data: bytes, layout: Layout) -> Found:
+def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
     return join(demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos"))
 
 
-def _read_bag(data: bytes, layout: Layout) -> Found:
+def _read_bag(data: bytes, layout: Layout) -> Parsed:
     raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
 
 

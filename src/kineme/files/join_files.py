@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.files.parsed_file import Block, Detected, Problem
+from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
+from kineme.movements.tables.parsed import Block, Detected
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements

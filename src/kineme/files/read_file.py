@@ -15,8 +15,9 @@ from kineme.files.check_block import check_block
 from kineme.files.folders import as_text
 from kineme.files.formats import FORMATS, Format
 from kineme.files.limits import check_expanded
-from kineme.files.parsed_file import Block, Detected, Problem
-from kineme.files.tables.layout import Layout
+from kineme.files.problem import Problem
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected
 
 #: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (

@@ -10,7 +10,7 @@ from kineme.files.folders import files_under
 from kineme.files.join_files import Recordings, join_files
 from kineme.files.limits import max_file_bytes
 from kineme.files.read_file import format_of, read_bytes, read_file
-from kineme.files.tables.layout import Column, Layout
+from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.trajectory import Trajectory
 
 Progress = Callable[[Sequence[Path]], Iterable[Path]]

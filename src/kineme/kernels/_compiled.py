@@ -14,8 +14,27 @@ from numba.extending import register_jitable
 from kineme.kernels._rows import Rows
 from kineme.runtime.compiled import jit
 
-# Columns of B that are packed together: one strip of sums and four strips of features stay in L1.
-_PANEL = 128
+# Bytes of each feature of those rows of B that are packed together, and rows of A that go over them at once. The strips
+# of sums stay in L1, and each packed number that comes from L2 serves four pairs: see bench/README.md for how near that
+# is to the processor's limit.
+_PANEL_BYTES = 512
+_ROWS = 4
+
+
+@jit
+def _aligned(n_rows, n_columns, like):  # type: ignore[no-untyped-def]
+    """An array on cache lines of 64 bytes; half of those that Numba makes begin in the middle of one."""
+    size, per_line = n_rows * n_columns, 64 // like.itemsize
+    whole = np.empty(size + per_line, like.dtype)
+    first = (-whole.ctypes.data // like.itemsize) % per_line
+    return whole[first : first + size].reshape(n_rows, n_columns)
+
+
+@jit
+def _pack(rows, panel):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[1]):
+        for j in range(rows.shape[0]):
+            panel[k, j] = rows[j, k]
 
 
 def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, sums: Rows) -> None:
@@ -23,32 +42,48 @@ def _sum_over_coordinates(term: Callable[..., Any], A: Rows, B: Rows, c: Any, su
 
     The rows of B are packed feature by feature, so that the innermost loop runs over neighboring
     columns of the Gram matrix: it vectorizes without reordering a sum, so the value of a pair does not
-    depend on its position in the tile. Four features at a time share one load and store of the strip.
+    depend on its position in the tile. Two features at a time share one load and store of the strips.
     """
     p = A.shape[1]
-    panel = np.empty((p, _PANEL), A.dtype)
-    strip = np.empty(_PANEL, A.dtype)
-    for start in range(0, B.shape[0], _PANEL):
-        width = min(_PANEL, B.shape[0] - start)
-        for j in range(width):
-            for k in range(p):
-                panel[k, j] = B[start + j, k]
-        for i in range(A.shape[0]):
-            a = A[i]
-            strip[:] = 0
-            for k in range(0, p - 3, 4):
-                x0, x1, x2, x3 = a[k], a[k + 1], a[k + 2], a[k + 3]
-                y0, y1, y2, y3 = panel[k], panel[k + 1], panel[k + 2], panel[k + 3]
+    n_columns = _PANEL_BYTES // A.itemsize
+    panel, strips = _aligned(p, n_columns, A), _aligned(_ROWS, n_columns, A)
+    s0, s1, s2, s3 = strips[0], strips[1], strips[2], strips[3]
+    by_four = len(A) - len(A) % _ROWS
+    for start in range(0, B.shape[0], n_columns):
+        width = min(n_columns, B.shape[0] - start)
+        _pack(B[start : start + width], panel)
+        for i in range(0, by_four, _ROWS):
+            a0, a1, a2, a3 = A[i], A[i + 1], A[i + 2], A[i + 3]
+            strips[:] = 0
+            for k in range(0, p - 1, 2):
+                x0, x1, x2, x3 = a0[k], a1[k], a2[k], a3[k]
+                y0, y1, y2, y3 = a0[k + 1], a1[k + 1], a2[k + 1], a3[k + 1]
+                first, second = panel[k], panel[k + 1]
                 for j in range(width):
-                    strip[j] += (term(x0, y0[j], c) + term(x1, y1[j], c)) + (term(x2, y2[j], c) + term(x3, y3[j], c))
-            for k in range(p - p % 4, p):
+                    s0[j] += term(x0, first[j], c) + term(y0, second[j], c)
+                    s1[j] += term(x1, first[j], c) + term(y1, second[j], c)
+                    s2[j] += term(x2, first[j], c) + term(y2, second[j], c)
+                    s3[j] += term(x3, first[j], c) + term(y3, second[j], c)
+            for k in range(p - p % 2, p):
+                for r in range(_ROWS):
+                    for j in range(width):
+                        strips[r, j] += term(A[i + r, k], panel[k, j], c)
+            sums[i : i + _ROWS, start : start + width] = strips[:, :width]
+        for i in range(by_four, len(A)):
+            s0[:] = 0
+            for k in range(0, p - 1, 2):
+                x0, y0, first, second = A[i, k], A[i, k + 1], panel[k], panel[k + 1]
                 for j in range(width):
-                    strip[j] += term(a[k], panel[k, j], c)
-            sums[i, start : start + width] = strip[:width]
+                    s0[j] += term(x0, first[j], c) + term(y0, second[j], c)
+            for k in range(p - p % 2, p):
+                for j in range(width):
+                    s0[j] += term(A[i, k], panel[k, j], c)
+            sums[i, start : start + width] = s0[:width]
 
 
-# Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached.
-_sum = jit(_sum_over_coordinates, cache=False)
+# Not cached on disk, since its key would contain functions; the loops below, which inline it, are cached. Each of the
+# four rows is summed in the same order, so that a Gram matrix is symmetric to the last bit.
+_sum = jit(_sum_over_coordinates, cache=False, reorder=False)
 
 
 @register_jitable

@@ -1,1 +1,1 @@
-"""The action library: movements, their primitives and features, and the symbols they stand for, in one database."""
+"""The action library: movements, their primitives and features, and the symbols that name them, in one database."""

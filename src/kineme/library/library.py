@@ -1,4 +1,4 @@
-"""The action library as users hold it: a thin skin over the functions of this folder."""
+"""`ActionLibrary`, a thin class over the functions of this chapter."""
 
 from __future__ import annotations
 
@@ -43,24 +43,25 @@ class ActionLibrary:
     Parameters
     ----------
     folder : str or Path
-        Holds the database ``library.sqlite``.
+        Folder of the database ``library.sqlite``.
     create : bool, default False
-        Make the library if there is none.
+        Create the library if it does not exist.
     read_only : bool, default False
-        Never write, not even beside the database; works in a read-only folder.
+        Write nothing, not even caches; works in a read-only folder.
     recognizer : Recognizer, optional
-        How movements are seen, for a library that is made; by default ``Recognizer()``.
+        How movements are described and compared in a new library; by default ``Recognizer()``.
     dmp : DMP, optional
-        Of the primitives, for a library that is made; by default bio-inspired, 40 basis functions, fitted to the path.
+        Specification of the primitives in a new library; by default bio-inspired, 40 basis functions, fitted to the
+        path.
     wait : float, default 10.0
         Seconds to wait while another process writes, before an error.
 
     Raises
     ------
     DataError
-        No library there, another program's file, damaged bytes, a later schema version, no permission.
+        No library in the folder, another program's file, damaged bytes, a later schema version, no permission.
     SpecificationError
-        The library is there, and was made with another recognizer or dmp.
+        The library exists and was created with another recognizer or dmp.
 
     Notes
     -----
@@ -127,7 +128,7 @@ class ActionLibrary:
 
     @property
     def specification(self) -> Specification:
-        """What features and primitives mean."""
+        """The specification of features and primitives."""
         return self.store.specification
 
     def learn(
@@ -146,14 +147,14 @@ class ActionLibrary:
         movements : movements
             Whatever `Demonstrations.of` accepts.
         labels : sequence of n str or None, optional
-            Names of symbols, made where there are none; by default the labels of the movements. None is unlabeled.
+            Names of symbols, which are created if needed; by default the labels of the movements. None is unlabeled.
         source : Source, or sequence of n Source or None, optional
-            The files they come from.
+            The files of the movements.
         places : sequence of n str, optional
-            Where in its file each movement is: one at a place that is known is taken for known. Without, movements are
-            known by their samples alone.
+            Position of each movement in its file: a movement at a stored position counts as stored already. If not
+            given, duplicates are found by their samples alone.
         progress : callable, optional
-            Called with the movements done and their number after every batch.
+            Called after every batch with the number of movements done and of all.
 
         Returns
         -------
@@ -164,13 +165,13 @@ class ActionLibrary:
         TrajectoryError
             Movements that cannot be used; nothing is stored.
         DataError
-            The disk is full, another process writes, ...; whole batches that were stored stay, and learning the same
-            again goes on where it ended.
+            The disk is full, another process writes, ...; batches that were stored stay, and learning the same
+            movements again continues after them.
 
         Notes
         -----
-        A movement is known by its samples, or by its place in a file of the same content read with the same options. A
-        known movement joins the symbol of its label only if it shows none.
+        A movement is stored already if its samples are, or its position in a file of the same content read with the
+        same options. Such a movement is added to the symbol of its label only if it belongs to none.
         """
         from kineme.library.learning.learn import learn
 
@@ -181,19 +182,19 @@ class ActionLibrary:
         return read.all_ids(self.store) if symbol is None else self[symbol].members
 
     def unlabeled(self) -> Ids:
-        """Ids of the movements that show no symbol, ascending."""
+        """Ids of the movements without a symbol, ascending."""
         return read.unlabeled_ids(self.store)
 
     def movements(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Demonstrations:
-        """Recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
+        """The recordings: all, those of a symbol (ascending ids), or those of `ids`, in their order.
 
-        Labels are the names of symbols if every one of the movements shows one, else None.
+        Labels are the names of symbols if every movement belongs to one, else None.
         """
         chosen = self._choose(symbol, ids)
         return read.movements(self.store, chosen, read.names_of(self.store, chosen))
 
     def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Rows of all representations of `specification`, one after the other, shape (k, sum of d * S)."""
+        """Rows of all representations of `specification`, concatenated, shape (k, sum of d * S)."""
         return read.features(self.store, self._choose(None, ids))
 
     def primitives(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Primitives:
@@ -222,18 +223,18 @@ class ActionLibrary:
     def recognize(self, movements: Demonstrations | Sequence[Any], error_rate: float = ...) -> list[Answer]: ...
 
     def recognize(self, movements: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
-        """What each movement is, or that it is unknown; labels are names of symbols.
+        """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
-        Up to 1000 movements that show a symbol, all are compared as `kineme.Recognizer` does. Above, few are, chosen by
-        short codes of all: the label is the same, and p-values are given for the 64 symbols that come closest. The
-        first answer after a change takes longer; what it prepares is kept beside the database unless `read_only`.
+        With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, few are, which are
+        chosen by short codes of all: the label is the same, and p-values are given for the 64 nearest symbols. The
+        first answer after a change takes longer; what it prepares is cached beside the database unless `read_only`.
 
         Parameters
         ----------
         movements : one movement or many
             A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. It is kept where an answer is `calibrated`; with one
+            Share of known movements that may be called unknown. It holds for answers that are `calibrated`; with one
             demonstration of each symbol p-values are a guess. See `kineme.recognition.conformal.Calibration`.
 
         Returns
@@ -244,7 +245,7 @@ class ActionLibrary:
         Raises
         ------
         SpecificationError
-            No movement shows a symbol, or there is only one movement.
+            No movement belongs to a symbol, or there is only one movement.
         TrajectoryError
             Movements of another number of dimensions.
         """
@@ -257,7 +258,7 @@ class ActionLibrary:
         return LibraryRecognizer(self.store)
 
     def history(self) -> tuple[Version, ...]:
-        """Every change, the first one first."""
+        """All versions, the first one first."""
         return history(self.store)
 
     def at(self, version: int) -> ActionLibrary:
@@ -267,7 +268,7 @@ class ActionLibrary:
         return past
 
     def verify(self) -> list[Problem]:
-        """All that is damaged, each problem with the table, the row or movement, and a text; empty if all is well."""
+        """Find damage: a list of problems with table, row or movement, and a text; empty if nothing is damaged."""
         from kineme.library.storage.verify import verify
 
         return verify(self.store)
@@ -280,7 +281,7 @@ class ActionLibrary:
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
-        """Make a library in `folder` of a file that `export` wrote, after checking every byte of it, and open it."""
+        """Create a library in `folder` from a file of `export`, after checking every byte of it, and open it."""
         from kineme.library.storage.export_import import import_
 
         import_(path, folder)
@@ -291,13 +292,13 @@ class ActionLibrary:
         changes.rename(self.store, old, new)
 
     def describe(self, who: str, text: str | None = None, **values: Any) -> None:
-        """Say what a symbol is, and set its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
+        """Set the description of a symbol, its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
         changes.describe(self.store, who, **({} if text is None else {"description": text}), **values)
 
     def delete(self, what: str | ArrayLike) -> None:
-        """Take a symbol away, given by name or id, whose movements stay; or movements, given by their ids.
+        """Delete a symbol, given by name or id, whose movements stay; or movements, given by their ids.
 
-        Earlier versions keep what is deleted, and `at` shows it.
+        Earlier versions still contain them, see `at`.
         """
         if isinstance(what, str):
             changes.delete_symbol(self.store, what)
@@ -305,31 +306,31 @@ class ActionLibrary:
             changes.delete_movements(self.store, what)
 
     def merge(self, names: Sequence[str], into: str) -> None:
-        """Make one symbol of several: an existing one, or a new one of that name. Their ids become its parents."""
+        """Merge several symbols into an existing one, or into a new one of that name. Their ids become its parents."""
         changes.merge(self.store, names, into)
 
     def split(self, name: str, ids: ArrayLike, new: str) -> None:
-        """Make a new symbol of some members of another one, which becomes its parent."""
+        """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
         changes.split(self.store, name, ids, new)
 
     def assign(self, ids: ArrayLike, symbol: str, how: str = "anchored") -> None:
-        """Let movements show a symbol, made if there is none, instead of the one that they showed.
+        """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
 
-        `how` is "label" (a person said so), "anchored" (by a cluster) or "recognized".
+        `how` is "label" (by a person), "anchored" (by a cluster) or "recognized".
         """
         changes.assign(self.store, ids, symbol, how)
 
     def release(self, ids: ArrayLike) -> None:
-        """Let movements show no symbol any more."""
+        """Remove movements from their symbols."""
         changes.release(self.store, ids)
 
     def join(self, error_rate: float = 0.05) -> dict[str, int]:
-        """Let movements without a symbol join the symbols that they are recognized as.
+        """Add movements without a symbol to the symbols that they are recognized as.
 
         Returns
         -------
         dict
-            Name of the symbol -> how many joined it.
+            Name of the symbol -> number of new members.
         """
         from kineme.library.symbols.recognized import assign_recognized, recognized
 
@@ -344,32 +345,32 @@ class ActionLibrary:
     ) -> LibraryProposals:
         """Propose symbols for the movements without one, or for `ids`; a person names them.
 
-        Where there are symbols, these measure how alike movements of one symbol are, see
-        `kineme.anchoring.assign`; else, and where `method` or `n_clusters` is given, the movements are
-        clustered, see `kineme.anchoring.propose`. A proposal is left out if four fifths of its
-        movements were in one proposal that was rejected. Fewer than three movements make no proposal.
+        If there are symbols, their members define how similar movements of one symbol are, see
+        `kineme.anchoring.assign`. If there are none, or if `method` or `n_clusters` is given, the movements are
+        clustered, see `kineme.anchoring.propose`. A proposal is left out if four fifths of its movements were in one
+        rejected proposal. Fewer than three movements make no proposal.
         """
         from kineme.library.symbols.proposals import propose
 
         return propose(self.store, ids, method, n_clusters, min_members)
 
     def accept(self, proposal: Proposal, name: str, description: str | None = None) -> None:
-        """Let the members of a proposal show the symbol of that name, made if there is none, its medoid the prototype.
+        """Assign the members of a proposal to a symbol, which is created if needed, with the medoid as its prototype.
 
-        Members that were given to other symbols since the proposal was made stay there.
+        Members that were assigned to other symbols since the proposal was made stay there.
         """
         from kineme.library.symbols.proposals import accept
 
         accept(self.store, proposal, name, description)
 
     def reject(self, proposal: Proposal) -> None:
-        """Remember that these movements are no symbol: they stay without one and are not proposed again."""
+        """Reject a proposal: its movements stay without a symbol and are not proposed again."""
         from kineme.library.symbols.proposals import reject
 
         reject(self.store, proposal)
 
     def ground(self, who: str, by: str = "medoid", units: str | Sequence[str] | None = None) -> dict[str, Any]:
-        """A symbol in a planner's terms: the primitive that stands for it, and the ranges that were demonstrated.
+        """A symbol for a planner: its prototype as a primitive, and the demonstrated ranges of its parameters.
 
         Plain data, as `kineme.anchoring.grounding.grounding_io.grounding_schema` describes it;
         `kineme.anchoring.grounding.grounding_io.primitive_from` makes it move again.
@@ -379,16 +380,16 @@ class ActionLibrary:
         who : str
             Name or id of a symbol.
         by : {"medoid", "mean"}, default "medoid"
-            What stands for it: its prototype or most typical movement, or the mean laid onto that one.
+            The prototype: the one that was set or else the medoid, or the mean of the members aligned with that one.
         units : str or sequence of d str, optional
-            Of the positions, as "mm", or of each dimension.
+            Units of the positions, as "mm", or one of each dimension.
         """
         from kineme.library.symbols.grounding import ground_symbol
 
         return ground_symbol(self.store, who, by, units)
 
     def nearest(self, who: str, k: int = 3) -> tuple[Near, ...]:
-        """The symbols most like one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
+        """The symbols most similar to one, nearest first; see `kineme.anchoring.grounding.space.ConceptualSpace`."""
         from kineme.library.symbols.grounding import space_of
 
         return space_of(self.store).nearest(self[who].name, k)
@@ -400,15 +401,15 @@ class ActionLibrary:
         return space_of(self.store).between(self[a].name, self[b].name, eps)
 
     def morph(self, a: str, b: str, shares: ArrayLike = 0.5) -> Primitives:
-        """Primitives on the way from a symbol to another, one for each share of the way: 0 is a, 1 is b."""
+        """Primitives between two symbols, one for each share of the way: 0 is a, 1 is b."""
         from kineme.library.symbols.grounding import morph_symbols
 
         return morph_symbols(self.store, a, b, shares)
 
     def review(self) -> Review:
-        """Symbols whose movements are hard to tell apart, and symbols whose movements form two clusters.
+        """Find symbols whose movements are hard to tell apart, and symbols whose movements form two clusters.
 
-        Advice for `merge` and `split`; nothing is changed.
+        The result suggests calls of `merge` and `split`; nothing is changed.
         """
         from kineme.library.symbols.review import review
 

@@ -79,16 +79,18 @@ def compiled_module(name: str) -> Any:
     return _modules[name]
 
 
-def jit(function: Callable[..., Any], *, cache: bool = True) -> Callable[..., Any]:
+def jit(function: Callable[..., Any], *, cache: bool = True, reorder: bool = True) -> Callable[..., Any]:
     """Compile one thread's loop: cached on disk where possible, without the GIL.
 
     Pass ``cache=False`` for a function whose arguments are functions: its cache would never be found
     again. Only reassociation and contraction of floating-point operations are allowed, so NaN and infinity
-    keep their meaning and validation can be compiled too.
+    keep their meaning and validation can be compiled too. With ``reorder=False`` sums are added as they are written, so
+    that two places with the same formula round alike.
     """
     _load(required=True)
     with _loading:
-        options: dict[str, Any] = {"nogil": True, "fastmath": {"reassoc", "contract", "nsz"}, "error_model": "numpy"}
+        allowed = {"reassoc", "contract", "nsz"} if reorder else {"contract", "nsz"}
+        options: dict[str, Any] = {"nogil": True, "fastmath": allowed, "error_model": "numpy"}
         dispatcher: Callable[..., Any] = _modules["numba"].njit(**options)(function)
         if cache:
             compiled_module("kineme.runtime.machine_code").keep(dispatcher)

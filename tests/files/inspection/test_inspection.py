@@ -12,7 +12,7 @@ from kineme.files.inspection.report import as_data, as_words
 from kineme.files.inspection.sampling import GAP, sampling_of
 from kineme.files.movements import write_movement
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import encode_figure
 

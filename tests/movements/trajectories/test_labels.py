@@ -11,7 +11,7 @@ import pytest
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory, TrajectoryError
 from kineme.files.recordings import read_recordings_from_bytes
-from kineme.files.tables.layout import Layout
+from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.labels import label_array
 
 X = np.arange(20.0)[:, None] ** [1, 2]

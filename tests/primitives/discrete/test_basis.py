@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP
+from kineme.primitives.discrete.basis import GaussianBasis
+from kineme.primitives.discrete.phase import ExponentialPhase
 
 bases = st.builds(
-    lambda n, overlap, gating, end: DMP(n_basis=n, overlap=overlap, gating=gating, phase_end=end).basis,
+    lambda n, overlap, gating, end: GaussianBasis(n, overlap, gating, ExponentialPhase(end)),
     st.integers(2, 60),
     st.floats(0.01, 0.95),
     st.sampled_from(["none", "phase"]),

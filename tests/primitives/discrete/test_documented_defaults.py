@@ -4,14 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import kineme
-from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning
+from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning, DMPFeatures, RhythmicDMP
+from kineme.cli import main
+from kineme.library.storage.specification import Specification
+from kineme.orientation import PoseDMP
+
+
+def test_the_path_is_fitted_with_forty_functions():
+    """The choice of ``python -m bench --only dmp_defaults``; docs/moving-again.md says what came of the others."""
+    assert DMP() == DMP("bio-inspired", fit="trajectory", n_basis=40)
+    assert PoseDMP().dmp == Specification().dmp == DMPFeatures().fit([np.eye(5)]).dmp_ == DMP()
+    assert RhythmicDMP().fit == DMP().fit
+
+
+def test_the_command_line_takes_the_same(tmp_path):
+    u = np.linspace(0.0, 1.0, 50)
+    np.savetxt(tmp_path / "x.csv", np.column_stack((u, np.sin(u), u**2)), delimiter=",", header="t,x,y", comments="")
+    files = {name: str(tmp_path / name) for name in ("x.csv", "x.kineme", "y.csv")}
+    arguments = ["generate", files["x.csv"], "--save", files["x.kineme"], "-o", files["y.csv"]]
+    assert CliRunner().invoke(main, arguments).exit_code == 0
+    assert kineme.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
 
 
 def test_the_numbers_of_the_paper_are_the_defaults():
-    """80 functions with centers even in time, K = 100, critical damping, s(tau) = 0.01; neighbors overlap by 0.3."""
-    dmp = DMP()
+    """Centers even in time, K = 100, critical damping, s(tau) = 0.01; neighbors overlap by 0.3."""
+    dmp = DMP(fit="forcing", n_basis=80)
     assert (dmp.K, dmp.D, dmp.n_points) == (100.0, 20.0, 200)
     assert dmp.basis.phase(np.ones(1))[0] == pytest.approx(0.01)
     np.testing.assert_allclose(dmp.basis.centers, 0.01 ** np.linspace(0.0, 1.0, 80))

@@ -41,8 +41,9 @@ def test_the_response_converges_with_twice_the_nodes(monkeypatch, n_nodes):
 
     def solve(steps_per_basis, nodes):
         monkeypatch.setattr(response, "_STEPS_PER_BASIS", steps_per_basis)
-        for name, values in zip(("_NODES", "_NODE_WEIGHTS"), np.polynomial.legendre.leggauss(nodes), strict=True):
-            monkeypatch.setattr(response, name, values)
+        on_both_sides, weights = np.polynomial.legendre.leggauss(nodes)
+        monkeypatch.setattr(response, "NODES", 0.5 * (on_both_sides + 1.0))
+        monkeypatch.setattr(response, "NODE_WEIGHTS", 0.5 * weights)
         u = np.linspace(0, 1, 3)
         return response.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, u)
 
@@ -65,7 +66,7 @@ def test_the_chosen_quadrature_has_converged():
 @pytest.mark.parametrize("formulation", ["original", "bio-inspired"])
 def test_learning_a_generated_path_converges_with_the_points(make_movement, formulation):
     """The path is one of the basis, so what is left is the differences': first order, from the ends."""
-    dmp = DMP(formulation, 8, phase_end=0.2, regression="ridge", ridge=0.0)
+    dmp = DMP(formulation, 8, phase_end=0.2, fit="forcing", regression="ridge", ridge=0.0)
     path = dmp.learn([make_movement(3)[1]]).rollout(n_samples=3201).positions
     errors = []
     for n_points in (201, 401, 801):

@@ -8,7 +8,7 @@ from sklearn.base import clone
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 
-from kineme import DMPFeatures, Smooth
+from kineme import DMP, DMPFeatures, Smooth
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseFeatures, product, to_tangent
 
@@ -55,14 +55,14 @@ def test_the_weight_scales_radians_and_millimeters_need_a_thousand_times_it():
 def test_preprocessing_is_applied_once():
     q, steps = [tumble(0)], (Smooth(8.0),)
     smoothed = DMPFeatures().fit_transform(to_tangent(q, steps)[0])
-    agree(PoseFeatures(DMPFeatures(preprocessing=steps)).fit_transform(q), smoothed)
+    agree(PoseFeatures(DMPFeatures(dmp=DMP(preprocessing=steps))).fit_transform(q), smoothed)
 
 
 def test_they_recognize_orientation_gestures_in_a_pipeline():
     rng = np.random.default_rng(0)
     labels = np.repeat(np.arange(6), 4)
     q = [product(tumble(k, 60 + 5 * i), random_quaternions(rng.integers(100))) for i, k in enumerate(labels)]
-    model = clone(make_pipeline(PoseFeatures(DMPFeatures(n_basis=30)), KNeighborsClassifier(1)))
+    model = clone(make_pipeline(PoseFeatures(DMPFeatures(dmp=DMP(n_basis=30))), KNeighborsClassifier(1)))
     model.set_params(posefeatures__features__n_samples=40)
     assert model.fit(q[::2], labels[::2]).score(q[1::2], labels[1::2]) == 1.0
     names = model[0].get_feature_names_out()

@@ -16,6 +16,7 @@ from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.preparation.arc_length import arc_length_phase, resample_by_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
+from kineme.primitives.discrete.dmp import DMP
 from kineme.validation import Array
 
 N_POINTS = 200
@@ -60,7 +61,7 @@ class PaperFeatures(_Nearest):
     """The paper's configuration: a DMP feature with the paper's parameters, Euclidean distance."""
 
     def __init__(self, formulation: str, feature: str) -> None:
-        self.features = DMPFeatures(feature, formulation)
+        self.features = DMPFeatures(feature, DMP(formulation, fit="forcing", n_basis=80))
 
     def describe(self, demonstrations: Demonstrations) -> Array:  # noqa: D102 - see _Nearest
         with warnings.catch_warnings():

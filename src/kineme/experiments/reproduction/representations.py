@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kineme.experiments.reproduction.paper import N_BASIS, N_POINTS, N_SAMPLES, STIFFNESS
-from kineme.features.rows import features_of
+from kineme.features.movement_features import features_of
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.discrete.dmp import DMP
@@ -46,7 +46,7 @@ class Representation:
 
 def specification(formulation: str, gating: str = "none") -> DMP:
     """The paper's parameters (Section 4.2)."""
-    return DMP(formulation, n_basis=N_BASIS, stiffness=STIFFNESS, gating=gating, n_points=N_POINTS)
+    return DMP(formulation, N_BASIS, STIFFNESS, gating=gating, fit="forcing", n_points=N_POINTS)
 
 
 def _feature(formulation: str, feature: str, gating: str = "none") -> Callable[[Demonstrations], Array]:

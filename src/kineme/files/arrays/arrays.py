@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.files.parsed_file import Block, Detected, Found, listed
-from kineme.files.tables.dates import nanoseconds
-from kineme.files.tables.layout import Layout
-from kineme.files.tables.time_units import in_seconds, unit_by_size
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
+from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
 from kineme.movements.trajectories.axes import axis_names
 from kineme.validation import Array
 
@@ -24,7 +23,7 @@ _RAGGED = (
 )
 
 
-def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Found:
+def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Parsed:
     """The movements in named arrays.
 
     - ``positions`` (T, d) or (T,), ``times`` (T,): one movement.
@@ -57,8 +56,8 @@ def join(
     named: tuple[Sequence[str | None], str],
     layout: Layout,
     detected: tuple[str, str],
-) -> Found:
-    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Found`."""
+) -> Parsed:
+    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`."""
     labels, time = named
     dims = sorted({x.shape[1] for x in xs})
     if len(dims) != 1 or dims == [0]:
@@ -81,7 +80,7 @@ def join(
     columns = tuple(axis_names(xs[0].shape[1]))
     places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
     block = Block(np.concatenate(xs), stamps, offsets, list(labels), places)
-    return Found(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+    return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
 
 
 def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:

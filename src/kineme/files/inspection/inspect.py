@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.join_files import Recordings
-from kineme.files.parsed_file import Detected, Problem
-from kineme.files.tables.time_units import GUESSED
+from kineme.files.problem import Problem
+from kineme.movements.tables.parsed import Detected
+from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 

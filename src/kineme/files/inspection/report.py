@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
-from kineme.files.parsed_file import Detected
+from kineme.movements.tables.parsed import Detected
 from kineme.output.table import Table, to_text
 from kineme.output.text import counted, printable
 

@@ -1,1 +1,1 @@
-"""Tables of samples, text and Parquet, and the roles of their columns."""
+"""Tables of samples in text and Parquet files."""

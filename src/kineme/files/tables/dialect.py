@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
-from kineme.files.tables.columns import is_time
-from kineme.files.tables.dates import is_date
+from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.time_stamps import is_date
 
 COMMENTS = ("#", "%", "//")
 _PEEK = 20  # samples from which the dialect is detected

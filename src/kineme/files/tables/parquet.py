@@ -11,11 +11,11 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
-from kineme.files.parsed_file import no_lines
-from kineme.files.tables.columns import Roles, choose_roles
-from kineme.files.tables.dates import nanoseconds
-from kineme.files.tables.layout import Layout
-from kineme.files.tables.table import Table
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import no_lines
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.time_stamps import nanoseconds
 
 _ROWS = 2**18  # rows that are decompressed at a time
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
-from kineme.files.tables.columns import Roles, choose_roles
-from kineme.files.tables.dates import seconds_of_dates
 from kineme.files.tables.dialect import COMMENTS, Dialect, detect_dialect
-from kineme.files.tables.layout import Layout
-from kineme.files.tables.table import Table
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.time_stamps import seconds_of_dates
 
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 

@@ -1,1 +1,1 @@
-"""Movements and files into the database."""
+"""Store movements and files in the database."""

@@ -1,4 +1,4 @@
-"""One batch of movements into the tables, in one transaction."""
+"""Write one batch of movements to the tables, in one transaction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 
 @dataclass(frozen=True, eq=False)
 class Committed:
-    """What one batch became."""
+    """The result of storing one batch."""
 
     added: int
     symbols: tuple[str, ...]
@@ -40,7 +40,7 @@ def commit(store: Store, batch: Batch) -> Committed:
         return Committed(0, (), ids)
     detail: dict[str, Any] = {}
     with store.writing("learn", detail) as change:
-        stored = find_stored(change.connection, batch)  # again: another writer may have been first
+        stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
         _insert_sources(change, batch, stored)
         keys, new = _keys(change, batch, stored)
         if new:
@@ -53,7 +53,7 @@ def commit(store: Store, batch: Batch) -> Committed:
 
 
 def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
-    """The ids, if every movement is there and has a symbol if it should: then there is nothing to store."""
+    """The ids, if all movements are stored and those with labels have symbols, so that nothing changes; else None."""
     with store.reading() as connection:
         stored = find_stored(connection, batch)
         found = [stored.id_of(batch, i) for i in range(len(batch.digests))]
@@ -114,7 +114,7 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
-    """Movement -> label, of those with a label that show no symbol yet."""
+    """Movement -> label, for movements with a label that belong to no symbol yet."""
     labeled = {key: label for key, label in zip(keys, batch.labels, strict=True) if label is not None}
     if not labeled:
         return {}

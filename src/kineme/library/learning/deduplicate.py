@@ -1,4 +1,4 @@
-"""Which movements of a batch are in the library already: by their samples, or by their place in the same file."""
+"""Find movements of a batch that are stored already: by their samples, or by their position in the same file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 
 @dataclass
 class Batch:
-    """Movements to be stored, and what is said about them."""
+    """Movements to be stored, with labels and sources."""
 
     demos: Demonstrations
     digests: list[int]
@@ -38,7 +38,7 @@ class Stored:
         return self.by_place.get(where) if found is None and where is not None else found
 
     def place_of(self, batch: Batch, i: int) -> tuple[int, str] | None:
-        """(source, place) of movement i, if its source is known."""
+        """(source, position in it) of movement i, if its source is stored."""
         source, place = batch.sources[i], batch.places[i]
         key = None if source is None else self.sources.get((source.sha256, source.options_json))
         return None if key is None or place is None else (key, as_text(place))

@@ -1,4 +1,4 @@
-"""Learning: what is new is described, and stored in batches, each of them one version."""
+"""Learn movements: describe new ones and store them in batches, each of which is one version."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from kineme.validation import describe as name_of
 Progress = Callable[[int, int], object]
 
 _BATCH_MOVEMENTS = 8192
-_SMALL_BATCH = 2048  # of fewer movements four batches are made: one is written while the next one is described
+_SMALL_BATCH = 2048  # fewer movements are split into four batches: one is written while the next one is described
 _BATCH_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class LearnReport:
-    """What learning has done.
+    """The result of learning.
 
     Attributes
     ----------
     added, known : int
-        Movements that were stored, and that were there already.
+        Number of movements that were stored, and of those that were stored before.
     symbols : tuple of str
-        Names of the symbols that were made.
+        Names of new symbols.
     ids : ndarray of shape (n,)
-        Of the movements, in the order in which they were given; of known ones, the id that they have.
+        Ids of the movements in the given order; for movements stored before, the existing id.
     version : int
-        Of the library afterwards.
+        Version of the library afterwards.
     """
 
     added: int
@@ -63,7 +63,7 @@ def learn(
     places: Sequence[Any] | None = None,
     progress: Progress | None = None,
 ) -> LearnReport:
-    """Store movements that are not there yet; see `ActionLibrary.learn`."""
+    """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
     demos = Demonstrations.of(movements)
     _check_dimensions(store, demos)
@@ -113,7 +113,7 @@ def _tell(progress: Progress | None, done: int, total: int) -> int:
 
 
 def _ranges(demos: Demonstrations) -> Iterator[tuple[int, int]]:
-    """Batches of at most so many movements and samples; at least one movement."""
+    """Ranges of movements for batches, limited by movements and samples; each has at least one movement."""
     start, n = 0, len(demos)
     most = min(_BATCH_MOVEMENTS, max(_SMALL_BATCH, -(-n // 4)))
     while start < n:
@@ -148,7 +148,7 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
 
 
 def _as_names(demos: Demonstrations, labels: Sequence[Any] | None) -> list[str | None]:
-    """The name of each movement's symbol; None where it has no label."""
+    """The name of each movement's symbol; None without a label."""
     given = demos.labels if labels is None else labels
     if given is None:
         return [None] * len(demos)
@@ -164,7 +164,7 @@ def _as_names(demos: Demonstrations, labels: Sequence[Any] | None) -> list[str |
 
 
 def _one_each(what: str, given: Any, n: int) -> list[Any]:
-    """What a user passes for every movement, as a list; one text is none."""
+    """A user's list with one item per movement; a single text is refused."""
     many = f"one {what} for each of the {n} movements"
     try:
         size = -1 if isinstance(given, (str, bytes)) else len(given)
@@ -186,7 +186,7 @@ def _as_sources(source: Source | Sequence[Source | None] | None, n: int) -> list
 
 
 def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> list[str | None]:
-    """Where in its source each movement is; unless that is said, movements are known by their samples alone."""
+    """The position of each movement in its source; if not given, duplicates are found by their samples alone."""
     if places is None:
         return [None] * len(sources)
     places = _one_each("place", places, len(sources))
@@ -195,7 +195,7 @@ def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> li
 
 
 def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
-    """Refuse two movements at one place of a source: the second would be taken for the first."""
+    """Refuse two movements at one position of a source: the second would count as a copy of the first."""
     seen: dict[tuple[int, str], int] = {}
     for i, (place, source) in enumerate(zip(places, sources, strict=True)):
         if source is not None and place is not None and seen.setdefault((id(source), str(place)), i) != i:

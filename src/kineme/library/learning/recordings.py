@@ -1,4 +1,4 @@
-"""Learning from files: every movement keeps the file that it comes from."""
+"""Learn from files; the source file of every movement is stored."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def learn_recordings(
     progress: Progress | None = None,
     root: str | PurePath = "",
 ) -> LearnReport:
-    """Store what `kineme.files.recordings.read_recordings` has read.
+    """Store the recordings of `kineme.files.recordings.read_recordings`.
 
     Parameters
     ----------
@@ -30,13 +30,13 @@ def learn_recordings(
         The library, ``ActionLibrary.store``.
     recordings : Recordings
     options : mapping, optional
-        What the reader was told. The same file read in another way is another source.
+        Options of the reader. The same file read with other options is another source.
     labels : sequence of n str or None, optional
         Names of symbols; by default each movement's own label.
     progress : callable, optional
         As for `ActionLibrary.learn`.
     root : str or Path, optional
-        Folder that was read: where the files come from is kept with it before their names.
+        Folder that was read; stored before the names of the files.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     told = {name: value for name, value in (options or {}).items() if value is not None}

@@ -1,8 +1,8 @@
-"""From movements to the bytes of their rows, a batch at a time, and what they are recognized by when they come again.
+"""Serialize movements to the bytes of their rows, a batch at a time, and compute their digests.
 
-Positions are kept in single precision relative to the start of the movement, which is kept in double: the error of a
-position is at most 2^-24 (6e-8) of its distance from the start. Times are kept the same way; even ones are not kept at
-all, but computed from the duration.
+Positions are stored in single precision relative to the start of the movement, which is stored in double: the error of
+a position is at most 2^-24 (6e-8) of its distance from the start. Times are stored in the same way; even ones are not
+stored, but computed from the duration.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class SerializedRows:
 
 
 def check(demos: Demonstrations) -> None:
-    """Refuse movements that cannot be stored, before any is.
+    """Refuse movements that cannot be stored, before any is stored.
 
     Raises
     ------
@@ -68,9 +68,9 @@ def evenly_sampled(demos: Demonstrations) -> NDArray[np.bool_]:
 
 
 def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """BLAKE2b of each movement's positions and times from its start, as 64-bit numbers; labels and names do not count.
+    """BLAKE2b of each movement's positions and times from its start, as 64-bit numbers; without labels and names.
 
-    Two different movements out of a million have the same one with a probability of 3e-8.
+    The probability that any two of a million different movements have the same digest is 3e-8.
     """
     positions, row = np.ascontiguousarray(demos.positions).data.cast("B"), 8 * demos.n_dims
     relative = None if even.all() else _relative_times(demos).data.cast("B")
@@ -113,7 +113,7 @@ def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, by
 
 
 def _times(stamps: Array) -> bytes:
-    """In single precision; in double where single cannot hold the duration, or would make two stamps one."""
+    """Times in single precision; in double if single overflows, or makes two stamps equal."""
     if not _SMALL <= stamps[-1] <= _LARGE:
         return stamps.tobytes()
     short = stamps.astype(np.float32)

@@ -1,1 +1,1 @@
-"""Recognizing with the movements of a library."""
+"""Recognition with the movements of a library."""

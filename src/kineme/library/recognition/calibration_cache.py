@@ -1,4 +1,4 @@
-"""The comparison of a large library: widths, weights, calibration, from samples; the last is kept in a cache."""
+"""Recognizer of a large library, fitted to a sample of its movements; its calibration is kept in a cache file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _SAMPLE = 500  # movements that widths and weights are estimated from, evenly sp
 
 
 def sample_recognizer(store: Store, members: Members) -> Recognizer:
-    """A recognizer fitted to some of the members: it has their widths and weights, but not yet a calibration."""
+    """A recognizer fitted to a sample of the members: it has widths and weights, but no calibration yet."""
     chosen = evenly_spaced(len(members.ids), _SAMPLE)
     demos = read.movements(store, members.ids[chosen])
     recognizer = store.specification.recognizer().set_params(classifier="nearest")
@@ -42,18 +42,18 @@ def sample_recognizer(store: Store, members: Members) -> Recognizer:
 def calibrate(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """The calibration on all members, taken from the cache if that is of the same ones."""
     path, key = store.folder / FILE, _key(store, members)
-    if path.is_file():  # a pipe would keep us waiting
+    if path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _unpacked(path.read_bytes(), key, len(members.names))
     made = calibrate_sample(similarity, stored)
     if not store.read_only:
-        with suppress(OSError):  # no room, no permission: it is made again next time
+        with suppress(OSError):  # disk full or no permission: it is computed again next time
             write_atomically(path, _packed(made, key))
     return made
 
 
 def _key(store: Store, members: Members) -> str:
-    """Changes with the library, its specification, and which movement shows which symbol."""
+    """Key of the cache: changes with the library, its specification, and the members of symbols."""
     text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
@@ -61,7 +61,7 @@ def _key(store: Store, members: Members) -> str:
 
 
 def _packed(calibration: Calibration, key: str) -> bytes:
-    pooled = {id(one): one for one in calibration.pooled}  # classes of one size share theirs
+    pooled = {id(one): one for one in calibration.pooled}  # classes of one size share an array
     numbers = {name: k for k, name in enumerate(pooled)}
     arrays: dict[str, Any] = {f"pooled {k}": one for k, one in enumerate(pooled.values())}
     arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
@@ -72,12 +72,12 @@ def _packed(calibration: Calibration, key: str) -> bytes:
 
 
 def _seal(data: bytes, key: str) -> bytes:
-    """Fits these bytes, for these members, alone."""
+    """Checksum of the bytes and the key."""
     return hashlib.sha256(key.encode() + data).digest()
 
 
 def _unpacked(data: bytes, key: str, n: int) -> Calibration:
-    """The calibration of n classes; a ValueError or KeyError if this is none: the checksum has no key."""
+    """The calibration of n classes; a ValueError or KeyError if invalid, since anybody can compute the checksum."""
     data, seal = data[32:], data[:32]
     if seal != _seal(data, key):
         raise ValueError("damaged, or of other members")

@@ -1,8 +1,7 @@
-"""Codes of every movement of a library, in a file beside the database that can be built again at any time.
+"""Reduced features of every movement of a library, in a cache file beside the database.
 
-The file is written whole, under another name, and renamed. It is used if it says that it belongs to this library, this
-specification and this history, and if its checksum holds; else it is built again, in silence: it holds
-nothing of its own.
+The file is written atomically. It is used if its key names this library, this specification and this history, and if
+its checksum is right; otherwise it is silently built again from the database.
 """
 
 from __future__ import annotations
@@ -29,11 +28,11 @@ from kineme.validation import Array
 FILE = "codes.cache"
 
 _FORMAT = 1
-_HEADER = 4096  # bytes; what follows begins on a page of its own
-_SAMPLE = 2000  # movements that the functions behind the codes are fitted to
+_HEADER = 4096  # bytes; the arrays begin on a new page
+_SAMPLE = 2000  # movements that the codes are fitted to
 _ROWS = 8192  # movements coded at a time
-_GROWN = 0.1  # movements that the file does not know, as a share of those it does, from which on it is written again
-_FEW = 2000  # fewer are never worth it
+_GROWN = 0.1  # share of new movements from which on the file is written again
+_FEW = 2000  # fewer new ones are never written
 
 Ids = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
@@ -41,19 +40,19 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True, eq=False)
 class Index:
-    """Codes of the movements `ids` (ascending), in one block or two: what is in the file, and what came later."""
+    """Codes of the movements `ids` (ascending), in one block or two: from the file, and of later movements."""
 
     ids: Ids
     bases: tuple[Array, ...]
     blocks: tuple[tuple[ReducedFeatures, ...], ...]
 
     def rows(self, ids: Ids) -> NDArray[np.intp]:
-        """Where the codes of those movements are."""
+        """Rows of the codes of these movements."""
         return np.searchsorted(self.ids, ids)
 
 
 def open_index(store: Store) -> Index:
-    """Codes of all movements that the library ever held, as far as they are not in its cache made now."""
+    """Codes of all movements that the library ever had: from the cache, and computed for those not in it."""
     path = store.folder / FILE
     index = _load(store, path)
     known = int(index.ids[-1]) if index is not None else -1
@@ -62,7 +61,7 @@ def open_index(store: Store) -> Index:
         return index if not len(later) else grown(store, index, later)
     everything = _ids_after(store, -1)
     if not store.read_only:
-        with suppress(OSError):  # no room, no permission: memory does as well
+        with suppress(OSError):  # disk full or no permission: kept in memory only
             _write(store, path, everything)
             if (index := _load(store, path)) is not None:
                 return index
@@ -72,7 +71,7 @@ def open_index(store: Store) -> Index:
 
 
 def grown(store: Store, index: Index, later: Ids) -> Index:
-    """The index with the codes of movements that came later."""
+    """The index with the codes of later movements appended."""
     new = reduce_features(index.bases, _features(store, later), store.n_dims or 0)
     if len(index.blocks) > 1:
         pairs = zip(index.blocks[1], new, strict=True)
@@ -81,7 +80,7 @@ def grown(store: Store, index: Index, later: Ids) -> Index:
 
 
 def refreshed(store: Store, index: Index) -> Index:
-    """The index of a library that may have grown since."""
+    """The index brought up to date with the library."""
     later = _ids_after(store, int(index.ids[-1]))
     if len(later) > max(_FEW, _GROWN * len(index.blocks[0][0].values)):
         return open_index(store)
@@ -101,7 +100,7 @@ def _features(store: Store, ids: Ids) -> tuple[NDArray[np.float32], ...]:
 
 
 def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]]], int]:
-    """Types and shapes of the arrays in the file, one after the other, and the bytes they take."""
+    """Types and shapes of the arrays in the file, in order, and their total bytes."""
     d = store.n_dims or 0
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
     for one in store.specification.representations:
@@ -156,7 +155,7 @@ def _write(store: Store, path: Path, ids: Ids) -> None:
 
 
 def _tie(store: Store, version: int) -> dict[str, Any]:
-    """What a cache must say to be believed: which library, seen how, and which history (a copy may have gone on)."""
+    """Key of the cache: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
         found = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
     seen = zlib.crc32(json.dumps(store.specification.to_json()).encode())
@@ -165,7 +164,7 @@ def _tie(store: Store, version: int) -> dict[str, Any]:
 
 
 def _load(store: Store, path: Path) -> Index | None:
-    """The index in a file; None if there is none to be trusted."""
+    """The index in a file; None if there is no valid one."""
     if not path.is_file():  # a pipe would keep us waiting
         return None
     try:
@@ -184,7 +183,7 @@ def _load(store: Store, path: Path) -> Index | None:
 
 
 def _makes_sense(index: Index) -> bool:
-    """Whether these could be codes: a checksum has no key, and anybody can write a file with the right one."""
+    """Whether the values are possible codes: anybody can write a file with the right checksum."""
     return (
         bool((index.ids == np.arange(1, len(index.ids) + 1)).all())
         and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in index.bases)

@@ -1,4 +1,4 @@
-"""The movements that show a symbol, by class, as recognition needs them."""
+"""The members of symbols, ordered by class, as recognition needs them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.movements.trajectories.labels import label_array
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Movements that show a symbol, ordered by the symbol's name, then by id."""
+    """Members of symbols, ordered by the symbol's name, then by id."""
 
     ids: Ids  # (m,)
     names: NDArray[Any]  # (C,), sorted
@@ -26,12 +26,12 @@ class Members:
 
     @property
     def labels(self) -> NDArray[Any]:
-        """The name of each one's symbol, (m,)."""
+        """The name of each member's symbol, (m,)."""
         return np.repeat(self.names, np.diff(self.first, append=len(self.ids)))
 
 
 def members_of(store: Store) -> Members:
-    """Movements that show a symbol.
+    """All movements that belong to a symbol.
 
     Raises
     ------

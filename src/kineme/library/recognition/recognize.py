@@ -1,4 +1,4 @@
-"""Recognizing with what a library knows: all of it where that is little, in two stages where it is much."""
+"""Recognition with the movements of a library: with all of a small one, in two stages in a large one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ EXHAUSTIVE = 1000
 
 @dataclass(eq=False)
 class LibraryRecognizer:
-    """What recognizes the movements that a library holds: made when first asked for, and again after a change."""
+    """The recognizer of a library; created on first use, and again after a change."""
 
     store: Store
     exhaustive: int = EXHAUSTIVE
@@ -61,7 +61,7 @@ class LibraryRecognizer:
         return two_stages(self.store, self._index, members)
 
     def _named(self, found: list[Answer]) -> list[Answer]:
-        """The answers with ids and names of movements in place of rows."""
+        """The answers with ids and names of movements instead of rows."""
         ids = np.unique([self._ids[near.index] for answer in found for near in answer.nearest])
         names = {one["id"]: one["name"] for one in read.records(self.store, ids)}
 

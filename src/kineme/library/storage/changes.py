@@ -1,4 +1,4 @@
-"""Changes to symbols and to who shows them; each is one version, and none deletes what was there before."""
+"""Changes to symbols and their members; each creates one version, and none deletes rows of earlier versions."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from kineme.library.storage.versions import Change
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
-_SAID = ("description", "prototype", "threshold")  # what `describe` changes
+_SAID = ("description", "prototype", "threshold")  # the columns that `describe` changes
 
 
 def rename(store: Store, old: str, new: str) -> None:
-    """Give a symbol another name; its id stays."""
+    """Rename a symbol; its id stays."""
     check_name(new)
     with store.writing("rename", {"old": old, "new": new}) as change:
         state = state_of(change.connection, old, NOW)
@@ -30,7 +30,7 @@ def rename(store: Store, old: str, new: str) -> None:
 
 
 def describe(store: Store, who: str, **values: Any) -> None:
-    """Change what a symbol says about itself: description, prototype (id of a movement), threshold."""
+    """Change description, prototype (id of a movement) and threshold of a symbol."""
     for name in values:
         check_choice("what is described", name, _SAID)
     if (prototype := values.get("prototype")) is not None:
@@ -41,13 +41,13 @@ def describe(store: Store, who: str, **values: Any) -> None:
     if "description" in values:
         if not isinstance(values["description"], str):
             raise SpecificationError(f"expected a description, got {values['description']!r}")
-        check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, written as JSON
+        check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, in JSON
     with store.writing("describe", {"symbol": who, **values}) as change:
         _replace_state(change, state_of(change.connection, who, NOW), **values)
 
 
 def delete_symbol(store: Store, who: str) -> None:
-    """Take a symbol away; its movements stay, without a symbol."""
+    """Delete a symbol; its movements stay, without a symbol."""
     with store.writing("delete", {"symbol": who}) as change:
         state = state_of(change.connection, who, NOW)
         _leave(change, "symbol = :key", {"key": state[1]})
@@ -55,7 +55,7 @@ def delete_symbol(store: Store, who: str) -> None:
 
 
 def delete_movements(store: Store, ids: Any) -> None:
-    """Take movements away; a symbol whose prototype is among them has none any more."""
+    """Delete movements; a symbol whose prototype is among them loses it."""
     wanted = as_ids(store, ids)
     detail = {"movements": len(wanted), "first": int(wanted[0])}
     with store.writing("delete", detail) as change:
@@ -68,10 +68,10 @@ def delete_movements(store: Store, ids: Any) -> None:
 
 
 def merge(store: Store, names: Sequence[str], into: str) -> None:
-    """Make one symbol of several.
+    """Merge several symbols into one.
 
-    If `into` is the name or id of a symbol, that one takes the members of the others; else a new one is made. The ids
-    of those that went into it become its parents.
+    If `into` is the name or id of a symbol, that one takes the members of the others; otherwise a new symbol is
+    created. The ids of the merged symbols become its parents.
     """
     if isinstance(names, str) or len(set(names)) < 1:
         raise SpecificationError(f"expected a list of symbols to merge, got {names!r}")
@@ -97,7 +97,7 @@ def merge(store: Store, names: Sequence[str], into: str) -> None:
 
 
 def split(store: Store, name: str, ids: Any, new: str) -> None:
-    """Make a new symbol of some members of another one, which becomes its parent."""
+    """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
     check_name(new)
     wanted = as_ids(store, ids)
     with store.writing("split", {"symbol": name, "new": new, "movements": len(wanted)}) as change:
@@ -114,7 +114,7 @@ def split(store: Store, name: str, ids: Any, new: str) -> None:
 
 
 def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
-    """Let movements show a symbol, which is made if there is none; the one that they showed before, they leave."""
+    """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to."""
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
     with store.writing("assign", {"symbol": who, "movements": len(wanted), "how": how}) as change:
@@ -126,14 +126,14 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
 
 
 def release(store: Store, ids: Any) -> None:
-    """Let movements show no symbol any more."""
+    """Remove movements from their symbols."""
     wanted = as_ids(store, ids)
     with store.writing("release", {"movements": len(wanted)}) as change:
         _forget_prototypes(change, _leave(change, among("movement"), {"keys": listed(wanted)}))
 
 
 def _replace_state(change: Change, state: Row, **values: Any) -> None:
-    """The same symbol with other values from this version on."""
+    """Give a symbol other values from this version on."""
     change.retire("symbol_state", [state])
     record = dict(zip(_STATE, state, strict=True)) | values
     record |= {"id": next_key(change.connection, "symbol_state"), "added": change.version, "removed": None}
@@ -141,14 +141,14 @@ def _replace_state(change: Change, state: Row, **values: Any) -> None:
 
 
 def _leave(change: Change, where: str, parameters: dict[str, Any]) -> list[Row]:
-    """End memberships; gives the rows that were ended."""
+    """End memberships; return the rows that were ended."""
     rows = select(change.connection, "member", f"removed IS NULL AND {where}", parameters)
     change.retire("member", rows)
     return rows
 
 
 def _forget_prototypes(change: Change, left: Sequence[Row]) -> None:
-    """A symbol whose prototype is among the members that left it has none any more."""
+    """Clear the prototypes that are among the members that left."""
     pairs = {(row[2], row[1]) for row in left}
     keys = {"keys": listed(key for key, _ in pairs)}
     for state in select(change.connection, "symbol_state", f"removed IS NULL AND {among('symbol')}", keys):

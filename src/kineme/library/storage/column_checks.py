@@ -1,8 +1,7 @@
-"""What every value of a library must be: one condition per column, which SQLite evaluates beside the row.
+"""Valid values of every column: one SQL condition per column, which SQLite evaluates with the row.
 
-A checksum tells that a row is as it was written, not who wrote it: it has no key. A file from elsewhere may hold
-anything under right checksums, therefore types and ranges are checked too, when rows are read, on import and by
-`verify`.
+A checksum detects changes of a row, but anybody can compute it: a file from elsewhere may contain anything under right
+checksums. Therefore types and ranges are checked too, when rows are read, on import and by `verify`.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ _LARGEST_REAL = "1.7976931348623157e308"
 
 
 class Check(NamedTuple):
-    """A condition in SQL, which is TRUE of a good value, what it says, and what of it costs little."""
+    """A SQL condition that is TRUE for valid values, its text for messages, and a cheaper part of it."""
 
     condition: str
     words: str
@@ -52,7 +51,7 @@ def _or_none(name: str, check: Check) -> Check:
     return Check(f"({name} IS NULL OR ({check.condition}))", f"{check.words}, or nothing", quick)
 
 
-#: From when to when a row is alive.
+#: The versions from which and until which a row is alive.
 _ADDED = {"added": _whole("added")}
 _ALIVE = _ADDED | {
     "removed": Check(
@@ -60,7 +59,7 @@ _ALIVE = _ADDED | {
     )
 }
 
-#: Table -> column -> what is true of its values.
+#: Table -> column -> the condition on its values.
 CHECKS: dict[str, dict[str, Check]] = {
     "meta": {"key": _text("key", 1), "value": _text("value", 1, MAX_DOCUMENT)},
     "version": {
@@ -133,7 +132,7 @@ CHECKS: dict[str, dict[str, Check]] = {
     },
 }
 
-#: Table -> the condition that a row is asked whenever it is read, and the one of import and `verify`.
+#: Table -> the condition that is checked whenever a row is read, and the one of import and `verify`.
 GOOD = {
     table: f"({' AND '.join(one.quick or one.condition for one in checks.values())}) IS TRUE"
     for table, checks in CHECKS.items()

@@ -1,8 +1,8 @@
-"""Opening the database of a library: what it must be, and what keeps its writes safe.
+"""Open the database of a library: checks of the file, and settings that keep writes safe.
 
-Write-ahead log: one writer and any number of readers, and a transaction is there as a whole or not at all.
-``synchronous = FULL``: a commit is on the disk when it returns, also after a power cut. It costs one fsync a commit,
-and learning commits thousands of movements at a time.
+The write-ahead log allows one writer and any number of readers, and makes transactions atomic. With ``synchronous =
+FULL`` a commit is on the disk when it returns, also after a power cut. It costs one fsync per commit, and learning
+commits thousands of movements at a time.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from kineme.library.storage.schema import APPLICATION_ID, CREATE, META, MIGRATIO
 from kineme.library.storage.sqlite_errors import in_plain_words
 
 _WRITER_CACHE_KIB = 65536
-_LOG_BYTES = 1 << 26  # what the write-ahead log is cut back to
+_LOG_BYTES = 1 << 26  # size to which the write-ahead log is truncated
 _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name"
 
 
 def connect(path: Path, mode: str, wait: float) -> Connection:
-    """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun by hand."""
+    """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
     address = f"file:{quote(str(path))}?mode={mode}"
     if mode == "ro" and _cannot_keep_a_log(path):
         address += "&immutable=1"
@@ -50,10 +50,10 @@ def connect(path: Path, mode: str, wait: float) -> Connection:
 
 
 def _cannot_keep_a_log(path: Path) -> bool:
-    """Whether the folder is read-only to us and holds no log: then SQLite cannot lock, and reads without.
+    """Whether the folder is read-only for this user and has no log: then SQLite cannot lock, and must read without.
 
-    It takes the file for one that does not change. Should another user, who may write there, do so meanwhile, what is
-    read is refused as damaged until the library is opened again.
+    SQLite then assumes that the file does not change. If another user writes to it meanwhile, rows are refused as
+    damaged until the library is opened again.
     """
     return (
         not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
@@ -62,8 +62,8 @@ def _cannot_keep_a_log(path: Path) -> bool:
 
 
 def create(path: Path, meta: dict[str, str]) -> None:
-    """Make an empty library: all of it or, if anything fails, nothing."""
-    with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may make it at the same time
+    """Create an empty library, atomically."""
+    with in_plain_words(path, 0.0), suppress(FileExistsError):  # another process may create it at the same time
         path.parent.mkdir(parents=True, exist_ok=True)
         check_alone(path)
         with new_database(path) as beside, closing(open_connection(beside, isolation_level=None)) as connection:
@@ -79,10 +79,10 @@ def create(path: Path, meta: dict[str, str]) -> None:
 
 
 def check_alone(path: Path) -> None:
-    """Refuse to make a library where the log of one that is gone still lies: SQLite would add that to the new one."""
+    """Refuse to create a library beside the log of a deleted one: SQLite would apply that log to the new one."""
     logs = [path.with_name(path.name + end) for end in LOGS]
     left = [log for log in logs if log.exists() and log.stat().st_size]
-    if left and not path.exists():  # in this order: a log of another process that makes it now comes after the library
+    if left and not path.exists():  # in this order: the log of a library that is created now appears after it
         raise DataError(
             f"expected no log without its library, found {left[0]} and no {path.name}; put the library back, or delete "
             "the log, which is of no use without it"
@@ -90,7 +90,7 @@ def check_alone(path: Path) -> None:
 
 
 def check_kind(connection: sqlite3.Connection, path: Path) -> int:
-    """The schema version of a library; refuses another program's database, a later version, and strange definitions."""
+    """The schema version; refuses another program's database, a later version, and definitions that are not ours."""
     if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID:
         got = "another program's database" if path.stat().st_size else "an empty file"
         raise DataError(
@@ -106,9 +106,9 @@ def check_kind(connection: sqlite3.Connection, path: Path) -> int:
 
 
 def _check_definitions(connection: sqlite3.Connection, path: Path, version: int) -> None:
-    """Refuse a database that defines anything but the tables and indexes of a library, word for word.
+    """Refuse a database whose definitions differ from the tables and indexes of a library in any character.
 
-    A trigger would change what is written, a view or a computed column could answer anything, and never end.
+    A trigger could change what is written; a view or a computed column could return anything, or run forever.
     """
     encoding = connection.execute("PRAGMA encoding").fetchone()[0]
     expected = _definitions(_statements(version))
@@ -125,7 +125,7 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
 
 
 def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
-    """What the library says of itself, once the definitions of its tables have been found undamaged."""
+    """The rows of the table `meta`, after a check that the definitions of the tables are undamaged."""
     try:
         meta: dict[str, str] = dict(select(connection, "meta"))
         if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(connection):
@@ -137,7 +137,7 @@ def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
 
 
 def _statements(version: int) -> tuple[str, ...]:
-    """What makes an empty file a library of this schema version: the same definitions, word for word, as migrating."""
+    """The statements that create a library of this schema version; equal in every character to those of migration."""
     return (*CREATE, *(statement for earlier in range(1, version) for statement in MIGRATIONS[earlier]))
 
 
@@ -150,7 +150,7 @@ def _definitions(statements: tuple[str, ...]) -> list[Row]:
 
 
 def migrate(connection: sqlite3.Connection, path: Path) -> None:
-    """Bring an older library to today's schema, in one transaction."""
+    """Migrate an older library to the current schema, in one transaction."""
     with transaction(connection):
         for version in range(check_kind(connection, path), SCHEMA_VERSION):
             for statement in MIGRATIONS[version]:
@@ -162,13 +162,13 @@ def migrate(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def schema_seal(connection: sqlite3.Connection) -> str:
-    """A checksum of the tables' definitions, without which the other checksums would mean nothing."""
+    """A checksum of the tables' definitions."""
     return str(zlib.crc32(repr(connection.execute(_DEFINITIONS).fetchall()).encode()))
 
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing. Waits for its turn to write at the beginning, never in the middle."""
+    """An atomic transaction. It waits for the write lock at its beginning, never later."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield

@@ -1,7 +1,7 @@
-"""What rows must hold that SQLite cannot judge: numbers inside bytes, and JSON.
+"""Checks of contents that SQLite cannot do: numbers inside bytes, and JSON.
 
-Each function gets rows whose checksums are right and whose columns fit `column_checks.CHECKS`, and gives the keys of
-those that no library holds, with what is wrong with them.
+Each function takes rows with right checksums whose columns fulfill `column_checks.CHECKS`, and yields the keys of
+invalid rows with a description of what is wrong.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kineme.validation import Array
 
 Strange = Iterator[tuple[Any, str]]
 
-_SLACK = 1e-5  # of the duration: where the last stamp, in single precision, may be
+_SLACK = 1e-5  # of the duration: tolerance of the last stamp, in single precision
 
 _FINITE = "numbers that are not finite"
 
@@ -74,7 +74,7 @@ def _finite(blobs: Sequence[bytes], kind: Any) -> bool:
     return bool(np.isfinite(np.frombuffer(b"".join(blobs), kind)).all())
 
 
-#: Table -> what its rows hold that no library does.
+#: Table -> the check of its contents.
 CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
     "version": _version,
     "source": _source,
@@ -85,7 +85,7 @@ CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
 
 
 def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) -> Strange:
-    """As the functions of `CONTENTS`, for ascending rows of the table `raw`: beside its movement each makes sense."""
+    """Like the functions of `CONTENTS`, for ascending rows of the table `raw`, compared with the rows of movements."""
     yield from _not_finite(rows, 1, np.float64)
     yield from _not_finite(rows, 2, np.float32)
     query = f"SELECT id, n_samples, t0, duration FROM movement WHERE id BETWEEN ? AND ? AND {GOOD['movement']}"
@@ -106,7 +106,7 @@ def samples(connection: sqlite3.Connection, rows: Sequence[Row], n_dims: int) ->
 
 
 def _stamps(rows: Sequence[Row], about: Sequence[tuple[Any, ...]], kind: Any) -> Strange:
-    """Stamps (total,) begin at zero, increase strictly, also when t0 is added, and end with the duration."""
+    """Check that stamps (total,) begin at zero, increase strictly, also with t0 added, and end at the duration."""
     relative: Array = np.frombuffer(b"".join(row[3] for row in rows), kind).astype(np.float64)
     lengths, t0, durations = (np.array([one[k] for one in about]) for k in range(3))
     ends = np.cumsum(lengths)

@@ -1,7 +1,7 @@
-"""What a database from elsewhere may not do, and how long reading it may take.
+"""Defense against hostile databases: what they must not do, and limits on time and size.
 
-SQLite survives hostile files, as its authors say, if it is told to trust none of what they define; see "Defense
-Against The Dark Arts", sqlite.org/security.html.
+According to its authors, SQLite is safe with hostile files if it is set not to trust the definitions in them; see
+"Defense Against The Dark Arts", sqlite.org/security.html.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
-_STEPS = 200_000  # of SQLite's virtual machine, between two looks at the clock: some milliseconds
-#: What one statement may take, in such steps: at least, and for each byte of the file. Reading takes up to three for
-#: each byte of a row, a hundredth of that where features are stored; endless pages hold more rows than bytes.
+_STEPS = 200_000  # of SQLite's virtual machine between two checks of the limits: some milliseconds
+#: Limit of steps for one statement: a minimum, and a number per byte of the file. Reading takes up to three steps per
+#: byte of a row, and a hundredth of that for stored features; pages that refer to each other in circles exceed it.
 _WORK, _WORK_PER_BYTE = 10_000_000, 10
-_ROOM = 1 << 24  # bytes that a copy may have more than twice those of the file
-_SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # a file may take this long, and longer by its size: a slow disk is faster
+_ROOM = 1 << 24  # bytes that a copy may have beyond twice the size of the file
+_SECONDS, _BYTES_PER_SECOND = 60.0, 4e6  # limit of time, with an amount per byte that slow disks keep
 
-#: Switches that Python can set from 3.12 on, by name: what a library needs none of, and what makes no difference to one
-#: that is only read.
+#: Settings that Python can change from 3.12 on, by name: features that a library does not need, and features that do
+#: not matter for a database that is only read.
 _OFF = ("SQLITE_DBCONFIG_ENABLE_TRIGGER", "SQLITE_DBCONFIG_ENABLE_VIEW", "SQLITE_DBCONFIG_TRUSTED_SCHEMA")
 _ON = ("SQLITE_DBCONFIG_DEFENSIVE",)
 
@@ -32,14 +32,14 @@ def size_of(path: Path) -> int:
 
 
 def defend(connection: sqlite3.Connection) -> None:
-    """Let nothing that a file defines act by itself."""
+    """Disable everything that the definitions in a file could run."""
     connection.execute("PRAGMA cell_size_check = ON")
     connection.execute("PRAGMA trusted_schema = OFF")
     _switch(connection, _OFF, False)
 
 
 def defend_foreign(connection: sqlite3.Connection, path: Path) -> None:
-    """As `defend`, for a file that nobody has looked at yet: it is only read, and holds nothing larger than itself."""
+    """As `defend`, for a file that has not been checked: read only, with no value larger than the file."""
     defend(connection)
     connection.execute("PRAGMA query_only = ON")
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1 << 20, min(path.stat().st_size, (1 << 31) - 1)))
@@ -55,25 +55,25 @@ def _switch(connection: sqlite3.Connection, names: tuple[str, ...], on: bool) ->
 
 
 class Watched(sqlite3.Connection):
-    """Interrupts a statement that takes more work than reading every byte of the file could.
+    """A connection that interrupts statements that take more work than reading every byte of the file.
 
-    One thread uses it at a time.
+    For one thread at a time.
     """
 
     _path: Path
 
     def __init__(self, *database: Any, **options: Any) -> None:
-        self._looks = 0  # at the statement under way
+        self._looks = 0  # checks during the current statement
         self._too_much: Callable[[], bool] = bool
         super().__init__(*database, **options)
 
     def watch(self, path: Path) -> None:
-        """Begin to do so, for the file of that path."""
+        """Start the limit, for the file of that path."""
         self._path = path
         self.set_progress_handler(self._is_endless, _STEPS)
 
     def execute(self, *statement: Any) -> sqlite3.Cursor:
-        """As SQLite's."""
+        """As `sqlite3.Connection.execute`."""
         self._looks = 0
         return super().execute(*statement)
 
@@ -84,7 +84,7 @@ class Watched(sqlite3.Connection):
 
     @contextmanager
     def stopping(self, too_much: Callable[[], bool]) -> Iterator[None]:
-        """Interrupt also once `too_much()` is true."""
+        """Within the context, interrupt also once `too_much()` is true."""
         self._too_much = too_much
         try:
             yield
@@ -93,12 +93,12 @@ class Watched(sqlite3.Connection):
 
 
 def limited(connection: Watched, path: Path) -> AbstractContextManager[None]:
-    """Interrupt also what all together takes longer than reading every byte of the file could."""
+    """Within the context, interrupt also once all statements together take too long for the size of the file."""
     end = time.monotonic() + _SECONDS + size_of(path) / _BYTES_PER_SECOND
     return connection.stopping(lambda: time.monotonic() > end)
 
 
 def limited_copy(connection: Watched, path: Path, copy: Path) -> AbstractContextManager[None]:
-    """Interrupt also what makes a copy far larger than the file."""
+    """Within the context, interrupt also once the copy is far larger than the file."""
     most = 2 * size_of(path) + _ROOM
     return connection.stopping(lambda: size_of(copy) > most)

@@ -1,4 +1,4 @@
-"""A whole library as one file, and back: every row of every table, with all versions."""
+"""Export a library to one file and import it: every row of every table, with all versions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kineme.library.storage.verify import verify
 
 
 def export(store: Store, path: str | Path) -> Path:
-    """Write the library, with all its versions, to one new file; it is there as a whole or not at all.
+    """Write the library, with all its versions, to one new file, atomically.
 
     Libraries with the same rows give the same bytes.
 
@@ -38,14 +38,14 @@ def export(store: Store, path: str | Path) -> Path:
         ):
             _copy(connection, store, beside)
         with closing(connect(beside, "rw", store.wait)) as copy:
-            copy.execute("PRAGMA schema_version = 1")  # counts how often a file was compacted: no content
+            copy.execute("PRAGMA schema_version = 1")  # a counter of VACUUM, which is not content
     return target
 
 
 def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
     try:
         connection.execute("VACUUM INTO ?", (str(beside),))
-    except sqlite3.IntegrityError as error:  # two rows of one key
+    except sqlite3.IntegrityError as error:  # two rows with one key
         raise damage(f"every row of {store.path} once", f"damaged bytes ({error})") from error
     except sqlite3.OperationalError as error:
         if error.sqlite_errorcode != sqlite3.SQLITE_INTERRUPT:  # of the new file
@@ -55,16 +55,16 @@ def _copy(connection: sqlite3.Connection, store: Store, beside: Path) -> None:
 
 
 def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
-    """Make a library in `folder` of a file that `export` wrote, once every byte and every value has been checked.
+    """Create a library in `folder` from a file of `export`, after checking every byte and every value.
 
-    The file may come from anywhere: a copy of it is looked at, by a connection that nothing in it can make act, and
-    becomes a library only if it defines and holds nothing but what a library does.
+    The file may come from anywhere: a copy of it is checked, by a connection on which nothing in the file can run, and
+    becomes a library only if its definitions and values are those of a library.
 
     Raises
     ------
     DataError
-        There is a library already; the file is no export, is a library in use, is damaged, holds what no library does,
-        or is of a later schema version.
+        The folder has a library already; the file is not an export, is a library in use, is damaged, contains invalid
+        values, or is of a later schema version.
     """
     source, target = Path(path), as_folder(folder) / FILE
     _check_file(source)
@@ -84,12 +84,12 @@ def import_(path: str | Path, folder: str | Path, wait: float = 10.0) -> Path:
 
 
 def _check_file(source: Path) -> None:
-    """Refuse what is not one whole file."""
+    """Refuse anything but one complete file."""
     if not source.is_file():
         got = "something else" if source.exists() else "no file"
         raise DataError(f"expected an exported library at {source}, found {got} there")
     for log in (source.with_name(source.name + end) for end in LOGS):
-        if log.exists() and log.stat().st_size:  # changes are there, and the file alone would be another state
+        if log.exists() and log.stat().st_size:  # the log contains changes; the file alone is an older state
             raise DataError(
                 f"expected an exported library, got {source} with changes beside it in {log.name}; export it, and "
                 "import that file"
@@ -97,14 +97,14 @@ def _check_file(source: Path) -> None:
 
 
 def _check_room(source: Path, target: Path) -> None:
-    """Refuse a file that would fill the disk; one with holes may be larger than the disk it comes from."""
+    """Refuse a file that would fill the disk; a sparse file may be larger than its disk."""
     size, free = source.stat().st_size, shutil.disk_usage(target.parent).free
     if size > free:
         raise DataError(f"expected room for the {size:,} bytes of {source} in {target.parent}, got {free:,}; free some")
 
 
 def _check_structure(beside: Path, source: Path, wait: float) -> None:
-    """Refuse definitions that are not ours, and pages that do not form tables, before anything in them is read."""
+    """Refuse definitions that are not ours, and pages that do not form tables, before rows are read."""
     with closing(connect(beside, "ro", wait)) as copy, limited(copy, beside):
         defend_foreign(copy, beside)
         check_kind(copy, source)
@@ -133,7 +133,7 @@ def _refusal(source: Path, n: int, first: str) -> DataError:
 
 @contextmanager
 def _named(beside: Path, source: Path) -> Iterator[None]:
-    """Errors name the file that the user knows, not the copy that is looked at."""
+    """Let errors name the user's file, not the copy that is checked."""
     try:
         yield
     except DataError as error:
@@ -144,7 +144,7 @@ def _named(beside: Path, source: Path) -> Iterator[None]:
 
 @contextmanager
 def _new(target: Path) -> Iterator[Path]:
-    """As `new_database`, with errors that users can act on."""
+    """As `new_database`, with errors for users."""
     if not target.parent.is_dir():
         raise DataError(f"expected a folder {target.parent} to write {target.name} into, there is none; create it")
     try:

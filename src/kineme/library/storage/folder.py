@@ -1,4 +1,4 @@
-"""The folder of a library: how it is named, and the new files in it, which are there as a whole or not at all."""
+"""The folder of a library: its name, and new files in it, which are created atomically."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from kineme.library.storage.schema import APPLICATION_ID
 from kineme.output.atomic import whole_file
 
 FILE = "library.sqlite"
-LOGS = ("-wal", "-journal")  # ends of the names of the files beside a database from which SQLite changes it
+LOGS = ("-wal", "-journal")  # suffixes of the files beside a database from which SQLite may change it
 _COMPANIONS = (*LOGS, "-shm")
 _DAY = 86400.0  # seconds
 _LEFT = re.compile(r"\..+\.[0-9a-f]{8}")
 
 
 def as_folder(folder: Any) -> Path:
-    """Where a library is, or is to be.
+    """The folder of a library that exists or is to be created.
 
     Raises
     ------
@@ -37,12 +37,12 @@ def as_folder(folder: Any) -> Path:
 
 @contextmanager
 def new_database(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write a database to; if all goes well, that gets the name `path`, which must be free.
+    """Context manager: a name beside `path` for a new database, which is renamed to `path`, if that does not exist.
 
     Raises
     ------
     FileExistsError
-        There is a file of that name, or another process was faster; it stays as it is.
+        A file of that name exists, or another process was faster; it is unchanged.
     """
     if not path.exists():
         _remove_old_leftovers(path.parent)
@@ -51,20 +51,20 @@ def new_database(path: Path) -> Iterator[Path]:
 
 
 def _remove_old_leftovers(folder: Path) -> None:
-    """Delete what processes left that were killed here more than a day ago.
+    """Delete the files of processes that were killed here more than a day ago.
 
     Unlike `kineme.output.atomic.remove_leftovers`, for libraries of any name: an export often has a name that is never
     used again.
     """
     for path in folder.glob(".*"):
-        with suppress(OSError):  # another process was faster, or it is not ours to delete
+        with suppress(OSError):  # another process was faster, or no permission
             if _LEFT.fullmatch(path.name) and time.time() - path.lstat().st_mtime > _DAY and _is_library(path):
                 for end in ("", *_COMPANIONS):
                     path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def _is_library(path: Path) -> bool:
-    """Whether a file begins as a library does."""
+    """Whether a file begins like a library."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:

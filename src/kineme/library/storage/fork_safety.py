@@ -1,16 +1,15 @@
 """Connections to libraries over a fork: all are closed before it, and opened again on both sides when needed.
 
-SQLite remembers in the memory of a process which locks the process holds on a file: those of the connections that are
-open. A fork copies that memory but not the locks, which the system keeps for each process. A child that used a
-connection of its parent, or opened one of its own while SQLite remembers the parent's, would believe in locks that it
-does not have: it would read while others overwrite, write into a log that the parent deletes, or wait for ever for a
-transaction of a thread that is not there. Nor may it close what it inherited: that rolls back a transaction that goes
-on in the parent, in memory that both share. So the memory has to be empty at the fork. A closed connection leaves
-none: the locks are given back, the log is written into the file, and both sides begin with nothing.
+SQLite keeps in the memory of a process which locks its open connections hold on a file. A fork copies that memory but
+not the locks, which the system keeps per process. A child that uses a connection of its parent, or opens its own while
+the copied memory lists the parent's locks, assumes locks that it does not hold: it reads while others overwrite, writes
+into a log that the parent deletes, or waits forever for a transaction of a thread that does not exist. It must not
+close inherited connections either: that would roll back a transaction of the parent in shared memory. So no connection
+may be open at the fork. Closing one releases its locks and writes the log into the file, and both sides start afresh.
 
-A fork waits until no thread reads or writes, and others wait until it is done; within a transaction a library does
-nothing but that, so it is short. Should it take longer than `_PATIENCE`, or should the fork not be one that Python
-prepares, then connections stay open in the parent, and the child refuses to use that library file.
+A fork waits until no thread reads or writes, and threads wait until it is done; transactions are short. If that takes
+longer than `_PATIENCE`, or if the fork is not one that Python prepares, connections stay open in the parent, and the
+child refuses to use that library file.
 """
 
 from __future__ import annotations
@@ -32,34 +31,34 @@ from kineme.runtime import forks
 _PATIENCE = 10.0  # seconds
 
 _changed = Condition()
-_busy: dict[int, int] = {}  # thread -> how many times over it reads or writes
-_forking: int | None = None  # the thread
-_lost: set[tuple[int, int]] = set()  # device and number of files that are open in the parent
+_busy: dict[int, int] = {}  # thread -> number of its nested uses of a library
+_forking: int | None = None  # id of the thread that forks
+_lost: set[tuple[int, int]] = set()  # device and inode of files that are open in the parent
 
 
 class Sleeper(Protocol):
-    """What holds connections between calls."""
+    """An object that keeps connections open between calls."""
 
     path: Path
 
     def sleep(self) -> None:
-        """Close them, to be opened again when needed."""
+        """Close the connections; they are opened again when needed."""
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """Called in a child: those that are open, none of which must be used or closed."""
+        """Called in a child: the connections that are open, which must be neither used nor closed."""
 
 
 _sleepers: WeakSet[Any] = WeakSet()
 
 
 def register(sleeper: Sleeper) -> None:
-    """Put its connections to sleep before every fork."""
+    """Register an object whose connections are closed before every fork."""
     _sleepers.add(sleeper)
 
 
 @contextmanager
 def awake() -> Iterator[None]:
-    """No fork while this lasts; a thread may enter it again."""
+    """Context manager that holds off forks; a thread may enter it several times."""
     me = get_ident()
     _enter(me)
     try:
@@ -69,25 +68,25 @@ def awake() -> Iterator[None]:
 
 
 class Connection(Watched):
-    """Keeps forks waiting until it is closed, or until who holds it lets it `rest`."""
+    """A connection that holds off forks until it is closed, or until its owner calls `rest`."""
 
     _thread: int | None = None
 
     def rest(self) -> Connection:
-        """Do not keep forks waiting any more; the holder is registered, and will close it."""
+        """Hold off forks no more; the owner is registered, and closes the connection before a fork."""
         if self._thread is not None:
             _leave(self._thread)
             self._thread = None
         return self
 
     def close(self) -> None:
-        """As SQLite's."""
+        """As `sqlite3.Connection.close`."""
         super().close()
         self.rest()
 
 
 def open_connection(address: str | Path, **options: Any) -> Connection:
-    """``sqlite3.connect``, for a connection that keeps forks waiting."""
+    """``sqlite3.connect``, for a connection that holds off forks."""
     me = get_ident()
     _enter(me)
     try:
@@ -105,7 +104,7 @@ def is_lost(path: Path) -> bool:
 
 
 def refuse_if_lost(path: Path) -> None:
-    """Refuse a library file that is lost to this process."""
+    """Refuse a library file that was open in the parent at the fork."""
     if is_lost(path):
         raise DataError(
             f"expected a process that opens {path} itself, got one that was forked while the library was being read or "
@@ -130,7 +129,7 @@ def _leave(thread: int) -> None:
 
 @contextmanager
 def _all_asleep() -> Iterator[None]:
-    """Before a fork: nobody reads or writes, and no connection is open."""
+    """Before a fork: wait until no thread reads or writes, and close all connections."""
     global _forking  # noqa: PLW0603
     with _changed:
         _forking = get_ident()
@@ -151,13 +150,13 @@ def _all_asleep() -> Iterator[None]:
 def _in_child() -> None:
     global _changed  # noqa: PLW0603
     _changed = Condition()
-    if _busy:  # what they had open cannot be told from what sleeps
+    if _busy:  # it is unknown which connections were open
         _lost.update(_identity(sleeper.path) for sleeper in list(_sleepers) if sleeper.path.exists())
     for thread in _busy.keys() - {get_ident()}:
         del _busy[thread]
     for sleeper in list(_sleepers):
         for connection in sleeper.carried_over():
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(connection))  # so that not even the end of Python closes it
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(connection))  # so that even the end of Python does not close it
             if sleeper.path.exists():
                 _lost.add(_identity(sleeper.path))
 

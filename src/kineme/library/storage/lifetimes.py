@@ -1,4 +1,4 @@
-"""Whether rows make sense beside each other at every version: what is alive then, and what it refers to."""
+"""Checks across rows: the rows that are alive at each version, and references between them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
 
 
 def lives(connection: sqlite3.Connection) -> Found:
-    """Rows that are alive when they cannot be. Expects a library whose rows are good one by one."""
+    """Find contradictions between the lifetimes of rows. Expects a library whose rows are valid one by one."""
     yield from _counted(connection)
     movement = _columns(connection, "movement", "id")
     state = _columns(connection, "symbol_state", "symbol")
@@ -31,7 +31,7 @@ def lives(connection: sqlite3.Connection) -> Found:
 
 
 def _counted(connection: sqlite3.Connection) -> Found:
-    """Each version says how many rows are alive at it."""
+    """Check the number of rows that are alive, which each version states."""
     names = list(COUNTED.values())
     said = _table(connection, f"SELECT id, {', '.join(names)} FROM version ORDER BY id", 1 + len(names))
     n = len(said)
@@ -50,14 +50,14 @@ def _table(connection: sqlite3.Connection, query: str, width: int) -> Whole:
 
 
 def _columns(connection: sqlite3.Connection, table: str, whose: str) -> Whole:
-    """Rows (key, whose, added, removed), ordered by whose life it is, then by time."""
+    """Rows (key, owner, added, removed), ordered by owner, then by time."""
     query = f"SELECT id, {whose}, added, coalesce(removed, {LARGEST_ID}) FROM {table} WHERE {whose} IS NOT NULL"
     rows = _table(connection, query, 4)
     return rows[np.lexsort((rows[:, 3], rows[:, 2], rows[:, 1]))]
 
 
 def _named(connection: sqlite3.Connection) -> Whole:
-    """As `_columns`, for names: each gets a number."""
+    """As `_columns`, with the names numbered."""
     rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
     numbers: dict[str, int] = {}
     found = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
@@ -66,7 +66,7 @@ def _named(connection: sqlite3.Connection) -> Whole:
 
 
 def _apart(table: str, rows: Whole, words: str, gaps: str = "") -> Found:
-    """Lives of one owner follow one another; without a gap where `gaps` says what one would mean."""
+    """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean."""
     same = rows[1:, 1] == rows[:-1, 1]
     yield from ((table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
     if gaps:
@@ -75,14 +75,14 @@ def _apart(table: str, rows: Whole, words: str, gaps: str = "") -> Found:
 
 
 def _whole_lives(rows: Whole) -> Whole:
-    """One row per owner, from its first version to its last."""
+    """One row per owner, from its first to its last version."""
     owners, first = np.unique(rows[:, 1], return_index=True)
     last = np.append(first[1:], len(rows)) - 1
     return np.stack([owners, owners, rows[first, 2], rows[last, 3]], axis=1) if len(rows) else rows
 
 
 def _within(table: str, rows: Whole, owners: Whole, whose: str) -> Found:
-    """A row lives no longer than what it refers to."""
+    """Check that a row is alive only while the row that it refers to is."""
     if not len(rows):
         return
     place = np.searchsorted(owners[:, 1], rows[:, 1])

@@ -1,4 +1,4 @@
-"""Reading movements, features and primitives back, a few thousand rows at a time, each checked against its checksum."""
+"""Read movements, features and primitives, a few thousand rows at a time, each checked against its checksum."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from kineme.validation import Array
 
 Ids = NDArray[np.int64]
 
-_ROWS = 4096  # fetched at a time
+_ROWS = 4096  # rows fetched at a time
 
 
 def all_ids(store: Store) -> Ids:
@@ -34,7 +34,7 @@ def all_ids(store: Store) -> Ids:
 
 
 def unlabeled_ids(store: Store) -> Ids:
-    """Ids of the movements that show no symbol, ascending."""
+    """Ids of the movements without a symbol, ascending."""
     members = f"SELECT movement FROM member WHERE {ALIVE}"
     query = f"SELECT id FROM movement WHERE {ALIVE} AND id NOT IN ({members}) ORDER BY id"
     with store.reading() as connection:
@@ -49,7 +49,7 @@ def count(store: Store) -> int:
 
 
 def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
-    """Ids, if they are as many as there should be; ids are given one after the other, so that none is left out."""
+    """Ids from a query; refused if their number is wrong."""
     found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
     last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
     if len(found) != expected or last != n or (np.diff(found) <= 0).any():
@@ -58,12 +58,12 @@ def _column(connection: sqlite3.Connection, query: str, version: int, expected: 
 
 
 def as_ids(store: Store, ids: Any) -> Ids:
-    """Ids that a user passes, as an array; all must be in the library.
+    """A user's ids as an array; all must be in the library.
 
     Raises
     ------
     SpecificationError
-        Not whole numbers, none at all, or no such movement at this version.
+        Not whole numbers, an empty list, or no such movement at this version.
     """
     wanted = np.atleast_1d(np.asarray(ids))
     if wanted.dtype.kind not in "iu" or wanted.ndim != 1 or not len(wanted):
@@ -94,7 +94,7 @@ def records(store: Store, ids: Ids) -> list[dict[str, Any]]:
 
 
 def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Demonstrations:
-    """The recordings, in the order of `ids`; without labels unless every one has a label."""
+    """The recordings, in the order of `ids`; with labels if every one has a label."""
     wanted, order = _sorted(ids)
     about = records(store, wanted)
     d, lengths = store.n_dims or 0, np.array([one["n_samples"] for one in about])
@@ -126,13 +126,13 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
 
 
 def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
-    """Refuse to make room for more samples than the files could hold."""
+    """Refuse to allocate memory for more samples than the files could contain."""
     if size > store.size:
         raise strange("movement", (max(about, key=lambda one: int(one["n_samples"]))["id"],))
 
 
 def _check_finite(table: str, rows: Sequence[Row], block: NDArray[Any], lengths: Any = 1) -> None:
-    """Refuse numbers that are not finite: as many rows of the block belong to each row as its length says."""
+    """Refuse rows with values that are not finite; `lengths` are the numbers of block rows per row of the table."""
     if not (good := np.isfinite(block).all(axis=1)).all():
         first = np.cumsum(np.broadcast_to(lengths, len(rows)))
         raise strange(table, rows[int(np.searchsorted(first, np.argmin(good), side="right"))])
@@ -148,7 +148,7 @@ def _check_increasing(times: Array | None, offsets: NDArray[np.intp], keys: Ids)
 
 
 def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durations: Array) -> Array:
-    """Time stamps of all samples: the stored ones, and even ones where none were stored."""
+    """Time stamps of all samples: the stored ones, and even ones for movements without."""
     lengths = np.diff(offsets)
     k = np.arange(offsets[-1]) - np.repeat(offsets[:-1], lengths)
     times: Array = np.repeat(t0, lengths) + np.repeat(durations / (lengths - 1), lengths) * k
@@ -159,7 +159,7 @@ def _times(stamps: dict[int, bytes], offsets: NDArray[np.intp], t0: Array, durat
 
 
 def features(store: Store, ids: Ids) -> NDArray[np.float32]:
-    """Rows of all representations, one after the other, shape (k, sum of d * S)."""
+    """Rows of all representations, concatenated, shape (k, sum of d * S)."""
     wanted, order = _sorted(ids)
     width, done = sum(store.specification.widths(store.n_dims or 0)), 0
     found = np.empty((len(wanted), width), dtype=np.float32)
@@ -172,7 +172,7 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
 
 
 def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Primitives:
-    """The primitives, in the order of `ids`; without labels unless every one has a label."""
+    """The primitives, in the order of `ids`; with labels if every one has a label."""
     wanted, order = _sorted(ids)
     dmp, d = store.specification.dmp, store.n_dims or 0
     about = records(store, ids)
@@ -196,7 +196,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
 
 
 def _concatenated(table: str, rows: Sequence[Row], column: int, kind: Any, width: int) -> NDArray[Any]:
-    """The bytes of a column, (rows, width)."""
+    """The bytes of a column as an array (rows, width)."""
     size = np.dtype(kind).itemsize * width
     for row in rows:
         if len(row[column]) != size:
@@ -213,7 +213,7 @@ def _names(about: Sequence[dict[str, Any]]) -> tuple[str, ...]:
 
 
 def names_of(store: Store, ids: Ids) -> list[str | None]:
-    """The name of each movement's symbol; None where it shows none."""
+    """The name of each movement's symbol; None for movements without."""
     keys = {"keys": listed(ids), "v": store.as_of}
     with store.reading() as connection:
         names = {state[1]: state[2] for state in select(connection, "symbol_state", ALIVE, {"v": store.as_of})}
@@ -225,7 +225,7 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
 
 
 def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:
-    """Rows of a table with those keys, which ascend, some at a time."""
+    """Rows of a table with ascending keys, in chunks."""
     for k in range(0, len(wanted), _ROWS):
         with store.reading() as connection:
             rows = select(connection, table, among(column), {"keys": listed(wanted[k : k + _ROWS])})
@@ -236,7 +236,7 @@ def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list
 
 
 def _sorted(ids: Ids) -> tuple[Ids, NDArray[np.intp]]:
-    """The ids ascending, each once, and where each of `ids` stands among them."""
+    """The unique ids, ascending, and the position of each of `ids` among them."""
     if not len(ids):
         raise SpecificationError("expected at least one movement, got none: the library or the symbol has none yet")
     wanted, order = np.unique(ids, return_inverse=True)

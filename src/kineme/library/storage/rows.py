@@ -1,4 +1,4 @@
-"""Rows of the tables, each sealed with a checksum, so that a flipped bit is told from a number."""
+"""Rows of the tables, each with a checksum that detects damage."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT
 
 Row = tuple[Any, ...]
 
-_PARAMETERS = 999  # of one statement, in every build of SQLite
+_PARAMETERS = 999  # parameters per statement that every build of SQLite allows
 
 #: A row at version :v.
 ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
@@ -37,8 +37,8 @@ def _seal_blobs(row: Row) -> int:
 def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> None:
     """Add rows, in the order of `COLUMNS`, each with its seal.
 
-    Many rows to a statement: between two statements Python's lock changes hands, and a writing thread that asks for it
-    once a row waits for the one that describes the next movements most of the time.
+    Many rows per statement: between two statements the GIL changes hands, and with one statement per row the writing
+    thread would mostly wait for the thread that describes the next movements.
     """
     width = len(COLUMNS[table]) + 1
     step = _PARAMETERS // width
@@ -52,12 +52,12 @@ def insert(connection: sqlite3.Connection, table: str, rows: Sequence[Row]) -> N
 def select(
     connection: sqlite3.Connection, table: str, where: str = "TRUE", parameters: dict[str, Any] | None = None
 ) -> list[Row]:
-    """Rows of a table ordered by key, seals and values checked, seals left out.
+    """Rows of a table ordered by key, with checked seals and values, without the seals.
 
     Raises
     ------
     DataError
-        A row is not what was stored, or holds what no library does; the message names it.
+        A row is damaged or invalid; the message names it.
     """
     columns = COLUMNS[table]
     query = f"SELECT {', '.join(columns)}, crc, {GOOD[table]} FROM {table} WHERE {where} ORDER BY {columns[0]}"
@@ -69,7 +69,7 @@ def select(
 
 
 def sealed(table: str, row: Row) -> bool:
-    """Whether a row fits its seal, which is its last column."""
+    """Whether a row matches its seal, which is its last column."""
     try:
         return seal(table, row[:-1]) == row[-1]
     except TypeError:  # a value of another type than was stored
@@ -77,12 +77,12 @@ def sealed(table: str, row: Row) -> bool:
 
 
 def damaged(table: str, row: Row) -> DataError:
-    """The error for a row whose seal does not fit."""
+    """The error for a row whose seal does not match."""
     return damage(f"{row_name(table, row[0])} as stored", "damaged bytes")
 
 
 def strange(table: str, row: Row) -> DataError:
-    """The error for a row that fits its seal, but holds what no library does."""
+    """The error for a row that matches its seal but has an invalid value."""
     return damage(f"{row_name(table, row[0])} as a library stores it", "values that no library holds")
 
 
@@ -92,7 +92,7 @@ def parsed(text: str) -> Any:
     Raises
     ------
     ValueError
-        It is none, or nested so deeply that nobody wrote it.
+        Invalid JSON, or nested too deeply.
     """
     try:
         return json.loads(text)
@@ -106,7 +106,7 @@ def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
     Raises
     ------
     DataError
-        It is something else; the message names the row.
+        Anything else; the message names the row.
     """
     try:
         value = parsed(row[COLUMNS[table].index(column)])
@@ -118,7 +118,7 @@ def parsed_column(table: str, row: Row, column: str, kind: type) -> Any:
 
 
 def damage(expected: str, got: str) -> DataError:
-    """The error for anything that is not as stored."""
+    """The error for damage, with a description."""
     return DataError(
         f"expected {expected}, got {got}; kineme library verify names all that is damaged: "
         "take the file from a backup or an export"
@@ -126,18 +126,18 @@ def damage(expected: str, got: str) -> DataError:
 
 
 def row_name(table: str, key: Any) -> str:
-    """How messages refer to a row."""
+    """The name of a row in messages."""
     of_movement = {"raw": "the samples", "primitive": "the primitive", "feature": "the features"}
     return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
 
 
 def among(column: str, name: str = "keys") -> str:
-    """A condition that `column` is in the list that `listed` passes as parameter `name`."""
+    """SQL condition that `column` is in the list that is passed as parameter `name`, see `listed`."""
     return f"{column} IN (SELECT value FROM json_each(:{name}))"
 
 
 def listed(values: Iterable[Any]) -> str:
-    """Numbers or texts as the parameter that `among` reads."""
+    """Numbers or texts as the parameter of `among`."""
     return json.dumps([value if isinstance(value, str) else int(value) for value in values])
 
 
@@ -149,20 +149,20 @@ def retire(connection: sqlite3.Connection, table: str, rows: Sequence[Row], vers
 
 
 def next_key(connection: sqlite3.Connection, table: str) -> int:
-    """The key that the next row of a table gets: keys are never used again."""
+    """The key of the next row of a table; keys are never reused."""
     largest = connection.execute(f"SELECT max({COLUMNS[table][0]}) FROM {table}").fetchone()[0]
     return (largest or 0) + 1
 
 
 def as_text(value: Any) -> str:
-    """Text as the database can hold it: what is no Unicode, as some file names, is written out with backslashes."""
+    """Text that the database can store: bytes that are not Unicode, as in some file names, are escaped."""
     text = str(value).encode("utf-8", "backslashreplace").decode("utf-8")
     check_text("a name", text, MAX_TEXT)
     return text
 
 
 def check_text(what: str, text: str, most: int) -> None:
-    """Refuse a text that no library holds: with half of a character in it, or of more bytes than `most`."""
+    """Refuse a text with lone surrogates, or of more bytes than `most`."""
     try:
         size = len(text.encode())
     except UnicodeEncodeError as error:

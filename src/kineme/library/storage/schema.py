@@ -1,4 +1,4 @@
-"""The tables of a library, and how an older library becomes a newer one.
+"""The tables of a library, and the migrations of older ones.
 
 Every committed transaction is a version. Rows are added and, at most once, removed: ``added`` and ``removed`` are
 version numbers, so the state at version v is ``added <= v AND (removed IS NULL OR removed > v)``. Nothing is deleted.
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 APPLICATION_ID = 0x6B696E65  # "kine", in the header of the file
 SCHEMA_VERSION = 1
-MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # bytes of a name, and of a description or JSON
-LARGEST_ID = (1 << 62) - 1  # of versions and rows: one more is still a number to SQLite and NumPy
-PAGE_SIZE = 32768  # a row of features fills a seventh of it or less, so little of a page stays empty
+MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # largest number of bytes of a name, and of a description or JSON
+LARGEST_ID = (1 << 62) - 1  # of versions and rows; adding one does not overflow in SQLite and NumPy
+PAGE_SIZE = 32768  # a row of features fills at most a seventh of it, so that little of a page is unused
 
 #: Table -> its columns, the key first. Every table ends with a checksum of all of them, see `rows.seal`.
 COLUMNS: dict[str, tuple[str, ...]] = {
@@ -30,17 +30,17 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "member": ("id", "movement", "symbol", "how", "added", "removed"),
 }  # fmt: skip
 
-#: Keys of the table `meta`; the last one comes with the first movement.
+#: Keys of the table `meta`; the last one is written with the first movement.
 META = frozenset({"id", "recognizer", "dmp", "schema", "n_dims"})
 
 #: Tables of a key and bytes, one row per movement.
 BLOBS = ("raw", "primitive", "feature")
 
-#: Tables whose rows are alive or removed; each version says how many are alive, in columns of these names.
+#: Tables whose rows are alive or removed; each version stores the number of alive rows, in columns of these names.
 COUNTED = {"movement": "movements", "member": "members", "symbol_state": "symbols"}
 
-#: What makes an empty file a library of version 1. Columns carry the type and the meaning of `COLUMNS`. Not a word may
-#: change, blanks included: SQLite keeps these texts, and a library is refused if its texts are others.
+#: Statements that create a library of version 1, with the columns of `COLUMNS`. No character may change, blanks
+#: included: SQLite stores these texts, and a library with other texts is refused.
 CREATE = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL)",
     """CREATE TABLE version (
@@ -72,7 +72,7 @@ CREATE = (
         id INTEGER PRIMARY KEY, movement INTEGER NOT NULL REFERENCES movement, symbol INTEGER NOT NULL
         REFERENCES symbol, how TEXT NOT NULL CHECK (how IN ('label', 'anchored', 'recognized')),
         added INTEGER NOT NULL REFERENCES version, removed INTEGER REFERENCES version, crc INTEGER NOT NULL)""",
-    # Among rows that are alive: a recording is stored once, a name means one symbol, a movement shows one symbol.
+    # Among alive rows a recording is stored once, a name belongs to one symbol, a movement to at most one symbol.
     "CREATE UNIQUE INDEX movement_digest ON movement (digest) WHERE removed IS NULL",
     "CREATE UNIQUE INDEX movement_place ON movement (source, place) WHERE removed IS NULL AND source IS NOT NULL",
     "CREATE UNIQUE INDEX symbol_name ON symbol_state (name) WHERE removed IS NULL",
@@ -81,5 +81,5 @@ CREATE = (
     "CREATE INDEX source_sha256 ON source (sha256)",
 )
 
-#: Schema version -> the statements that lead from it to the next one, for a library that is there and for a new one.
+#: Schema version -> the statements from it to the next one, for an existing library and for a new one.
 MIGRATIONS: dict[int, tuple[str, ...]] = {}

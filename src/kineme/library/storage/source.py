@@ -1,4 +1,4 @@
-"""Where movements come from: a file as it was when it was read."""
+"""Sources of movements: a file as it was when it was read."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class Source:
     Parameters
     ----------
     path : str
-        As the user gave it; never opened again.
+        As given by the user; never opened again.
     sha256 : str
-        Of its bytes. The same bytes read with the same options are the same source, wherever they lie.
+        Hash of its bytes. Equal bytes read with equal options are the same source, whatever their path.
     size : int
         In bytes.
     kind : str
-        How it was read: "csv", "npz", ...
+        Format: "csv", "npz", ...
     options : mapping
-        What the reader was told: columns, units; anything that JSON can hold.
+        Options of the reader: columns, units; anything that JSON can represent.
     read_at : str
         Time, ISO 8601.
     """
@@ -40,7 +40,7 @@ class Source:
 
     @classmethod
     def of_file(cls, path: str | Path, kind: str = "", options: Mapping[str, Any] | None = None) -> Source:
-        """Look at a file now."""
+        """The source of a file as it is now."""
         with Path(path).open("rb") as file:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()
             size = file.tell()
@@ -49,5 +49,5 @@ class Source:
 
     @property
     def options_json(self) -> str:
-        """The options in one spelling."""
+        """The options as canonical JSON."""
         return json.dumps(dict(self.options), sort_keys=True)

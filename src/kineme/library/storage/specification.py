@@ -1,9 +1,9 @@
-"""What the features and primitives of a library mean: fixed when it is made, kept with it as data."""
+"""The specification of a library's features and primitives: fixed when it is created, stored as plain data."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,15 +22,12 @@ if TYPE_CHECKING:
 
 _MOST = 100_000  # dimensions
 
-#: The primitives of a library: a fit of the path itself, which replays what was shown.
-DEFAULT_DMP = DMP("bio-inspired", fit="trajectory", n_basis=40)
-
 
 @dataclass(frozen=True)
 class Specification:
-    """How the movements of a library are seen, and how they move again.
+    """How the movements of a library are described and compared, and how primitives are learned.
 
-    The fields are the parameters of `kineme.Recognizer` that features depend on, those of its comparison, and `dmp`.
+    The fields are the parameters of `kineme.Recognizer` that features and comparisons depend on, and `dmp`.
     """
 
     representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
@@ -41,7 +38,7 @@ class Specification:
     mean: str = "arithmetic"
     classifier: str = "auto"
     weights: str | tuple[float, ...] = "auto"
-    dmp: DMP = DEFAULT_DMP
+    dmp: DMP = field(default_factory=DMP)
 
     @classmethod
     def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
@@ -58,13 +55,13 @@ class Specification:
         chosen["representations"] = DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
         if not isinstance(weights := chosen.get("weights", "auto"), str):
             chosen["weights"] = tuple(map(float, weights))
-        made = cls(**chosen, dmp=dmp or DEFAULT_DMP)
+        made = cls(**chosen, dmp=dmp or DMP())
         made.check()
         return made
 
     @property
     def normalization(self) -> Normalization:
-        """What is taken out of place and size."""
+        """The normalization of position and size."""
         return Normalization(self.translation, self.scale)
 
     @property
@@ -73,11 +70,11 @@ class Specification:
         return ComparisonSpecification(self.representations, self.normalization, self.cutoff, self.max_angle, self.mean)
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
-        """Numbers per movement in the rows of each representation."""
+        """Row length of each representation."""
         return tuple(n_dims * one.n_points for one in self.representations)
 
     def recognizer(self) -> Recognizer:
-        """A recognizer, not fitted, that sees movements in this way."""
+        """An unfitted recognizer with this specification."""
         from kineme.recognition.recognizer import Recognizer
 
         return Recognizer(**{field.name: getattr(self, field.name) for field in fields(self) if field.name != "dmp"})
@@ -90,7 +87,7 @@ class Specification:
 
     @classmethod
     def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
-        """What `to_json` wrote into the library at `path`; every parameter is checked as if a user had typed it."""
+        """The specification from `to_json` in the library at `path`; every parameter is checked like user input."""
         try:
             seen, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
             seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
@@ -107,7 +104,7 @@ class Specification:
         return made
 
     def check(self) -> None:
-        """Refuse what no recognizer could be made with; each representation and the DMP check themselves."""
+        """Refuse invalid parameters of a recognizer; representations and the DMP check themselves."""
         check_representations(self.representations)
         _ = self.normalization  # checks translation and scale
         if self.max_angle is not None:
@@ -132,7 +129,7 @@ class Specification:
 
 
 def as_n_dims(text: str, path: Path) -> int:
-    """The number of dimensions, as the library at `path` keeps it."""
+    """The number of dimensions from the stored text in the library at `path`."""
     if not (text.isascii() and text.isdecimal() and len(text) <= len(str(_MOST)) and 0 < int(text) <= _MOST):
         raise DataError(
             f"expected {path} to say how many dimensions its movements have, from 1 to {_MOST}, got {text[:40]!r}; "

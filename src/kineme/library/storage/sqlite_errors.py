@@ -1,4 +1,4 @@
-"""SQLite's errors in the words of a library: what was expected, what came, what to do next."""
+"""Errors of SQLite as `DataError`: what was expected, what came, what to do next."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _DAMAGED = (
     "file can still be opened, kineme library verify names what is damaged"
 )
 
-#: What SQLite says of damage under no code of its own: of text that is no text any more, of a strange header.
+#: Messages of SQLite about damage without an error code of its own.
 _DAMAGE = ("decode", "unsupported file format")
 
-#: Primary result code of SQLite -> what to tell; see sqlite.org/rescode.html for the codes.
+#: Primary result code of SQLite -> message; see sqlite.org/rescode.html for the codes.
 _WORDS = {
     sqlite3.SQLITE_BUSY: (
         "expected to write to {path}, got no turn: another process has been writing for more than {wait:g} s; "
@@ -56,12 +56,12 @@ _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
 
 @contextmanager
 def in_plain_words(path: Path, wait: float) -> Iterator[None]:
-    """Turn errors of the database into `DataError`; a mistake of this library stays what it is."""
+    """Convert errors of the database to `DataError`; programming errors stay as they are."""
     try:
         yield
     except KinemeError:
         raise
-    except FileExistsError:  # who waits for it knows better what it means
+    except FileExistsError:  # handled by the caller
         raise
     except OSError as error:
         raise DataError(f"expected to read or write {path}, got an error of the system ({error})") from error

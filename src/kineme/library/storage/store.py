@@ -23,23 +23,23 @@ from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.library.storage.sqlite_errors import in_plain_words
 from kineme.library.storage.versions import Change, Moment, Version, moment_at
 
-NOW = LARGEST_ID  # later than every version: what is there now
+NOW = LARGEST_ID  # later than every version: the current state
 
 
 class Store:
-    """A library's database, opened.
+    """The open database of a library.
 
     Parameters
     ----------
     path : Path
-        Of the database. Caches that can be built again may lie beside it.
+        Path of the database. Caches that can be built again may be beside it.
     specification : Specification, optional
-        Of a library that is to be created if there is none.
+        Specification of a library that is created if it does not exist.
     read_only : bool
     as_of : int, optional
         Show the library as it was at this version; implies `read_only`.
     wait : float
-        Seconds to wait for another writer's turn to end.
+        Seconds to wait for another writer.
     """
 
     def __init__(
@@ -55,11 +55,11 @@ class Store:
         self.read_only = read_only or as_of is not None
         self.wait = wait
         self._turn = RLock()
-        # Threads share the connection to read from, one at a time: Python may hand a statement that it keeps to two
-        # threads that ask the same at the same moment, and each gets rows of the other. Closing takes a turn
-        # too: SQLite frees what a statement needs, and the process would end.
+        # Threads share the reading connection, one at a time: Python's statement cache may give one statement to two
+        # threads with the same query, and each would get rows of the other. Closing waits for its turn too, since
+        # SQLite would free memory of a running statement.
         self._look = RLock()
-        self._n_reading = 0  # how many times over the thread whose turn it is to read does so
+        self._n_reading = 0  # nesting depth of the thread that reads
         self._writer: sqlite3.Connection | None = None
         self._waking, self._asleep, self._closed = Lock(), False, False
         if not self.path.exists():
@@ -82,7 +82,7 @@ class Store:
         return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
 
     def sleep(self) -> None:
-        """Close the connections for a fork; the next one to read or write opens them again."""
+        """Close the connections for a fork; the next read or write opens them again."""
         if not self._closed and not self._asleep:
             self._asleep = True
             for connection in (self._writer, self._reader):
@@ -91,7 +91,7 @@ class Store:
             self._writer = None
 
     def carried_over(self) -> list[sqlite3.Connection]:
-        """The connections that a fork found open; see `fork_safety`."""
+        """The connections that were open at a fork; see `fork_safety`."""
         if self._closed or self._asleep:
             return []
         return [one for one in (self._writer, self._reader) if one is not None]
@@ -112,7 +112,7 @@ class Store:
         create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
 
     def _check_kind(self) -> None:
-        """Refuse what is no library; bring an older one up to date."""
+        """Refuse a file that is not a library; migrate an older one."""
         self._file = self.path.stat().st_ino
         if check_kind(self._reader, self.path) == SCHEMA_VERSION:
             return
@@ -131,7 +131,7 @@ class Store:
 
     @property
     def folder(self) -> Path:
-        """Where the library is."""
+        """The folder of the library."""
         return self.path.parent
 
     @property
@@ -156,9 +156,9 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """The connection to read from. It sees committed versions only, also while this process writes.
+        """Context manager: the connection to read from, which sees only committed versions.
 
-        A thread that reads may begin to read again; no other one reads meanwhile.
+        One thread reads at a time; it may nest readings.
 
         Raises
         ------
@@ -166,9 +166,8 @@ class Store:
             The library was closed, or is not to be used in this process.
         """
         with fork_safety.awake(), in_plain_words(self.path, self.wait):
-            fork_safety.refuse_if_lost(
-                self.path
-            )  # first: in a child, the turn may be that of a thread that is not there
+            # Before the lock: in a forked child, a thread that does not exist may hold it.
+            fork_safety.refuse_if_lost(self.path)
             with self._look:
                 if not self._n_reading:
                     self._check_open()
@@ -180,12 +179,12 @@ class Store:
                     self._n_reading -= 1
 
     def moment(self, connection: sqlite3.Connection) -> Moment:
-        """The version that is shown, which stays the same while others are added."""
+        """Context manager: the shown version, which stays the same while new ones are added."""
         return moment_at(connection, self.as_of)
 
     @contextmanager
     def writing(self, action: str, detail: dict[str, Any] | None = None) -> Iterator[Change]:
-        """One transaction, which becomes one version; put what is worth telling into `detail` before it ends.
+        """Context manager: one transaction, which becomes one version; `detail` is stored in the history.
 
         Raises
         ------
@@ -194,9 +193,8 @@ class Store:
         """
         detail = {} if detail is None else detail
         with fork_safety.awake(), in_plain_words(self.path, self.wait):
-            fork_safety.refuse_if_lost(
-                self.path
-            )  # first: in a child, the turn may be that of a thread that is not there
+            # Before the lock: in a forked child, a thread that does not exist may hold it.
+            fork_safety.refuse_if_lost(self.path)
             with self._turn:
                 self._check_open()
                 self._wake()
@@ -214,9 +212,9 @@ class Store:
                     insert(self._writer, "version", [(change.version, at, action, text, *change.counts.values())])
 
     def check_writable(self) -> None:
-        """Refuse to write where it was opened for reading, or where the file is no longer the one that was opened.
+        """Refuse to write if opened for reading, or if the file is no longer the one that was opened.
 
-        A deleted file can still be written to, and would take the writes with it.
+        Writes to a deleted file would succeed and be lost.
         """
         if self.read_only:
             raise DataError(
@@ -244,14 +242,14 @@ class Store:
             self.close()
 
     def close(self) -> None:
-        """Close both connections, once no other thread uses them; the last one to close leaves a single file."""
+        """Close both connections, once no thread uses them; the last process to close leaves a single file."""
         if fork_safety.is_lost(self.path):
             return
         with fork_safety.awake():
-            self._closed = True  # nobody begins any more
+            self._closed = True  # no new reads or writes begin
             with self._look:
                 self._reader.close()
-            with self._turn:  # not within the other: who reads may want to write
+            with self._turn:  # not nested: a thread that reads may want to write
                 if self._writer is not None:
                     self._writer.close()
 

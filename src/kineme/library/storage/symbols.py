@@ -1,4 +1,4 @@
-"""Symbols: what they are, and the rows that say so."""
+"""Symbols, and the rows that store them."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from kineme.library.storage.schema import COLUMNS, MAX_TEXT
 from kineme.library.storage.store import Store
 from kineme.library.storage.versions import Change, Moment
 
-_ALIKE = 100  # characters by which names are alike: the search takes their square
+_ALIKE = 100  # characters of names that are compared: the time of the search is quadratic
 
-#: How a movement came to its symbol.
+#: How a movement was assigned to its symbol.
 HOW = ("label", "anchored", "recognized")
 
 
@@ -48,13 +48,13 @@ class Symbol:
     members : ndarray of shape (k,)
         Ids of its movements, ascending; read-only.
     prototype : int or None
-        Id of the movement that stands for it.
+        Id of the movement that represents it.
     threshold : float or None
-        Largest nonconformity of a member, where it was set.
+        Largest nonconformity of a member, if set.
     parents : tuple of str
         Ids of the symbols that it was merged or split from.
     created, changed : int
-        Versions that made it, and that gave it its name, description, prototype or threshold.
+        Versions that created it, and that last changed its name, description, prototype or threshold.
     """
 
     id: str
@@ -106,7 +106,7 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     Raises
     ------
     SpecificationError
-        No such symbol; the message lists names like it.
+        No such symbol; the message lists similar names.
     """
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
@@ -162,9 +162,9 @@ def _members(connection: sqlite3.Connection, keys: list[int], moment: Moment) ->
 
 
 def check_name(name: Any) -> str:
-    """Any text that can be written in Unicode is a name: separators, quotes and commands are letters like others.
+    """Check a name: any Unicode text is allowed, with separators, quotes and control characters.
 
-    The one exception is U+0000, which NumPy, C and shells cannot tell from the end of a text.
+    Except U+0000, which NumPy, C and shells treat as the end of a text.
     """
     if not isinstance(name, str) or not name:
         raise SpecificationError(f"expected a name of at least one character, got {name!r}")
@@ -175,11 +175,11 @@ def check_name(name: Any) -> str:
 
 
 def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], tuple[str, ...]]:
-    """Name or id -> key of its symbol, and the names whose symbols did not exist and were made."""
+    """Name or id -> key of its symbol, and the names whose symbols were created."""
     names = list(names)
     known = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
     found: dict[str, int] = {}
-    for column in ("symbol.id", "name"):  # a name goes before an id, as in `state_of`
+    for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
         query = f"SELECT {column}, symbol.key {known} AND {among(column)}"
         found |= dict(change.connection.execute(query, {"keys": listed(names)}))
     made = tuple(name for name in names if name not in found)
@@ -189,7 +189,7 @@ def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], 
 
 
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
-    """A new symbol; gives its key."""
+    """Create a symbol; return its key."""
     key = next_key(change.connection, "symbol")
     change.insert("symbol", [(key, f"sym-{secrets.token_hex(6)}", change.version)])
     state = next_key(change.connection, "symbol_state")
@@ -199,7 +199,7 @@ def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:
 
 
 def add_members(change: Change, pairs: Sequence[tuple[int, int]], how: str) -> None:
-    """Movements, which show no symbol, become members: pairs (movement, key of the symbol)."""
+    """Add movements without a symbol as members: pairs (movement, key of the symbol)."""
     first = next_key(change.connection, "member")
     rows = [(first + k, movement, key, how, change.version, None) for k, (movement, key) in enumerate(pairs)]
     change.insert("member", rows)

@@ -1,4 +1,4 @@
-"""Looking for damage: every page, every checksum, every value, every reference, every size."""
+"""Verify a library: every page, checksum, value, reference and size."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from kineme.library.storage.rows import Row, row_name, sealed
 from kineme.library.storage.schema import BLOBS, COLUMNS, META
 from kineme.library.storage.store import Store
 
-_SHOWN = 100  # messages of one check
-_BATCH_BYTES = 1 << 24  # of rows whose contents are looked at together
-_ROW_BYTES = 512  # of a row beside its bytes, in memory
+_SHOWN = 100  # messages per check
+_BATCH_BYTES = 1 << 24  # of rows whose contents are checked together
+_ROW_BYTES = 512  # memory of a row beside its bytes
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is not as it was stored.
+    """One problem of a library.
 
     Attributes
     ----------
     table : str
-        Empty where the file as a whole is meant.
+        Empty for the file as a whole.
     key : int, str or None
-        Of the row: the movement, in the tables of samples, primitives and features.
+        Key of the row: the movement, in the tables of samples, primitives and features.
     text : str
         What is wrong.
     """
@@ -48,9 +48,9 @@ Check = Callable[[sqlite3.Connection], Iterator[Problem]]
 
 
 def verify(store: Store, *, pages: bool = True) -> list[Problem]:
-    """All that is damaged or that no library holds, as it is at one moment; an empty list if nothing is.
+    """All problems of the library at one moment; an empty list if there are none.
 
-    `pages` is False where the pages of the file have been checked already.
+    `pages` is False if the pages of the file have been checked already.
     """
     with closing(connect(store.path, "ro", store.wait)) as connection, limited(connection, store.path):
         connection.execute("BEGIN")
@@ -62,11 +62,11 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
             _sizes(store),
         ]
         problems = [problem for check in checks for problem in _all_of(check, connection)]
-        return problems or _all_of(_lives, connection)  # rows are looked at together once each is as it should be
+        return problems or _all_of(_lives, connection)  # relations between rows are checked only if each row is valid
 
 
 def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
-    """What a check finds; that it cannot go on is a finding too."""
+    """All problems that a check finds; an error that stops it is one too."""
     found: list[Problem] = []
     try:
         for problem in check(connection):
@@ -85,7 +85,7 @@ def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
 
 
 def _rows(table: str, store: Store) -> Check:
-    """The seal of every row, its values, and what they hold; the last is not asked of rows that failed before."""
+    """Check the seal of every row, its values, and their contents; contents only of rows without other problems."""
 
     def check(connection: sqlite3.Connection) -> Iterator[Problem]:
         try:
@@ -109,12 +109,12 @@ def _rows(table: str, store: Store) -> Check:
 
 
 def _broken(table: str, row: Row) -> list[Problem]:
-    """A row that does not fit its seal."""
+    """The problem of a row that does not match its seal."""
     return [] if sealed(table, row) else [Problem(table, row[0], f"{row_name(table, row[0])}: damaged bytes")]
 
 
 def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[Problem]:
-    """Which values of a row are none that a library holds."""
+    """The problems of a row with invalid values."""
     checks = CHECKS[table]
     fits = ", ".join(f"({one.condition}) IS TRUE" for one in checks.values())
     row = connection.execute(f"SELECT {fits} FROM {table} WHERE {COLUMNS[table][0]} IS ?", (key,)).fetchone()
@@ -135,7 +135,7 @@ def _nothing(rows: Sequence[Row]) -> Iterator[tuple[Any, str]]:
 
 
 def _one_by_one(connection: sqlite3.Connection, table: str) -> Iterator[Problem]:
-    """Which movements' rows cannot be read, in a table that cannot be read in one go."""
+    """The movements whose rows cannot be read, in a table that cannot be read as a whole."""
     if table not in BLOBS:
         return
     for (key,) in connection.execute("SELECT id FROM movement").fetchall():

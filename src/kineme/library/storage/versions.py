@@ -1,4 +1,4 @@
-"""Versions of a library: what each changed, what is alive at it, and the transaction that makes the next one."""
+"""Versions of a library: what each changed, the rows alive at it, and the transaction that creates the next one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kineme.library.storage.schema import COUNTED
 
 @dataclass(frozen=True)
 class Version:
-    """One change.
+    """One version.
 
     Attributes
     ----------
@@ -24,7 +24,7 @@ class Version:
     action : str
         "learn", "rename", ...
     detail : mapping
-        What there is to say about it.
+        Details of the change.
     """
 
     id: int
@@ -35,7 +35,7 @@ class Version:
 
 @dataclass(frozen=True)
 class Moment:
-    """A version, and how many rows are alive at it: by that count, rows that damage has hidden are missed."""
+    """A version and its numbers of alive rows, by which rows that damage has hidden are noticed."""
 
     version: int
     movements: int = 0
@@ -62,7 +62,7 @@ def moment_at(connection: sqlite3.Connection, version: int) -> Moment:
 
 @dataclass(frozen=True)
 class Change:
-    """One transaction under way."""
+    """An open transaction."""
 
     connection: sqlite3.Connection
     version: int
@@ -74,7 +74,7 @@ class Change:
         self._count(table, len(rows))
 
     def retire(self, table: str, rows: Sequence[Row]) -> None:
-        """Remove rows, as they were selected, from this version on."""
+        """Mark selected rows as removed from this version on."""
         retire(self.connection, table, rows, self.version)
         self._count(table, -len(rows))
 

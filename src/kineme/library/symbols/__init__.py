@@ -1,1 +1,1 @@
-"""Symbols of a library: proposals, grounding, reports."""
+"""Symbols of a library: proposals, grounding and reports."""

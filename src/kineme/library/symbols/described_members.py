@@ -1,4 +1,4 @@
-"""Movements of symbols as anchoring compares them, from the features that are stored."""
+"""Movements of symbols in the form that anchoring compares, from the stored features."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import symbols
 from kineme.movements.trajectories.labels import label_array
 
-_MOST = 3000  # movements of symbols that are compared, evenly many of each symbol
+_MOST = 3000  # movements that are compared at most, equally many of each symbol
 
 
 def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
@@ -27,7 +27,7 @@ def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None
 
 
 def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
-    """At most 3000 movements that show a symbol, evenly many of each, and the names of their symbols."""
+    """At most 3000 members of symbols, equally many of each, and the names of their symbols."""
     shown = [symbol for symbol in symbols(store) if len(symbol)]
     share = max(1, _MOST // max(1, len(shown)))
     some = [one.members[evenly_spaced(len(one), share)] for one in shown]

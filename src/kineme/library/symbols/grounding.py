@@ -1,4 +1,4 @@
-"""What symbols mean: the movement that stands for one, how it may vary, and where it lies among the others."""
+"""Grounding of stored symbols: prototypes, parameters, and similarity to other symbols."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from kineme.library.storage.symbols import Symbol, symbol, symbols
 from kineme.library.symbols.described_members import described
 from kineme.primitives.discrete.primitives import Primitives
 
-_MEMBERS = 500  # of a symbol that its prototype is chosen from, at most, evenly spaced
+_MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
 
 
 def prototype_of(store: Store, one: Symbol) -> int:
-    """Id of the movement that stands for a symbol: the one that was named so, else the medoid."""
+    """Id of the prototype of a symbol: the one that was set, else the medoid."""
     if one.prototype is not None:
         return int(one.prototype)
     members = _some_members(one)
@@ -33,14 +33,14 @@ def prototype_of(store: Store, one: Symbol) -> int:
 
 
 def primitive_of(store: Store, who: str) -> Primitives:
-    """The primitive of the movement that stands for a symbol, a batch of one."""
+    """The primitive of the prototype of a symbol, a batch of one."""
     return _primitives(store, np.array([prototype_of(store, symbol(store, who))]))
 
 
 def ground_symbol(
     store: Store, who: str, by: str = "medoid", units: str | Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """A symbol in a planner's terms; see `ActionLibrary.ground`."""
+    """A symbol for a planner; see `ActionLibrary.ground`."""
     one = symbol(store, who)
     typical = prototype_of(store, one)
     members = np.union1d(_some_members(one), [typical])
@@ -52,12 +52,12 @@ def ground_symbol(
         medoid=int(np.searchsorted(members, typical)),
         like=store.specification.recognizer(),
     )
-    grounding["prototype"]["medoid"] = typical  # as the library knows it, for a planner that asks it for more
+    grounding["prototype"]["medoid"] = typical  # its id, for queries to the library
     return grounding
 
 
 def space_of(store: Store) -> ConceptualSpace:
-    """The symbols at distances, by the movements that stand for them; needs two symbols with movements."""
+    """The space of symbols, with distances of their prototypes; needs two symbols with movements."""
     shown = [one for one in symbols(store) if len(one)]
     if len(shown) < 2:
         raise SpecificationError(
@@ -69,7 +69,7 @@ def space_of(store: Store) -> ConceptualSpace:
 
 
 def morph_symbols(store: Store, a: str, b: str, shares: ArrayLike) -> Primitives:
-    """Movements on the way from one symbol to another; see `ActionLibrary.morph`."""
+    """Movements between two symbols; see `ActionLibrary.morph`."""
     return morph(primitive_of(store, a), primitive_of(store, b), shares, store.specification.recognizer())
 
 

@@ -1,4 +1,4 @@
-"""Proposals of symbols among movements without one, for a person to name."""
+"""Proposals of symbols for unlabeled movements, to be named by a person."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kineme.library.storage.symbols import exists
 from kineme.library.symbols.described_members import described
 from kineme.library.symbols.recognized import Recognized, known_symbols
 
-_SAME = 0.8  # of a proposal's members in one that was rejected: it is the same one
+_SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,9 @@ class LibraryProposals:
     Attributes
     ----------
     ids : ndarray of shape (n,)
-        The movements looked at.
+        The movements that were considered.
     found : Proposals
-        The same in places among `ids`, as the pictures of `kineme.anchoring` want them.
+        The same with positions among `ids`, for the pictures of `kineme.anchoring`.
     """
 
     ids: Ids
@@ -116,19 +116,19 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
 
 
 def reject(store: Store, proposal: Proposal) -> None:
-    """Remember that these movements are no symbol; see `ActionLibrary.reject`."""
+    """Store that these movements are no symbol; see `ActionLibrary.reject`."""
     with store.writing("reject", {"movements": proposal.members.tolist()}):
         pass
 
 
 def _rejected_before(store: Store, ids: Ids) -> list[NDArray[np.intp]]:
-    """Positions among `ids` of what was rejected, per rejection."""
+    """Positions among `ids` of rejected movements, per rejection."""
     rejected = [one.detail.get("movements", []) for one in history(store) if one.action == "reject"]
     return [np.flatnonzero(np.isin(ids, one)) for one in rejected]
 
 
 def _without(found: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
-    """The proposals that are not a rejected one again, renumbered."""
+    """The proposals that do not repeat a rejected one, renumbered."""
     kept = [
         k
         for k, one in enumerate(found.proposals)

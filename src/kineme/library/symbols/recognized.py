@@ -1,4 +1,4 @@
-"""Movements without a symbol that are recognized as one."""
+"""Assign movements without a symbol to the symbols that they are recognized as."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Symbols of a library looked at again: which could be one, and which are two."""
+"""Review the symbols of a library: which could be merged, and which could be split."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kineme.library.symbols.described_members import described, evenly_many_memb
 
 @dataclass(frozen=True)
 class Review:
-    """Symbols that could be one, and symbols that could be two.
+    """Symbols that could be merged, and symbols that could be split.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class Review:
 
 
 def review(store: Store) -> Review:
-    """Compare at most 3000 movements of symbols; see `ActionLibrary.review`."""
+    """Compare at most 3000 members of symbols; see `ActionLibrary.review`."""
     ids, labels = evenly_many_members(store)
     if len(np.unique(labels)) < 2:
         return Review((), ())

@@ -1,4 +1,4 @@
-"""One symbol, written out: its movements, where they come from, how they vary."""
+"""A report of one symbol: its movements, their sources, and how they vary."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
     -------
     dict
         ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
-        place in the file, n_samples, duration [s], start and goal.
+        position in the file, n_samples, duration [s], start and goal.
     """
     shown = symbol(store, who)
     members = []
@@ -49,7 +49,7 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
 
 
 def _files(store: Store, keys: list[int]) -> dict[int, str]:
-    """Key of a source -> its path, as it was given."""
+    """Key of a source -> its path, as given."""
     with store.reading() as connection:
         rows = select(connection, "source", among("id"), {"keys": listed(keys)})
     path = COLUMNS["source"].index("path")

@@ -34,7 +34,7 @@ class DMP(SpringDamper):
     ----------
     formulation : {"original", "bio-inspired", "amplitude-scaled", "decoupled"}, default "bio-inspired"
         The transformation system; see `kineme.primitives.discrete.formulations.FORMULATIONS`.
-    n_basis : int, default 80
+    n_basis : int, default 40
         Number N of basis functions, at most 2,000.
     stiffness : float, default 100.0
         Spring constant K, in units of 1 / tau^2.
@@ -42,11 +42,12 @@ class DMP(SpringDamper):
         Damping D; by default critical, ``2 sqrt(K)``.
     gating : {"none", "phase"}, default "none"
         Whether f is Eq. (2) as printed, or that times s, as many implementations have it.
-    fit : {"forcing", "trajectory"}, default "forcing"
-        Solve the equation for f and fit that (the paper's way), or fit the path itself by regularized least squares
-        on the system's response: no numerical derivatives, robust to noise.
+    fit : {"trajectory", "forcing"}, default "trajectory"
+        Fit the path itself by regularized least squares on the system's response: no numerical derivatives, robust to
+        noise. Or solve the equation for f and fit that, as the paper does, with 80 basis functions.
     regression : {"local", "ridge"}, default "local"
-        How ``fit="forcing"`` finds the weights: locally weighted, or jointly by ridge regression.
+        How ``fit="forcing"`` finds the weights: locally weighted, or jointly by ridge regression. The fit of the path
+        does not use it.
     ridge : float, optional
         Strength of the penalty of ``regression="ridge"`` (default 1e-8) and ``fit="trajectory"`` (1e-6).
     phase_end : float, default 0.01
@@ -72,11 +73,11 @@ class DMP(SpringDamper):
     """
 
     formulation: str = "bio-inspired"
-    n_basis: int = 80
+    n_basis: int = 40
     stiffness: float = 100.0
     damping: float | None = None
     gating: str = "none"
-    fit: str = "forcing"
+    fit: str = "trajectory"
     regression: str = "local"
     ridge: float | None = None
     phase_end: float = 0.01

@@ -1,12 +1,17 @@
-"""The unit of time stamps: from the column's head, from their size, or given by the caller."""
+"""Time stamps: their unit, from the column's head, from their size, or given by the caller; and dates."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kineme.errors import DataError
 from kineme.validation import Array
 
 #: Unit -> number per second.
@@ -31,6 +36,7 @@ _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds s
 #: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
 _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
 
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
 
 #: Sources of a unit that are guesses.
 GUESSED = ("since 1970", "by its steps", "assumed")
@@ -70,3 +76,41 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
 def in_seconds(stamps: Array, units: str | float) -> Array:
     """Stamps (total,) of a unit in seconds; by division, so that 100 ms are exactly the float 0.1."""
     return stamps / PER_SECOND[units] if isinstance(units, str) else stamps * float(units)
+
+
+def is_date(cell: str) -> bool:
+    """Whether a cell reads as a date with a time of day, after ISO 8601."""
+    return _DATE.fullmatch(cell) is not None
+
+
+def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
+    """Seconds since 1970 to the microsecond, NaN where a cell is no date; and row -> that cell. No zone is UTC."""
+    seconds, others = np.full(len(cells), np.nan), {}
+    for row, cell in enumerate(cells):
+        try:
+            date = datetime.fromisoformat(cell.strip())
+            seconds[row] = (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
+        except (ValueError, OverflowError):
+            others[row] = cell
+    return seconds, others
+
+
+def nanoseconds(stamps: NDArray[Any]) -> Array:
+    """Dates or durations (datetime64 or timedelta64 of any unit) as nanoseconds, NaN for missing ones.
+
+    Raises
+    ------
+    DataError
+        Dates out of the range of nanoseconds; NumPy before 2.5 would wrap them around silently.
+    """
+    missing = np.isnat(stamps)
+    try:
+        counts = stamps.astype(f"{stamps.dtype.kind}8[ns]")
+        counted = bool(((counts.astype(stamps.dtype) == stamps) | missing).all())
+    except OverflowError:
+        counted = False
+    if not counted:
+        known = stamps[~missing]
+        farthest = known[np.abs(known.astype(np.int64).astype(np.float64)).argmax()]
+        raise DataError(f"expected dates from 1678 to 2262 or durations of that size, got {farthest}")
+    return np.where(missing, np.nan, counts.astype(np.int64))

@@ -1,4 +1,4 @@
-"""The result of a reader: movements of one file as a block, how it was understood, and problems with their lines."""
+"""What is found in a table or in arrays: movements as a block, not yet checked, and how they were understood."""
 
 from __future__ import annotations
 
@@ -9,30 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import DataError, KinemeError
 from kineme.validation import Array
 
 _SHOWN = 40  # names in a message
-
-
-class Problem(NamedTuple):
-    """Something that could not be read.
-
-    `line` counts from 1; None if the file has no lines. `error` is the class that is raised if only this file is read.
-    """
-
-    file: str
-    line: int | None
-    reason: str
-    error: type[KinemeError] = DataError
-
-    @property
-    def what(self) -> str:
-        """Line and reason, without the file."""
-        return f"line {self.line}: {self.reason}" if self.line else self.reason
-
-    def __str__(self) -> str:
-        return f"{self.file}{', ' if self.line else ': '}{self.what}"
 
 
 class Detected(NamedTuple):
@@ -52,7 +31,7 @@ class Detected(NamedTuple):
         Their unit.
     units_from : str
         Source of the unit: ``"given"``, ``"head"``, ``"dates"``; or a guess: ``"since 1970"``, ``"by its steps"``, see
-        `kineme.files.tables.time_units.unit_by_size`, or ``"assumed"``.
+        `kineme.movements.tables.time_stamps.unit_by_size`, or ``"assumed"``.
     movement, label, ignored : tuple of str
         Columns that tell movements apart, that name the action, and that are ignored.
     """
@@ -107,8 +86,8 @@ class Block:
         return k if self.rows is None else int(self.rows[k])
 
 
-class Found(NamedTuple):
-    """The content of one file."""
+class Parsed(NamedTuple):
+    """The content of one file or data frame."""
 
     detected: Detected
     block: Block

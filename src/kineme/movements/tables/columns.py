@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.parsed_file import listed
-from kineme.files.tables.layout import Column, Layout
-from kineme.files.tables.time_units import PER_SECOND, words_of
+from kineme.movements.tables.layout import Column, Layout
+from kineme.movements.tables.parsed import listed
+from kineme.movements.tables.time_stamps import PER_SECOND, words_of
 
 #: Words of heads. A head has a role if all its words are in the role's lists and at least one is in the first list.
 TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "elapsed", "epoch"})

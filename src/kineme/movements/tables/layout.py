@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Real
 
 from kineme.errors import SpecificationError
-from kineme.files.tables.time_units import PER_SECOND, UNITS
+from kineme.movements.tables.time_stamps import PER_SECOND, UNITS
 from kineme.validation import check_choice, check_number
 
 Column = str | int  # head, or number counted from 0
@@ -30,8 +30,8 @@ class Layout:
     label : str or int, optional
         Column that names the action.
     units : str or float, optional
-        Unit of the time stamps: one of `kineme.files.tables.time_units.UNITS`, or the number of seconds in one unit. As
-        a number, it is the step between samples of a file that has no time stamps at all.
+        Unit of the time stamps: one of `kineme.movements.tables.time_stamps.UNITS`, or the number of seconds in one
+        unit. As a number, it is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
 

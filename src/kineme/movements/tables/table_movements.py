@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.files.parsed_file import Block, Detected, Found
-from kineme.files.tables.columns import Roles
-from kineme.files.tables.layout import Layout
-from kineme.files.tables.table import Table
-from kineme.files.tables.time_units import in_seconds, unit_by_size, unit_in_head
+from kineme.movements.tables.columns import Roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.time_stamps import in_seconds, unit_by_size, unit_in_head
 from kineme.validation import Array
 
 
-def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Found:
+def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Parsed:
     """The movements of a table.
 
     With columns that tell movements apart, all rows with equal texts in them, and with equal labels, are one movement,
@@ -47,7 +47,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Fo
         tuple(heads[k] for k in roles.ignored),
     )
     places = [""] * n if n == 1 and not roles.movement else keys
-    return Found(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
+    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:

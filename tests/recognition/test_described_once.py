@@ -1,0 +1,90 @@
+"""A movement is smoothed and described once for each question, whatever is computed from its description."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from movement_samples import draw_shapes
+
+from kineme import Recognizer, Trajectory
+from kineme.anchoring.proposals.assign import place
+from kineme.comparison import describe
+
+QUESTIONS = ["predict", "predict_proba", "decision_function", "p_values", "predict_known", "novelty", "describe"]
+
+
+class _Counts:
+    """Movements that were smoothed and described."""
+
+    def __init__(self, monkeypatch):
+        self.smoothed = self.described = 0
+        smooth, rows = describe.smooth_rows, describe._tile_rows
+
+        def counted_smooth(demos, start, stop, *rest):
+            self.smoothed += stop - start
+            return smooth(demos, start, stop, *rest)
+
+        def counted_rows(demos, start, stop, *rest):
+            self.described += stop - start
+            return rows(demos, start, stop, *rest)
+
+        monkeypatch.setattr(describe, "smooth_rows", counted_smooth)
+        monkeypatch.setattr(describe, "_tile_rows", counted_rows)
+
+
+@pytest.fixture(params=[[1] * 5, [3, 4], [9, 8, 10]])
+def asked(request):
+    """A recognizer by the nearest or by support vectors, which has its calibration, and movements."""
+    recognizer = Recognizer().fit(draw_shapes(request.param))
+    recognizer.calibration()
+    return recognizer, draw_shapes([4] * len(request.param), seed=0, spread=0.2)
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_one_description_answers_a_question(question, asked, monkeypatch):
+    recognizer, movements = asked
+    counts = _Counts(monkeypatch)
+    getattr(recognizer, question)(movements)
+    assert (counts.smoothed, counts.described) == (len(movements), len(movements))
+
+
+def test_an_answer_smooths_each_movement_and_each_example_once(asked, monkeypatch):
+    """The map from the nearest demonstration takes the paths that were described; those of examples are made."""
+    recognizer, movements = asked
+    counts = _Counts(monkeypatch)
+    answers = recognizer.recognize(movements)
+    examples = {one.nearest[0].index for one in answers}
+    assert counts.described == len(movements)
+    assert counts.smoothed == len(movements) + len(examples)
+
+
+def test_movements_that_are_assigned_to_symbols_are_described_once(asked, monkeypatch):
+    recognizer, movements = asked
+    strange = draw_shapes([6], seed=9)
+    both = [one.positions for one in (*movements, *strange)]
+    counts = _Counts(monkeypatch)
+    place(both, recognizer)
+    assert (counts.smoothed, counts.described) == (len(both), len(both))
+
+
+def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
+    demos = draw_shapes([3] * 3)
+    recognizer = Recognizer().fit(demos)
+    recognizer.calibration()
+    asked = []
+    score = "kineme.recognition.spotting.score"
+    from kineme.recognition import spotting
+
+    inner = spotting.score
+
+    def noted(comparison, references, movements, *scores):
+        asked.append(len(movements))
+        return inner(comparison, references, movements, *scores)
+
+    monkeypatch.setattr(score, noted)
+    counts = _Counts(monkeypatch)
+    pieces = [demos[0].positions, np.repeat(demos[0].positions[-1:], 40, axis=0), demos[3].positions]
+    positions = np.concatenate(pieces)
+    recognizer.spot(Trajectory(np.linspace(0.0, 3.0, len(positions)), positions))
+    assert asked
+    assert (counts.smoothed, counts.described) == (sum(asked), sum(asked))
