@@ -101,11 +101,11 @@ class RandomBinning(TransformerMixin, BaseEstimator):
             raise SpecificationError(f"expected {self.n_features_in_} columns as in fit, got {rows.shape[1]}")
         n, per_row = len(rows), self.shifts_.size
         bins = np.floor((rows[:, :, None] + self.shifts_) / self.pitch_).astype(np.int64) - self.lowest_
-        seen = (bins >= 0) & (bins < self.bins_)
-        columns = np.where(seen, bins + self.first_, 0).astype(np.int32).reshape(n, per_row)
+        inside = (bins >= 0) & (bins < self.bins_)
+        columns = np.where(inside, bins + self.first_, 0).astype(np.int32).reshape(n, per_row)
         # sigma > 1: k = m (1 - 1/sigma) + (m / sigma) hat; sigma < 1: k = m hat of pitch sigma m.
         weight = np.sqrt(self.m_ / (max(1.0, float(self.sigma)) * per_row))
-        values = (weight * seen).reshape(-1)
+        values = (weight * inside).reshape(-1)
         index = np.int32 if n * per_row <= _COLUMNS else np.int64  # scikit-learn's linear models need 32-bit indices
         ends = np.arange(n + 1, dtype=index) * per_row  # keeps that type
         Z = csr_array((values, columns.ravel(), ends), shape=(n, int(self.bins_.sum())))

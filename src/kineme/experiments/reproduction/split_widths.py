@@ -31,11 +31,11 @@ def medians_without_each(values: Array, n: int) -> list[float]:
     values : ndarray of shape (n (n - 1) / 2, p)
         Values of the pairs ``np.triu_indices(n, 1)``.
     """
-    place = np.full(values.size, -1)  # rank of each positive value among all of them
+    rank = np.full(values.size, -1)  # rank of each positive value among all of them
     order = np.argsort(values, axis=None, kind="stable")
     order = order[np.count_nonzero(values <= 0) :]
-    place[order] = np.arange(len(order))
-    by_pair = place.reshape(values.shape)
+    rank[order] = np.arange(len(order))
+    by_pair = rank.reshape(values.shape)
     ascending = values.reshape(-1)[order]
     first, second = np.triu_indices(n, 1)
     medians = []

@@ -158,9 +158,16 @@ def _tie(store: Store, version: int) -> dict[str, Any]:
     """Key of the cache: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
         found = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
-    seen = zlib.crc32(json.dumps(store.specification.to_json()).encode())
+    specification = zlib.crc32(json.dumps(store.specification.to_json()).encode())
     at = found[0] if found else None
-    return {"format": _FORMAT, "library": store.id, "seen": seen, "dims": store.n_dims, "version": version, "at": at}
+    return {
+        "format": _FORMAT,
+        "library": store.id,
+        "seen": specification,
+        "dims": store.n_dims,
+        "version": version,
+        "at": at,
+    }
 
 
 def _load(store: Store, path: Path) -> Index | None:

@@ -81,24 +81,24 @@ class Specification:
 
     def to_json(self) -> dict[str, str]:
         """Two documents: ``recognizer`` and ``dmp``."""
-        seen = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "dmp"}
-        seen["representations"] = [asdict(one) for one in self.representations]
-        return {"recognizer": json.dumps(seen), "dmp": json.dumps(specification_to_dict(self.dmp))}
+        recognizer = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "dmp"}
+        recognizer["representations"] = [asdict(one) for one in self.representations]
+        return {"recognizer": json.dumps(recognizer), "dmp": json.dumps(specification_to_dict(self.dmp))}
 
     @classmethod
     def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
         """The specification from `to_json` in the library at `path`; every parameter is checked like user input."""
         try:
-            seen, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
-            seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
-            if isinstance(weights := seen.get("weights"), list):
-                seen["weights"] = tuple(map(float, weights))
-            made = cls(**seen, dmp=specification_from_dict(DMP, dmp))
+            recognizer, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
+            recognizer["representations"] = tuple(Representation(**one) for one in recognizer["representations"])
+            if isinstance(weights := recognizer.get("weights"), list):
+                recognizer["weights"] = tuple(map(float, weights))
+            made = cls(**recognizer, dmp=specification_from_dict(DMP, dmp))
             made.check()
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
             raise DataError(
-                f"expected {path} to say how its movements are seen, got a specification that does not fit ({reason}); "
+                f"expected {path} to contain the specification of its movements, got one that does not fit ({reason}); "
                 "take the file from a backup or an export that you trust"
             ) from error
         return made
