@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import SpecificationError
 from kineme.kernels import TruncatedEuclidean
 from kineme.validation import Array, as_numbers, check_count, check_number, check_seed
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _COLUMNS = np.iinfo(np.int32).max
 _MOST_SHIFTS = 100_000
@@ -39,14 +42,18 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     Attributes
     ----------
     m_ : float
+        The difference at which the kernel is truncated.
+    pitch_ : float
+        Width of a bin, ``min(1, sigma) m``.
     n_features_in_ : int
+        Columns of the training rows.
     n_columns_ : int
         Columns of Z. Values outside the bins of the training rows have no column: they share no bin with those rows.
 
     References
     ----------
-    A. Rahimi and B. Recht, "Random features for large-scale kernel machines", NIPS 2007, Section 4; there over random
-    pitches, here with the one pitch whose kernel is the hat itself.
+    A. Rahimi and B. Recht, "Random features for large-scale kernel machines", NIPS 2007, Section 4. They draw the
+    pitch, too; the fixed pitch here gives the triangle of Eq. (7).
 
     Examples
     --------
@@ -91,7 +98,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         self.n_columns_ = int(counts.sum()) + (self.sigma > 1)
         return self
 
-    def transform(self, X: ArrayLike) -> Any:
+    def transform(self, X: ArrayLike) -> csr_array:
         """Features Z, a `scipy.sparse.csr_array` of shape (n, n_columns_)."""
         from scipy.sparse import csr_array, diags_array, hstack
 
