@@ -1,4 +1,4 @@
-"""What may differ between two movements of the same kind, taken out: place and size."""
+"""What may differ between two movements of one class is taken out: translation and size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Normalization:
     Parameters
     ----------
     translation : bool, default True
-        Take out the place. Merges movements that differ only in where they are done.
+        Take out the mean position. Merges movements that differ only in where they are done.
     scale : {"path", "per-dimension", "none"}, default "path"
         "path" divides by the root mean square distance from the center, one number for all dimensions. Merges a dot and
         a circle. "per-dimension" divides each dimension by its own. Merges a circle and an ellipse too. "none" keeps
@@ -37,14 +37,14 @@ class Normalization:
         check_choice("scale", self.scale, SCALES)
 
     def apply(self, paths: Array) -> Array:
-        """Paths (n, d, T) minus their place, divided by their size."""
+        """Paths (n, d, T) minus their mean position, divided by their size."""
         centered = paths - self.center(paths)
         if self.scale == "none":
             _check_size(centered)
         return np.asarray(centered / self.size(paths))
 
     def center(self, paths: Array) -> Array:
-        """The place of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
+        """The mean position of each path (n, d, T) along the phase, shape (n, d, 1)."""
         return paths.mean(axis=2, keepdims=True) if self.translation else np.zeros((*paths.shape[:2], 1))
 
     def size(self, paths: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How a recognizer looks at a movement: which phase, which quantity."""
+"""Representations of a movement: of which quantity, over which phase."""
 
 from __future__ import annotations
 
@@ -21,14 +21,17 @@ QUANTITIES = ("positions", "forcing")
 class Representation:
     """One way to describe an evenly sampled, smooth path by a row of numbers.
 
+    A recognizer compares movements in several representations and averages the similarities: what misleads one of them,
+    such as uneven timing or a deformed path, leaves another one unimpaired.
+
     Parameters
     ----------
     quantity : {"positions", "forcing"}
         The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
         DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
     arc_share : float
-        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length does not see uneven
-        timing; time tells movements apart that differ in nothing else.
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Over arc length uneven
+        timing makes no difference; over time, movements differ that differ in timing only.
     n_points : int, default 100
         Samples along the phase.
     n_basis, stiffness, ridge
@@ -61,15 +64,15 @@ class Representation:
     def along(self, paths: Array) -> Array:
         """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
         if self.arc_share == 0:
-            every, rest = divmod(paths.shape[2] - 1, self.n_points - 1)
-            return paths[:, :, ::every] if rest == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
+            every, remainder = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
     def describe(self, paths: Array, translation: bool = True) -> Array:
-        """Rows (n, d * n_points), dimension-major, of paths (n, d, n_points) along the phase, place and size taken out.
+        """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
 
-        Without `translation` the place is still in the paths, and the forcing term gets it back: f does not know the
-        place, so the average over representations would forgive a wrong one.
+        Where `translation` is not taken out, the mean position is added to the forcing term: f alone does not depend on
+        the position, so the average over representations would forgive a wrong one.
         """
         described = paths
         if self.quantity == "forcing":
@@ -79,7 +82,7 @@ class Representation:
         return described.reshape(len(paths), -1)
 
 
-#: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".
+#: Three representations that fail on different movements. In an average of narrow kernels one that is close suffices.
 DEFAULT_REPRESENTATIONS = (
     Representation("positions", arc_share=1.0),
     Representation("forcing", arc_share=1.0),
@@ -96,7 +99,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
     if not given or not all(isinstance(one, Representation) for one in given):
         raise SpecificationError(
             "expected representations to be a tuple of kineme.comparison.representation.Representation, one or more, "
-            f"or None for the usual ones, got {representations!r}"
+            f"or None for the default ones, got {representations!r}"
         )
     return given
 

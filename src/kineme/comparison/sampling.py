@@ -1,4 +1,4 @@
-"""Some of many, when all would take too long."""
+"""Evenly spaced samples of many, where all would take too long."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How movements are to be compared, before any are known."""
+"""How movements are to be compared: parameters alone, nothing that is estimated from movements."""
 
 from __future__ import annotations
 

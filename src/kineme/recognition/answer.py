@@ -45,20 +45,22 @@ class Neighbor:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a recognizer says about one movement.
+    """What a recognizer answers to one movement.
 
     Attributes
     ----------
     label : label or None
         The best-ranked class whose p-value is above the error rate; None if there is none: unknown.
     confidence : float
-        1 minus the largest p-value of what was not answered: of the other classes, or, if unknown, of all
-        (Vovk et al. 2005, section 3.4).
+        1 minus the largest p-value of what was not answered: of the other classes, or, if unknown, of all (Vovk et al.
+        2005, section 3.4). At 0.95 no other answer has a p-value above 0.05; it is low where another class fits the
+        movement too.
     p_values : mapping from label to float
-        How many members of the class would look as strange or stranger; see `Calibration`.
+        Share of the members of the class that would be as far from their nearest demonstration, or farther; see
+        `Calibration`.
     calibrated : bool
-        Whether enough demonstrations were left out and scored, for every class compared with, that the error rate is
-        kept. If not, as with one demonstration of each class, p-values and confidence are a guess.
+        Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`. If not,
+        as with one demonstration of each class, p-values and confidence are a guess.
     ranked : tuple of labels
         Best first, in the order of the classifier.
     nearest : tuple of Neighbor

@@ -31,9 +31,15 @@ _PER_MOVEMENT = 0.5  # typical durations that a movement costs: it pays from hal
 
 
 class Spotted(NamedTuple):
-    """One stretch of motion: from when to when [s], what it is (None: no known movement), and how sure.
+    """One stretch of motion: from when to when, what it is (None: unknown), and how sure.
 
-    `confidence` is 1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
+    Attributes
+    ----------
+    start, end : float
+        Time stamps [s].
+    label : label or None
+    confidence : float
+        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
     """
 
     start: float

@@ -22,7 +22,7 @@ from kineme.recognition.conformal import Calibration, check_error_rate, distance
 from kineme.validation import Array
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
-_CLASSES = 64  # classes that an answer speaks of
+_CLASSES = 64  # classes that an answer gives p-values for
 _MOST = 4096  # movements compared afterwards, where bounds leave doubt about the nearest of all
 _OF_CLASSES = 256  # and about the nearest of each class
 _ASKED = 16  # questions whose bounds are computed in one matrix product
@@ -71,11 +71,11 @@ class TwoStageSearch:
         found = []
         for i in range(len(demos)):
             one = described.take(slice(i, i + 1))
-            places, _, near = self.compare(one, bounds[i])
-            compared, calibration = self._compared(one, places, near)
+            chosen, _, near = self.compare(one, bounds[i])
+            compared, calibration = self._compared(one, chosen, near)
             part = paths[i : i + 1]
             answer = answers_to(compared, Nearest(), calibration, demos[i : i + 1], part, error_rate)[0]
-            rows = self.stored.members[places]
+            rows = self.stored.members[chosen]
             named = tuple(replace(other, index=int(rows[other.index])) for other in answer.nearest)
             found.append(replace(answer, nearest=named))
         return found
@@ -94,29 +94,29 @@ class TwoStageSearch:
         First the most promising of all and of each class; then whoever could still be nearer than the nearest of its
         class found so far or, in a class not compared with yet, than the nearest of all.
         """
-        places = self._promising(bounds)
-        described, logs = self._exact(one, places)
+        chosen = self._promising(bounds)
+        described, logs = self._exact(one, chosen)
         near = np.full(len(self.classes), logs.max())
-        owners = np.searchsorted(self.stored.first, places, side="right") - 1
+        owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         begins = np.flatnonzero(np.diff(owners, prepend=-1))
         near[owners[begins]] = np.maximum.reduceat(logs, begins)
         doubtful = bounds > np.repeat(near, self.stored.counts)
-        doubtful[places] = False
+        doubtful[chosen] = False
         more = np.flatnonzero(doubtful)
         decisive = int(np.count_nonzero(bounds[more] > logs.max()))
         n_more = min(decisive, _MOST) + _OF_CLASSES
         if len(more) > n_more:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
         if not len(more):
-            return places, logs, described
+            return chosen, logs, described
         others, other_logs = self._exact(one, more)
-        order = np.argsort(np.concatenate((places, more)), kind="stable")
+        order = np.argsort(np.concatenate((chosen, more)), kind="stable")
         merged = tuple(
             Prepared(np.concatenate((a.rows, b.rows))[order], np.concatenate((a.squares, b.squares))[order])
             for a, b in zip(described.blocks, others.blocks, strict=True)
         )
         logs = np.concatenate((logs, other_logs))[order]
-        return np.concatenate((places, more))[order], logs, replace(described, blocks=merged)
+        return np.concatenate((chosen, more))[order], logs, replace(described, blocks=merged)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
@@ -132,13 +132,13 @@ class TwoStageSearch:
         top = [first[c] + int(bounds[first[c] : first[c] + counts[c]].argmax()) for c in classes]
         return np.unique(np.concatenate([*best, top]))
 
-    def _exact(self, one: Described, places: Rows) -> tuple[Described, Array]:
-        described = self.stored.described(self.comparison.similarity, self.stored.members[places])
+    def _exact(self, one: Described, chosen: Rows) -> tuple[Described, Array]:
+        described = self.stored.described(self.comparison.similarity, self.stored.members[chosen])
         return described, self.comparison.similarity.log_average(one, described)[0]
 
-    def _compared(self, one: Described, places: Rows, described: Described) -> tuple[Compared, Calibration]:
+    def _compared(self, one: Described, chosen: Rows, described: Described) -> tuple[Compared, Calibration]:
         """One movement compared with some members, and the calibration of their classes."""
-        owners = np.searchsorted(self.stored.first, places, side="right") - 1
-        demonstrations = OnDemand(self.stored.members[places], self.stored.movements)
+        owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
+        demonstrations = OnDemand(self.stored.members[chosen], self.stored.movements)
         references = References.of(demonstrations, described, self.classes[owners])
         return Compared(self.comparison, references, one), self.calibration.select(np.unique(owners))

@@ -1,4 +1,4 @@
-"""Many movements of which only the beginning has been seen."""
+"""Classes of many movements of which only the beginning is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The beginnings of movements, described so that place and size need not be known."""
+"""The beginnings of movements, described so that neither translation nor size matters."""
 
 from __future__ import annotations
 
