@@ -127,7 +127,8 @@ def _averaged(**wish):
 
 def _rhythmic_controller(**wish):
     controller = _rhythm().controller(**({"dt": 0.01} | wish))
-    _finite(controller.step(), controller.step())
+    state = controller.step()
+    _finite(state.position, state.velocity, state.acceleration, state.time)
 
 
 def _names(function):
@@ -164,7 +165,10 @@ USES = {
     "shape_attractor": (lambda **wish: _finite(_primitive().shape_attractor(**wish)), ["n_samples"]),
     "controller": (_control("bio-inspired", told=False), _CONTROLLER),
     "original controller": (_control("original", told=False), _CONTROLLER),
-    "rhythmic controller": (_rhythmic_controller, ["dt", "phase"]),
+    "rhythmic controller": (
+        _rhythmic_controller,
+        ["dt", "phase", "period", "amplitude", "baseline", "start", "velocity", *_CONTROLLER[5:-1]],
+    ),
     "phase stopping": (
         lambda **wish: _control("bio-inspired", told=False)(feedback="phase", **wish),
         ["phase_stopping"],

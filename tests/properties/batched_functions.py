@@ -350,15 +350,6 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
     return Batched(f"RhythmicDMP.learn {dmp.fit}", call, 1e-6, draw=rhythms)
 
 
-def rhythms_live(demos: Demonstrations) -> list[dict[str, Any]]:
-    """Steps of a fiftieth of each period: a step is as long for all, so the recordings are given one duration."""
-    alike = Demonstrations.from_arrays([one.positions for one in demos])
-    primitives = RhythmicDMP(period=0.5).learn(alike)
-    controller = primitives.controller(0.01, phase=primitives.phases)
-    path = np.stack([np.array(controller.step()) for _ in range(30)], axis=1)
-    return each(len(demos), path=by_extent(alike, path - primitives.baselines[:, None]))
-
-
 def rhythmic_features(demos: Demonstrations) -> list[dict[str, Any]]:
     shape, forcing = (
         RhythmicFeatures(feature, RhythmicDMP(align_on=0)).fit(demos).transform(demos)
@@ -490,7 +481,6 @@ TABLE = [
     ),
     Batched("RandomBinning", binned, 1e-12, draw=rows),
     *(rhythm_row(RhythmicDMP(fit=fit)) for fit in FITS),
-    Batched("RhythmicPrimitives.controller", rhythms_live, 1e-8, draw=rhythms),
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),
     Batched("PoseDMP.learn", pose_numbers, 1e-6, draw=poses),
     Batched("to_tangent", tangents, 1e-12, draw=poses),

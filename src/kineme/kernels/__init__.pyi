@@ -11,4 +11,4 @@ from kineme.kernels.average import Averaged as Averaged
 # Tables
 from kineme.kernels.table import KERNELS as KERNELS
 from kineme.kernels.means import MEANS as MEANS
-from kineme.kernels.presets import PAPER_WIDTHS as PAPER_WIDTHS
+from kineme.kernels.table import PAPER_WIDTHS as PAPER_WIDTHS

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import fields, replace
+from numbers import Real
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.kernels._numbers import check_representable, positive
+from kineme.errors import SpecificationError
+from kineme.kernels._parameters import Parameters
 from kineme.kernels._rows import Rows, checked_pair, checked_rows
 
 
-class Kernel(ABC):
+class Kernel(Parameters, ABC):
     """A similarity of feature rows; subclasses are frozen dataclasses.
 
     A width that is None is chosen from the *reference* rows of each call: B, or A where B is None.
@@ -62,14 +65,14 @@ class Kernel(ABC):
 
     def _check_dtype(self, dtype: np.dtype[np.floating]) -> None:
         for name in self._width_names():
-            check_representable(getattr(self, name), name, dtype)
+            _check_representable(getattr(self, name), name, dtype)
 
     def _check_widths(self) -> None:
         for name in self._width_names():
             value, default = getattr(self, name), getattr(type(self), name)
             hint = "leave it out to take it from the training rows" if default is None else f"the default is {default}"
             if value is not None or default is not None:
-                object.__setattr__(self, name, positive(value, name, hint))
+                object.__setattr__(self, name, _positive(value, name, hint))
 
     @classmethod
     def _width_names(cls) -> tuple[str, ...]:
@@ -81,3 +84,24 @@ class Kernel(ABC):
     @abstractmethod
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:
         """Write the Gram matrix of checked, non-empty rows; B None means A."""
+
+
+def _positive(value: object, name: str, otherwise: str) -> float:
+    """Return `value` as a float; refuse it unless it is finite and above zero. The message ends with `otherwise`."""
+    try:
+        number = float(value) if isinstance(value, Real) else math.nan
+    except OverflowError:  # an integer beyond the range of floats
+        number = math.inf
+    if not math.isfinite(number) or number <= 0:
+        raise SpecificationError(f"expected a finite {name} > 0, got {value!r}; {otherwise}")
+    return number
+
+
+def _check_representable(value: float, name: str, dtype: np.dtype[np.floating]) -> None:
+    """Raise SpecificationError if `value` squared leaves the range of `dtype`."""
+    limits = np.finfo(dtype)
+    if not float(limits.tiny) <= value * value <= float(limits.max):
+        raise SpecificationError(
+            f"expected {name} squared within the range of {dtype}, got {name} = {value:g}; "
+            "rescale the features or pass float64 rows"
+        )

@@ -54,7 +54,7 @@ class DistanceKernel(Kernel):
                 raise SpecificationError(f"expected a function {name}, got {getattr(self, name)!r}")
 
     def __repr__(self) -> str:
-        names = (f"{name}={getattr(f, '__name__', repr(f))}" for name, f in vars(self).items())
+        names = (f"{name}={getattr(f, '__name__', repr(f))}" for name, f in self.get_params().items())
         return f"DistanceKernel({', '.join(names)})"
 
     def _fill(self, A: Rows, B: Rows | None, gram: Rows) -> None:

@@ -1,8 +1,9 @@
-"""The kernels by name, with their properties: for the command line, the documentation and the tests."""
+"""The kernels by name, with their properties, and those of the paper."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from kineme.kernels.base import Kernel
 from kineme.kernels.canberra import Canberra
@@ -61,3 +62,21 @@ KERNELS: dict[str, KernelRow] = {
         Canberra, "1/n Σ (1 - |x_i - y_i| / (|x_i| + |y_i|))", "", psd=True, infinitely_divisible=False
     ),
 }
+
+
+class PaperKernels(NamedTuple):
+    """The two kernels that the paper applies to one feature of one formulation."""
+
+    rbf: RBF
+    truncated: TruncatedEuclidean
+
+
+#: (feature, formulation), as `DMPFeatures` and `DMP` name them -> the kernels of the paper, Table 3.
+PAPER_WIDTHS: dict[tuple[str, str], PaperKernels] = {
+    ("weights", "original"): PaperKernels(RBF(500), TruncatedEuclidean(750, 1)),
+    ("weights", "bio-inspired"): PaperKernels(RBF(3.5e7), TruncatedEuclidean(1e7, 1)),
+    ("forcing", "original"): PaperKernels(RBF(6e4), TruncatedEuclidean(1e4, 1)),
+    ("forcing", "bio-inspired"): PaperKernels(RBF(7000), TruncatedEuclidean(350, 1)),
+}
+for _kernels in PAPER_WIDTHS.values():
+    hash(_kernels)  # they are constants: a kernel that was hashed refuses set_params

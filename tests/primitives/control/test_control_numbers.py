@@ -7,8 +7,8 @@ import pytest
 
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance, steering
-from kineme.primitives.control.plan import Plan
 from kineme.primitives.control.state import Status
+from kineme.primitives.discrete.plan import plan_of
 
 
 def test_how_strongly_obstacles_turn_a_movement_by_default():
@@ -42,7 +42,7 @@ def test_a_movement_has_settled_within_a_thousandth_of_its_extent(bio):
 @pytest.mark.parametrize("dt", [0.02, 0.3])
 def test_of_a_filtered_goal_the_mean_over_the_step_acts(bio, dt):
     """On the way to a new target by ``filter dg/dt = target - g``."""
-    plan = Plan(bio, ObstacleAvoidance())
+    plan = plan_of(bio)
     old = bio.goals[0] - bio.starts[0]
     goal = MovingGoal(plan, old, 0.2)
     goal.aim(old + 1.0)

@@ -7,9 +7,8 @@ import pytest
 
 from kineme import DMP
 from kineme.primitives.control import _compiled
-from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.plan import Plan
 from kineme.primitives.control.shape_table import shape_table
+from kineme.primitives.discrete.plan import plan_of
 
 
 def look_up(table, u):
@@ -19,7 +18,7 @@ def look_up(table, u):
 
 
 def assert_tabulated(primitive):
-    plan = Plan(primitive, ObstacleAvoidance())
+    plan = plan_of(primitive)
     table = shape_table(plan)
     u = np.concatenate((np.random.default_rng(0).uniform(0, 1.5, 300), [0.0, 1.0, 3.0, 10.0, 1e3, 1e9]))
     expected = plan.shape(u)

@@ -7,10 +7,16 @@ import pytest
 from scipy.linalg import expm
 
 from kineme.primitives.control import _compiled
-from kineme.primitives.control.spring import transition
+from kineme.primitives.spring_damper import transition, transitions
 
 
-@pytest.mark.parametrize("function", [transition, _compiled._transition], ids=["plain", "compiled"])
+def many_at_once(stiffness, damping, h):
+    return transitions(stiffness, damping, np.array([1.0, h]))[1]
+
+
+@pytest.mark.parametrize(
+    "function", [transition, _compiled._transition, many_at_once], ids=["plain", "compiled", "many"]
+)
 @pytest.mark.parametrize("stiffness", [1e-2, 100.0, 1e4])
 @pytest.mark.parametrize("damping", [1e-3, 0.5, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-6, 3.0, 50.0])
 @pytest.mark.parametrize("h", [0.0, 1e-6, 0.01, 1.0])

@@ -41,8 +41,9 @@ def test_the_response_converges_with_twice_the_nodes(monkeypatch, n_nodes):
 
     def solve(steps_per_basis, nodes):
         monkeypatch.setattr(response, "_STEPS_PER_BASIS", steps_per_basis)
-        for name, values in zip(("_NODES", "_NODE_WEIGHTS"), np.polynomial.legendre.leggauss(nodes), strict=True):
-            monkeypatch.setattr(response, name, values)
+        on_both_sides, weights = np.polynomial.legendre.leggauss(nodes)
+        monkeypatch.setattr(response, "NODES", 0.5 * (on_both_sides + 1.0))
+        monkeypatch.setattr(response, "NODE_WEIGHTS", 0.5 * weights)
         u = np.linspace(0, 1, 3)
         return response.spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, u)
 

@@ -46,7 +46,7 @@ def test_it_reaches_a_goal_that_turns_and_moves_after_a_push(kind, seed):
     control, goal = learn(kind, seed).controller(0.02), goal_of(kind, seed)
     for k in range(400):
         state = control.step(
-            pose=goal_of(kind, seed + 1) if k == 20 else None, goal=-goal if k % 2 and kind == "orientation" else goal
+            goal_of(kind, seed + 1) if k == 20 else None, goal=-goal if k % 2 and kind == "orientation" else goal
         )
         assert abs(np.linalg.norm(state.pose[-4:]) - 1) < 1e-9
     assert state.status == Status.SETTLED
@@ -59,7 +59,9 @@ def test_the_measured_state_of_another_run_is_that_run(kind):
     one, other = learn(kind).controller(0.02), learn(kind).controller(0.02)
     for k in range(30):
         now = other.state
-        measured = {"pose": now.pose * [*[1] * (len(now.pose) - 4), *[-1] * 4], "velocity": now.velocity} if k else {}
+        measured = (
+            {"position": now.pose * [*[1] * (len(now.pose) - 4), *[-1] * 4], "velocity": now.velocity} if k else {}
+        )
         np.testing.assert_allclose(one.step(**measured).pose, other.step().pose, atol=1e-9)
 
 
@@ -78,7 +80,11 @@ class Broken:
 
 
 BAD = [[np.nan, 0, 0, 0], [2.0, 0, 0, 0], [1.0, 0, 0], "left", 1.0, [], object(), Broken()]
-STATUS = {"pose": Status.MEASUREMENT_REJECTED, "velocity": Status.MEASUREMENT_REJECTED, "goal": Status.GOAL_REJECTED}
+STATUS = {
+    "position": Status.MEASUREMENT_REJECTED,
+    "velocity": Status.MEASUREMENT_REJECTED,
+    "goal": Status.GOAL_REJECTED,
+}
 
 
 @pytest.mark.parametrize("name", STATUS)

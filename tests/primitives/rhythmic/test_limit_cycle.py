@@ -8,9 +8,9 @@ from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 
 from kineme import RhythmicDMP
-from kineme.primitives.discrete.response import transition
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import limit_cycle
+from kineme.primitives.spring_damper import transitions
 
 SPECS = [
     RhythmicDMP(),
@@ -60,7 +60,7 @@ def test_a_rollout_solves_the_literal_equation(learned, agree, i, k):
 def test_the_state_is_carried_by_the_matrix_exponential(damping, agree):
     steps = np.array([0.0, 1e-6, 0.03, 1.0, 7.0])
     expected = np.array([expm(np.array([[0.0, 1.0], [-100.0, -damping]]) * h) for h in steps])
-    for one, witness in zip(transition(100.0, damping, steps), expected, strict=True):
+    for one, witness in zip(transitions(100.0, damping, steps), expected, strict=True):
         agree(one, witness, 1e-8)
 
 

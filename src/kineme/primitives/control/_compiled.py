@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from kineme.primitives.control.obstacles import AHEAD
-from kineme.primitives.control.spring import NODE_WEIGHTS, NODES, transition
+from kineme.primitives.spring_damper import NODE_WEIGHTS, NODES, transition
 from kineme.runtime.compiled import jit
 
 _transition = jit(transition)
@@ -72,9 +72,11 @@ def _carry(spring, table, state, u, du, goal, ratio, push, shape, end):  # type:
 @jit
 def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
     """`ShapeTable` at u: each Chebyshev polynomial once, for all columns."""
-    breaks, coefficients = table
+    breaks, coefficients, periodic = table
     n_columns = len(shape)
     low, high = 0, len(breaks) - 1
+    if periodic:
+        u -= math.floor(u)
     if u >= breaks[high]:
         shape[:] = 0.0
         return
@@ -99,7 +101,7 @@ def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
 def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: ignore[no-untyped-def]
     """Add the terms of all obstacles to `push`; twin of `obstacles.steering`, with the obstacles `passed` later."""
     gamma, beta, fading = avoidance
-    d = len(push)
+    d = obstacles.shape[1]  # the leading dimensions
     r, heading = np.empty(d), np.empty(d)
     for i in range(len(obstacles)):
         speed, distance = 0.0, 0.0

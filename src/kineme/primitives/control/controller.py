@@ -1,4 +1,4 @@
-"""One primitive under live control."""
+"""One movement under live control, whatever kind of primitive it comes from."""
 
 from __future__ import annotations
 
@@ -9,52 +9,37 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.primitives.control import inputs
+from kineme.primitives.control.clock import Clock
+from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
-from kineme.primitives.control.options import limit, one_movement, options_from
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.primitives.control.options import Options
 from kineme.primitives.control.plan import Influences, Plan
-from kineme.primitives.control.running_sum import RunningSum
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
-from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array, check_number
 
-_SETTLED = 1e-3  # of the demonstration's largest extent
 _NOTHING = Status(0)
 _SHORTEST = 1e-12  # durations; shorter steps are lost in rounding
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
 class Controller:
-    """Moves one primitive step by step, and bends to what happens meanwhile; see `Primitives.controller`.
+    """Moves one primitive step by step, and bends to what happens meanwhile.
 
-    A step carries the equation of the formulation over ``du = tempo dt / tau`` exactly: undisturbed, positions,
-    velocities and accelerations are those of `Primitives.rollout`, at any dt. What is passed to a step is held over
-    it: goal and coupling as they are, obstacles at rest or with their velocities (second order in dt).
+    Made by ``controller`` of `Primitives`, `RhythmicPrimitives` and `PosePrimitives`. A step carries the equation of
+    the movement over ``du = tempo dt / tau`` exactly: undisturbed, positions, velocities and accelerations are those of
+    its rollout, at any dt. What is passed to a step is held over it: goal and coupling as they are, obstacles at rest
+    or with their velocities (second order in dt).
 
     Parameters
     ----------
-    primitives : Primitives
-        One, as in ``primitives[0]``.
+    plan : Plan
+        The movement: equation, start and goal.
     dt : float
         Time of a step [s], at most the duration.
-    start, goal, duration, velocity
-        As in `Primitives.rollout`, for one movement.
-    feedback : {"state", "phase"}, default "state"
-        What a measured position and velocity do. "state": the movement goes on from there. "phase": they do not touch
-        the state; the distance between measured and expected position slows the phase.
-    phase_stopping : float, optional
-        With feedback="phase": a in ``du/dt = tempo / (tau (1 + a |x_measured - x|^2))``, per squared unit.
-    goal_filter : float, optional
-        Time constant [s] with which the goal in force approaches a new one; by default it jumps. Over a step its mean
-        acts (second order in dt).
-    velocity_limit, acceleration_limit : float or array_like of shape (d,), optional
-        Reported when exceeded, by `Status.VELOCITY_LIMIT` and `Status.ACCELERATION_LIMIT`; nothing is clamped. The
-        acceleration counts at the end of the step and as the velocity's mean change over it.
-    avoidance : ObstacleAvoidance, optional
-        How to steer around obstacles.
-    settle : float, optional
-        Distance to the goal, in each dimension, and change per duration within which the movement has settled; by
-        default 0.1 % of the demonstration's largest extent.
+    options : Options
+        Feedback, limits, goal filter, obstacle avoidance.
 
     Attributes
     ----------
@@ -64,60 +49,46 @@ class Controller:
     Raises
     ------
     SpecificationError
-        More than one primitive, an option out of its range, a start, goal or velocity of the wrong shape.
-    DegenerateMovementError
-        The original formulation asked to move a closed or flat demonstration to another goal.
+        A step or a limit out of its range.
 
     Notes
     -----
-    Phase stopping: A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives:
-    Learning Attractor Models for Motor Behaviors", Neural Computation 25(2), 2013. As there, tau grows in all
-    equations, so the path stays the same.
-
     The twin, compiled unless `KINEME_COMPILED=never`, is chosen and warmed up when the controller is made. A controller
     belongs to one thread.
     """
 
-    def __init__(
-        self,
-        primitives: Primitives,
-        dt: float,
-        *,
-        start: ArrayLike | None = None,
-        goal: ArrayLike | None = None,
-        duration: float | None = None,
-        velocity: ArrayLike | None = None,
-        **options: Any,
-    ) -> None:
-        self.options = options_from(options)
-        movement = one_movement(primitives, start, goal, duration, velocity)
-        self._n_dims, self._tau = primitives.n_dims, float(movement.durations[0])
+    state: State
+
+    def __init__(self, plan: Plan, dt: float, options: Options) -> None:
+        if not isinstance(plan, Plan):
+            raise SpecificationError(
+                f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
+            )
         check_number("dt", dt, above=0.0)
-        self.dt = float(dt)
+        self.dt, self.options = float(dt), options
+        self._plan, self._n_dims, self._tau, self._origin = plan, plan.n_dims, plan.duration, plan.origin
         if not self._fits(self.dt):
-            raise SpecificationError(f"expected dt of at most the duration, {self._tau:g} s, got {dt!r} s")
-        self._velocity_limit = limit("velocity_limit", self.options.velocity_limit, self._n_dims)
-        self._acceleration_limit = limit("acceleration_limit", self.options.acceleration_limit, self._n_dims)
-        self._limited = self._velocity_limit is not None or self._acceleration_limit is not None
-        self._settle = float(self.options.settle or _SETTLED * primitives.extents.max())
-        self._plan = Plan(primitives, self.options.avoidance)
-        self._advance = stepper(self._plan)
-        self._x0 = movement.starts[0].copy()
-        self._first = (movement.goals[0] - self._x0, movement.velocities_at_start[0] * self._tau)
-        self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, self._n_dims))
+            most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
+            raise SpecificationError(f"expected dt of at most {most} {self._tau:g} s, got {dt!r} s")
+        self._limits = limits_from(options, self._n_dims)
+        self._limited = self._limits.exist
+        self._settle = float(options.settle or plan.settle)
+        self._advance = stepper(plan, options.avoidance or ObstacleAvoidance())
+        self._zeros, self._nowhere = np.zeros(self._n_dims), np.zeros((0, plan.n_positions))
         self.reset()
 
     def reset(self) -> State:
         """Back to the start, with the first goal; returns the state there."""
-        target, slope = self._first
-        self._goal = MovingGoal(self._plan, target, self.options.goal_filter)
-        self._time, self._u = RunningSum(), RunningSum()
+        plan = self._plan
+        self._goal = MovingGoal(plan, plan.goal, self.options.goal_filter)
+        self._clock = Clock(plan.begin, plan.periodic)
+        self._tau = plan.duration
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events = _NOTHING
-        influences = Influences(*self._goal.follow(0.0), self._zeros, self._nowhere, self._nowhere)
-        self._motion = self._advance(np.vstack((self._zeros, slope)), 0.0, 0.0, influences)  # x - x0, dx/du, x''
-        self.state = self._report()
+        influences = Influences(*self._follow(0.0), self._zeros, self._nowhere, self._nowhere)
+        self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
+        self.state = self._report(*self._derivatives())
         return self.state
 
     def step(  # noqa: PLR0913 - what can happen, a parameter each
@@ -156,6 +127,21 @@ class Controller:
         State
         """
         self._events = _NOTHING
+        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        return self.state
+
+    def _step(  # noqa: PLR0913, PLR0917 - as `step`
+        self,
+        position: Any,
+        velocity: Any,
+        goal: Any,
+        tempo: Any,
+        coupling: Any,
+        obstacles: Any,
+        obstacle_velocities: Any,
+        dt: Any,
+    ) -> None:
+        """`step`, after the events of the last one are forgotten."""
         dt, tempo = self._pace(dt, tempo)
         last = self._motion
         if position is not None or velocity is not None:
@@ -166,71 +152,90 @@ class Controller:
             self._aim(goal)
         self._sense(obstacles, obstacle_velocities)
         push = self._zeros if coupling is None else self._couple(coupling)
-        velocity_before = self._motion[1] * self._rate if self._limited else self._zeros
+        velocity_before = self._derivatives()[0] if self._limited else self._zeros
         self._rate = tempo / (self._tau * (1.0 + self._slowing))
         self._move(dt, push, last)
+        derivatives = self._derivatives()
         if self._limited:
-            self._check_limits(velocity_before, dt)
-        self.state = self._report()
-        return self.state
+            self._events |= self._limits.exceeded(velocity_before, *derivatives, dt)
+        self.state = self._report(*derivatives)
 
     def _pace(self, dt: Any, tempo: Any) -> tuple[float, float]:
         """The time and tempo of this step."""
         wanted = inputs.number(tempo)
-        if wanted >= 0.0 and wanted * self.dt <= self._tau:
+        if wanted >= 0.0 and wanted * self.dt <= self._longest:
             self._tempo = wanted
         else:
             self._events |= Status.TEMPO_REJECTED
         if dt is None:
             return self.dt, self._tempo
         dt = inputs.number(dt)
-        if self._fits(dt) and dt * self._tempo <= self._tau:
+        if self._fits(dt) and dt * self._tempo <= self._longest:
             return dt, self._tempo
         self._events |= Status.DT_REJECTED
         return self.dt, self._tempo
 
     def _fits(self, dt: float) -> bool:
-        return _SHORTEST * self._tau <= dt <= self._tau
+        return _SHORTEST * self._tau <= dt <= self._longest
+
+    @property
+    def _longest(self) -> float:
+        return self._tau * self._plan.longest_step
 
     def _measure(self, position: Any, velocity: Any) -> None:
         """Go on from what was measured, or let its distance slow the phase."""
-        x = None if position is None else inputs.vector(position, self._n_dims)
-        v = None if velocity is None else inputs.vector(velocity, self._n_dims)
+        x = None if position is None else self._read_position(position)
+        v = None if velocity is None else self._read_velocity(velocity, x)
         if (x is None and position is not None) or (v is None and velocity is not None):
             self._events |= Status.MEASUREMENT_REJECTED
         if self.options.phase_stopping is not None:
             if x is not None:
-                error = x - self._x0 - self._motion[0]
+                error = x - self._origin - self._motion[0]
                 self._slowing = float(self.options.phase_stopping * error.dot(error))
             elif position is None:
                 self._slowing = 0.0
             return
         motion = self._motion.copy()
         if x is not None:
-            motion[0] = x - self._x0
+            motion[0] = x - self._origin
         if v is not None and self._rate > 0:
             motion[1] = v / self._rate
         self._motion = motion
 
+    def _read_position(self, value: Any) -> Array | None:
+        """A measured position (d,), or None where it cannot be used."""
+        return inputs.vector(value, self._n_dims)
+
+    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
+        """A measured velocity (d,), at a measured position if there is one."""
+        return inputs.vector(value, self._n_dims)
+
+    def _read_goal(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
+    def _read_coupling(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
     def _aim(self, goal: Any) -> None:
-        target = inputs.vector(goal, self._n_dims)
-        if target is None or not self._goal.aim(target - self._x0):
+        target = self._read_goal(goal)
+        if target is None or not self._goal.aim(target - self._origin):
             self._events |= Status.GOAL_REJECTED
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
-        """Take over the obstacles, relative to x0; without any there are none."""
+        """Take over the obstacles, relative to the origin; without any there are none."""
         if obstacles is None and velocities is None:
             self._obstacles = self._obstacle_velocities = self._nowhere
             return
-        x = inputs.rows(obstacles, self._n_dims)
-        v = inputs.rows(velocities, self._n_dims) if velocities is not None or x is None else np.zeros_like(x)
-        if x is None or v is None or x.shape != v.shape or self._n_dims < 2:
+        n = self._plan.n_positions
+        x = inputs.rows(obstacles, n)
+        v = inputs.rows(velocities, n) if velocities is not None or x is None else np.zeros_like(x)
+        if x is None or v is None or x.shape != v.shape or n < 2:
             self._events |= Status.OBSTACLES_REJECTED
         else:
-            self._obstacles, self._obstacle_velocities = x - self._x0, v
+            self._obstacles, self._obstacle_velocities = x - self._origin[:n], v
 
     def _couple(self, coupling: Any) -> Array:
-        push = inputs.vector(coupling, self._n_dims)
+        push = self._read_coupling(coupling)
         if push is not None:
             return push
         self._events |= Status.COUPLING_REJECTED
@@ -238,8 +243,8 @@ class Controller:
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
-        goal, ratio = self._goal.follow(dt)
-        self._time.add(dt)
+        goal, ratio = self._follow(dt)
+        self._clock.add_time(dt)
         du = self._rate * dt
         if du <= _STANDSTILL:
             self._rate = 0.0
@@ -250,36 +255,35 @@ class Controller:
         if len(velocities):
             velocities = velocities / self._rate
         influences = Influences(goal, ratio, push, self._obstacles, velocities)
-        motion = self._advance(self._motion[:2], self._u.value, du, influences)
+        motion = self._advance(self._motion[:2], self._clock.u, du, influences)
         if inputs.usable(motion):
             self._motion = motion
-            self._u.add(du)
+            self._clock.add_phase(du)
         else:
             self._motion = last
             self._events |= Status.STATE_KEPT
 
-    def _check_limits(self, velocity_before: Array, dt: float) -> None:
-        velocity = self._motion[1] * self._rate
-        if self._velocity_limit is not None and (np.abs(velocity) > self._velocity_limit).any():
-            self._events |= Status.VELOCITY_LIMIT
-        if self._acceleration_limit is not None:
-            largest = np.maximum(
-                np.abs(self._motion[2]) * (self._rate * self._rate), np.abs(velocity - velocity_before) / dt
-            )
-            if (largest > self._acceleration_limit).any():
-                self._events |= Status.ACCELERATION_LIMIT
+    def _follow(self, dt: float) -> tuple[Array, Array]:
+        """Goal and ratio that act during dt."""
+        return self._goal.follow(dt)
 
-    def _report(self) -> State:
-        x, slope, bend = self._motion
-        rate, u, goal = self._rate, self._u.value, self._goal.now
+    def _derivatives(self) -> tuple[Array, Array]:
+        """Velocity and acceleration in time, as the state reports them."""
+        return self._motion[1] * self._rate, self._motion[2] * (self._rate * self._rate)
+
+    def _report(self, velocity: Array, acceleration: Array) -> State:
+        x, clock = self._motion[0], self._clock
+        origin, goal = self._origin, self._goal.now
+        return State(clock.time, clock.progress, origin + x, velocity, acceleration, origin + goal, self._status())
+
+    def _status(self) -> Status:
         status = Status.MOVING
-        if rate == 0.0:
+        if self._rate == 0.0:
             status = Status.PAUSED
-        elif u >= 1.0 and self._rests(x - self._goal.target, slope):
+        elif not self._plan.periodic and self._clock.u >= 1.0 and self._rests():
             status = Status.SETTLED
-        if self._events is not _NOTHING:
-            status |= self._events
-        return State(self._time.value, u, self._x0 + x, slope * rate, bend * (rate * rate), self._x0 + goal, status)
+        return status if self._events is _NOTHING else status | self._events
 
-    def _rests(self, distance: Array, slope: Array) -> bool:
+    def _rests(self) -> bool:
+        distance, slope = self._motion[0] - self._goal.target, self._motion[1]
         return bool(max(np.abs(distance).max(), np.abs(slope).max()) <= self._settle)

@@ -1,17 +1,14 @@
-"""How a controller treats what it is told while it moves."""
+"""The options of a controller, checked when it is made."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.discrete.primitives import Primitives
-from kineme.primitives.discrete.rollout import Rollout, rollout
 from kineme.validation import Array, check_choice, check_number
 
 FEEDBACK = ("state", "phase")
@@ -19,14 +16,46 @@ FEEDBACK = ("state", "phase")
 
 @dataclass(frozen=True)
 class Options:
-    """The choices that `Controller` takes as keywords; they are explained there."""
+    """How a controller treats what it is told while it moves.
+
+    Attributes
+    ----------
+    feedback : {"state", "phase"}, default "state"
+        What a measured position and velocity do. "state": the movement goes on from there. "phase": they do not touch
+        the state; the distance between measured and expected position slows the phase.
+    phase_stopping : float, optional
+        With feedback="phase": a in ``du/dt = tempo / (tau (1 + a |x_measured - x|^2))``, per squared unit.
+    goal_filter : float, optional
+        Time constant [s] with which the goal in force, and the amplitude of a rhythm, approach a new one; by default
+        they jump. Over a step the mean acts (second order in dt).
+    velocity_limit, acceleration_limit : float or array_like, optional
+        For all components or one each, as the state reports them. Reported when exceeded, by `Status.VELOCITY_LIMIT`
+        and `Status.ACCELERATION_LIMIT`; nothing is clamped. The acceleration counts at the end of the step and as the
+        velocity's mean change over it.
+    avoidance : ObstacleAvoidance, optional
+        How to steer around obstacles.
+    settle : float, optional
+        Distance to the goal, in each dimension, and change per duration within which the movement has settled; by
+        default 0.1 % of the demonstration's largest extent. A rhythm never settles.
+
+    Raises
+    ------
+    SpecificationError
+        An option out of its range.
+
+    Notes
+    -----
+    Phase stopping: A. J. Ijspeert, J. Nakanishi, H. Hoffmann, P. Pastor, S. Schaal, "Dynamical Movement Primitives:
+    Learning Attractor Models for Motor Behaviors", Neural Computation 25(2), 2013. As there, tau grows in all
+    equations, so the path stays the same.
+    """
 
     feedback: str = "state"
     phase_stopping: float | None = None
     goal_filter: float | None = None
     velocity_limit: ArrayLike | None = None
     acceleration_limit: ArrayLike | None = None
-    avoidance: ObstacleAvoidance = ObstacleAvoidance()  # noqa: RUF009 - frozen
+    avoidance: ObstacleAvoidance | None = None
     settle: float | None = None
 
     def __post_init__(self) -> None:
@@ -41,60 +70,31 @@ class Options:
         for name in ("goal_filter", "settle"):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), above=0.0)
-        if not isinstance(self.avoidance, ObstacleAvoidance):
+        if self.avoidance is not None and not isinstance(self.avoidance, ObstacleAvoidance):
             raise SpecificationError(f"expected avoidance to be an ObstacleAvoidance, got {self.avoidance!r}")
 
 
-def options_from(keywords: dict[str, Any]) -> Options:
-    """The options that a user typed; one that does not exist is a TypeError, as for any function."""
-    known = [field.name for field in fields(Options)]
-    unknown = [name for name in keywords if name not in known]
-    if unknown:
-        raise TypeError(f"expected options out of {known} for a controller, got {unknown[0]!r}")
-    return Options(**keywords)
-
-
-def one_movement(
-    primitives: Primitives,
-    start: ArrayLike | None,
-    goal: ArrayLike | None,
-    duration: float | None,
-    velocity: ArrayLike | None,
-) -> Rollout:
-    """The undisturbed movement of a single primitive, with the wishes of `Primitives.rollout` checked for one."""
-    if len(primitives) != 1:
-        raise SpecificationError(
-            f"expected one primitive to control, got {len(primitives)}; choose one: primitives[0].controller(dt)"
-        )
-    if duration is not None:
-        check_number("duration", duration, above=0.0)
-    d = primitives.n_dims
-    start, goal, velocity = _wish("start", start, d), _wish("goal", goal, d), _wish("velocity", velocity, d)
-    return rollout(primitives, start, goal, duration, velocity)
-
-
-def _wish(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
-    """A start, goal or velocity as finite (d,)."""
+def one_vector(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
+    """A start, goal or velocity of one movement as finite (d,)."""
     if value is None:
         return None
-    array = _numbers(name, value)
+    array = numbers(name, value)
     array = array[None] if array.ndim == 0 else array  # a number serves one dimension
     if array.shape != (n_dims,) or not np.isfinite(array).all():
         raise SpecificationError(f"expected {name} to be {n_dims} finite numbers, one per dimension, got {value!r}")
     return array
 
 
-def limit(name: str, value: ArrayLike | None, n_dims: int) -> Array | None:
-    """A limit as positive (d,), from a number or one per dimension."""
-    if value is None:
-        return None
-    array = _numbers(name, value)
-    if array.shape not in ((), (n_dims,)) or not (array > 0).all():
-        raise SpecificationError(f"expected {name} to be a number above 0, or {n_dims} of them, got {value!r}")
-    return np.broadcast_to(array, n_dims)
+def check_one(n_primitives: int) -> None:
+    """Refuse to control several primitives at once."""
+    if n_primitives != 1:
+        raise SpecificationError(
+            f"expected one primitive to control, got {n_primitives}; choose one: primitives[0].controller(dt)"
+        )
 
 
-def _numbers(name: str, value: ArrayLike) -> Array:
+def numbers(name: str, value: ArrayLike) -> Array:
+    """What a user typed as an array of numbers."""
     try:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

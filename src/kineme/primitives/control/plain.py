@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from kineme.primitives.control.obstacles import steering
+from kineme.primitives.control.obstacles import ObstacleAvoidance, steering
 from kineme.primitives.control.plan import Influences, Plan
-from kineme.primitives.control.spring import NODES, step_matrices
+from kineme.primitives.spring_damper import NODE_WEIGHTS, NODES, transition
 from kineme.validation import Array
 
 
-def advance(plan: Plan, state: Array, u: float, du: float, influences: Influences) -> Array:
+def advance(
+    plan: Plan, avoidance: ObstacleAvoidance, state: Array, u: float, du: float, influences: Influences
+) -> Array:
     """Carry position and dx/du from u to u + du, and add x'' there.
 
     Spring, damper, forcing term and all that is held over the step are exact, for any du. Obstacles enter by
@@ -22,30 +25,31 @@ def advance(plan: Plan, state: Array, u: float, du: float, influences: Influence
     Parameters
     ----------
     state : ndarray of shape (2, d)
-        Relative to x0.
+        Relative to the origin.
 
     Returns
     -------
     ndarray of shape (3, d)
     """
     with np.errstate(all="ignore"):  # the caller looks at the result
-        return _advance(plan, state, u, du, influences)
+        push = influences.push
+        if not len(influences.obstacles):
+            return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)
+        turn = _turn(avoidance, state, 0.0, influences)
+        middle = _carry(plan, state, u, 0.5 * du, influences, push + turn)
+        turn = _turn(avoidance, middle, 0.5 * du, influences)
+        end = _carry(plan, state, u, du, influences, push + turn)
+        return _with_acceleration(plan, end, u + du, influences, push + _turn(avoidance, end, du, influences))
 
 
-def _advance(plan: Plan, state: Array, u: float, du: float, influences: Influences) -> Array:
-    push, obstacles = influences.push, influences.obstacles
-    if not len(obstacles):
-        return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)
-    turn = steering(plan.avoidance, state, obstacles, influences.obstacle_velocities)
-    middle = _carry(plan, state, u, 0.5 * du, influences, push + turn)
-    turn = _steering_later(plan, middle, 0.5 * du, influences)
-    end = _carry(plan, state, u, du, influences, push + turn)
-    return _with_acceleration(plan, end, u + du, influences, push + _steering_later(plan, end, du, influences))
-
-
-def _steering_later(plan: Plan, state: Array, passed: float, influences: Influences) -> Array:
+def _turn(avoidance: ObstacleAvoidance, state: Array, passed: float, influences: Influences) -> Array:
+    """The terms of the obstacles (d,) when `passed` of the step is over."""
     velocities = influences.obstacle_velocities
-    return steering(plan.avoidance, state, influences.obstacles + passed * velocities, velocities)
+    n_positions = velocities.shape[1]
+    turn = np.zeros(state.shape[1])
+    obstacles = influences.obstacles + passed * velocities
+    turn[:n_positions] = steering(avoidance, state[:, :n_positions], obstacles, velocities)
+    return turn
 
 
 def _carry(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
@@ -69,6 +73,14 @@ def _carry_smoothly(plan: Plan, state: Array, u: float, du: float, influences: I
         state = carry @ state + driven
     state[0] += influences.goal
     return state
+
+
+@lru_cache(maxsize=64)
+def step_matrices(stiffness: float, damping: float, h: float) -> tuple[Array, Array]:
+    """What carries a state over h (2, 2), and what an acceleration at each quadrature node adds to it (8, 2)."""
+    carry = np.array(transition(stiffness, damping, h)).reshape(2, 2)
+    _, s01, _, s11 = transition(stiffness, damping, h * (1.0 - NODES))
+    return carry, np.column_stack((s01, s11)) * (h * NODE_WEIGHTS)[:, None]
 
 
 def _forcing(plan: Plan, u: Array, influences: Influences, push: Array) -> Array:

@@ -3,57 +3,83 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-import numpy as np
-
-from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array
 
 
 class Influences(NamedTuple):
-    """What acts on the movement during one step, held constant over it; in normalized time, relative to x0."""
+    """What acts on the movement during one step, held constant over it; in normalized time, relative to the origin."""
 
     goal: Array  # (d,)
     ratio: Array  # (d,), what scale f is multiplied by
     push: Array  # (d,), an external acceleration
-    obstacles: Array  # (m, d), at the start of the step
-    obstacle_velocities: Array  # (m, d); with these the obstacles go on during the step
+    obstacles: Array  # (m, n_positions), at the start of the step
+    obstacle_velocities: Array  # (m, n_positions); with these the obstacles go on during the step
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The equation of one primitive, ``x'' = K (g - x) - D x' + ratio scale f + coupling (g - x0)``, and obstacles."""
+    """The equation of one movement and where it begins, whatever kind of primitive it comes from.
 
-    primitive: Primitives  # a batch of one
-    avoidance: ObstacleAvoidance
+    In normalized time u, with positions and goals relative to the origin,
+
+        x'' = K (g - x) - D x' + ratio scale_f(u) + coupling(u) g,        ' = d/du.
+
+    Attributes
+    ----------
+    K, D : float
+        Stiffness and damping.
+    shape : callable
+        At normalized times u (T,): scale f of each dimension, then the coupling; shape (T, d + 1).
+    n_gaps : int
+        Gaps between the centers of basis functions in [0, 1]: how finely `shape` is to be sampled.
+    ratio : callable
+        What scale f is multiplied by for a goal (d,); not finite where the formulation cannot go.
+    origin : ndarray of shape (d,)
+        From where positions and goals count; x0 of a discrete movement.
+    goal : ndarray of shape (d,)
+        The first goal.
+    state : ndarray of shape (2, d)
+        The first position and dx/du.
+    duration : float
+        Of u = 1 [s].
+    settle : float
+        Distance within which the movement has settled, by default.
+    n_positions : int
+        The leading dimensions that are coordinates of one point, in which obstacles lie.
+    begin : float
+        u of the first state.
+    periodic : bool
+        Whether `shape` repeats itself after u = 1; then the movement never settles.
+    longest_step : float
+        At most so many durations in one step.
+    """
+
+    K: float
+    D: float
+    shape: Callable[[Array], Array]
+    n_gaps: int
+    ratio: Callable[[Array], Array]
+    origin: Array
+    goal: Array
+    state: Array
+    duration: float
+    settle: float
+    n_positions: int
+    begin: float = 0.0
+    periodic: bool = False
+    longest_step: float = 1.0
 
     @property
-    def K(self) -> float:
-        """Stiffness."""
-        return self.primitive.dmp.K
-
-    @property
-    def D(self) -> float:
-        """Damping."""
-        return self.primitive.dmp.D
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return len(self.origin)
 
     @cached_property
     def intervals(self) -> float:
         """Quadrature intervals per unit of u: two between neighboring centers, and as many as the spring is fast."""
-        return max(2.0 * (self.primitive.dmp.n_basis - 1), math.sqrt(self.K), 0.5 * self.D)
-
-    def shape(self, u: Array) -> Array:
-        """At normalized times u (T,): scale f of each dimension, then the coupling; shape (T, d + 1)."""
-        dmp = self.primitive.dmp
-        forcing = dmp.basis.design(u) @ self.primitive.scaled_weights[0].T
-        return np.column_stack((forcing, dmp.system.coupling(dmp.K, dmp.basis.phase(u))))
-
-    def ratio(self, goal: Array) -> Array:
-        """What scale f is multiplied by for a goal relative to x0 (d,); not finite where the formulation cannot go."""
-        primitive = self.primitive
-        learned = primitive.goals - primitive.starts
-        return np.array(primitive.dmp.system.ratio(goal[None], learned, primitive.extents)[0])
+        return max(2.0 * self.n_gaps, math.sqrt(self.K), 0.5 * self.D)

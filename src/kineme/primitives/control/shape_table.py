@@ -23,17 +23,23 @@ _AT_BETWEEN = chebyshev.chebvander(_BETWEEN, _N_TERMS - 1)
 
 
 class ShapeTable(NamedTuple):
-    """Chebyshev coefficients on intervals ``breaks[i], breaks[i + 1]``; beyond the last break everything is 0."""
+    """Chebyshev coefficients on intervals ``breaks[i], breaks[i + 1]``; beyond the last break everything is 0.
+
+    A periodic table ends at 1 and goes on as it began.
+    """
 
     breaks: Array  # (n + 1,)
     coefficients: Array  # (n, terms, d + 1)
+    periodic: bool
 
 
 def shape_table(plan: Plan) -> ShapeTable:
     """Tabulate `Plan.shape`: halve intervals until the polynomials agree with it between their nodes."""
-    scale = np.abs(plan.shape(np.linspace(0.0, 1.0, 4 * plan.primitive.dmp.n_basis))).max(axis=0)
+    scale = np.abs(plan.shape(np.linspace(0.0, 1.0, 4 * (plan.n_gaps + 1)))).max(axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    grid = np.append(np.linspace(0.0, 1.0, plan.primitive.dmp.n_basis), _tail(plan, scale))
+    grid = np.linspace(0.0, 1.0, plan.n_gaps + 1)
+    if not plan.periodic:
+        grid = np.append(grid, _tail(plan, scale))
     pending = np.column_stack((grid[:-1], grid[1:]))
     done: list[tuple[Array, Array]] = []
     for halving in range(_MOST_HALVINGS + 1):
@@ -50,7 +56,7 @@ def shape_table(plan: Plan) -> ShapeTable:
     intervals, table = (np.concatenate(parts) for parts in zip(*done, strict=True))
     order = np.argsort(intervals[:, 0])
     breaks = np.append(intervals[order, 0], intervals[:, 1].max())
-    return ShapeTable(breaks, np.ascontiguousarray(table[order]))
+    return ShapeTable(breaks, np.ascontiguousarray(table[order]), plan.periodic)
 
 
 def _tail(plan: Plan, scale: Array) -> Array:

@@ -23,6 +23,8 @@ class Status(Flag):
     VELOCITY_LIMIT = auto()
     ACCELERATION_LIMIT = auto()
     STATE_KEPT = auto()
+    AMPLITUDE_REJECTED = auto()
+    PERIOD_REJECTED = auto()
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -52,6 +54,8 @@ MESSAGES = {
     Status.VELOCITY_LIMIT: "the velocity is above its limit; it was not changed",
     Status.ACCELERATION_LIMIT: "the acceleration is above its limit; it was not changed",
     Status.STATE_KEPT: "the step led out of the range of numbers; the last good state was kept",
+    Status.AMPLITUDE_REJECTED: "expected the amplitude as a finite number; the last good one stays",
+    Status.PERIOD_REJECTED: "expected the period in seconds, above 0 and not too short for dt; the last good one stays",
 }
 
 REJECTED = (
@@ -61,6 +65,8 @@ REJECTED = (
     | Status.DT_REJECTED
     | Status.COUPLING_REJECTED
     | Status.OBSTACLES_REJECTED
+    | Status.AMPLITUDE_REJECTED
+    | Status.PERIOD_REJECTED
 )
 
 
@@ -72,11 +78,12 @@ class State(NamedTuple):
     time : float
         Since the start [s].
     progress : float
-        The phase as normalized time u: 0 at the start, 1 where the demonstration ended, more while settling.
+        The phase as normalized time u: 0 at the start, 1 where the demonstration ended, more while settling; of a
+        rhythm the periods since the start.
     position, velocity, acceleration : ndarray of shape (d,)
         In the unit of the demonstration, per second and per second squared.
     goal : ndarray of shape (d,)
-        The goal in force; on the way to a new one where the controller filters goals.
+        The goal in force, of a rhythm the baseline; on the way to a new one where the controller filters goals.
     status : Status
     """
 

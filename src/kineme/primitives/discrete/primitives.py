@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.primitives.batch import Batch
+from kineme.primitives.control import Controller, ObstacleAvoidance, Options
 from kineme.primitives.discrete.amplitudes import safe_amplitudes
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.operators import forcing_matrix
+from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
 from kineme.validation import Array, check_count, check_samples
-
-if TYPE_CHECKING:
-    from kineme.primitives.control.controller import Controller
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,19 +158,44 @@ class Primitives(Batch):
         n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return replace(movement, n_samples=n_samples, end=end)
 
-    def controller(self, dt: float, **options: Any) -> Controller:
+    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+        self,
+        dt: float,
+        *,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        velocity: ArrayLike | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+        settle: float | None = None,
+    ) -> Controller:
         """One primitive under live control, in steps of `dt` [s].
 
         Parameters
         ----------
-        dt, **options
-            See `kineme.primitives.control.controller.Controller`: start, goal, duration, velocity, feedback, limits and
-            more.
+        dt : float
+            Time of a step [s], at most the duration.
+        start, goal, duration, velocity : optional
+            As in `rollout`, for one movement.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
+            What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`.
+
+        Returns
+        -------
+        Controller
+            At the start, with ``step``, ``reset`` and ``state``.
 
         Raises
         ------
         SpecificationError
-            More than one primitive; an option out of its range.
+            More than one primitive; a wish or an option out of its range.
+        DegenerateMovementError
+            The original formulation asked to move a closed or flat demonstration to another goal.
 
         Examples
         --------
@@ -181,9 +205,8 @@ class Primitives(Batch):
         >>> controller.step(goal=[10.0, 5.0]).time
         0.002
         """
-        from kineme.primitives.control.controller import Controller
-
-        return Controller(self, dt, **options)
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
+        return Controller(plan_of(self, start, goal, duration, velocity), dt, options)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

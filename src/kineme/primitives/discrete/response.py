@@ -9,9 +9,9 @@ import numpy as np
 
 from kineme.primitives.discrete.basis import GaussianBasis
 from kineme.primitives.discrete.formulations import Formulation
+from kineme.primitives.spring_damper import NODE_WEIGHTS, NODES, transitions
 from kineme.validation import Array
 
-_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NUMBERS_AT_ONCE = 500_000  # of the forcing term at a time; a limit on memory
 _STEPS_PER_BASIS = 2  # quadrature intervals between two neighboring centers, at least
 
@@ -43,10 +43,10 @@ def spring_damper_response(
     """
     n_steps = max(1, math.ceil(_STEPS_PER_BASIS * (basis.n_basis - 1) * (u[1] - u[0])))
     h = (u[1] - u[0]) / n_steps
-    nodes = 0.5 * h * (_NODES + 1.0)
-    carry = transition(stiffness, damping, np.array([h]))[0]
-    # The effect of an acceleration at a node on the end of the step is the second column.
-    impulse = transition(stiffness, damping, h - nodes)[:, :, 1] * (0.5 * h * _NODE_WEIGHTS)[:, None]  # (8, 2)
+    nodes = h * NODES
+    carry = transitions(stiffness, damping, np.array([h]))[0]
+    # An acceleration at a node reaches the end of the step through the second column.
+    impulse = transitions(stiffness, damping, h - nodes)[:, :, 1] * (h * NODE_WEIGHTS)[:, None]  # (8, 2)
     starts = u[0] + np.arange((len(u) - 1) * n_steps) * h
     driven = np.empty((len(starts), 2, basis.n_basis + 1))  # the term that each step adds to (x, x')
     for some in np.array_split(np.arange(len(starts)), max(1, len(starts) * basis.n_basis // _NUMBERS_AT_ONCE)):
@@ -56,9 +56,9 @@ def spring_damper_response(
     for k in at_end:  # one step at most: an ungated f has a kink at u = 1, where quadrature must be split
         driven[k] = 0.0
         for left, right in ((starts[k], 1.0), (1.0, starts[k] + h)):
-            inside = left + 0.5 * (right - left) * (_NODES + 1.0)
-            weighted = transition(stiffness, damping, starts[k] + h - inside)[:, :, 1] * _NODE_WEIGHTS[:, None]
-            driven[k] += 0.5 * (right - left) * weighted.T @ _forcing(basis, formulation, stiffness, inside)
+            inside = left + (right - left) * NODES
+            weighted = transitions(stiffness, damping, starts[k] + h - inside)[:, :, 1] * NODE_WEIGHTS[:, None]
+            driven[k] += (right - left) * weighted.T @ _forcing(basis, formulation, stiffness, inside)
     states = np.zeros((len(u), 3, basis.n_basis + 2))
     states[0, 1, -1] = 1.0
     state = states[0, :2]
@@ -76,24 +76,3 @@ def spring_damper_response(
 def _forcing(basis: GaussianBasis, formulation: Formulation, stiffness: float, u: Array) -> Array:
     """Accelerations besides spring and damper, per unit of each W and of g - x0, shape (T, N + 1)."""
     return np.column_stack((basis.design(u), stiffness + formulation.coupling(stiffness, basis.phase(u))))
-
-
-def transition(stiffness: float, damping: float, h: Array) -> Array:
-    """Exponentials ``exp(A h)`` of ``A = [[0, 1], [-K, -D]]`` for steps h (m,), shape (m, 2, 2).
-
-    With a = D / 2 and ``b = sqrt(|K - a^2|)``, ``exp(A h) = [[C + a S, S], [-K S, C - a S]]``, where C and S are
-    ``e^(-a h)`` times cos(b h) and sin(b h) / b below critical damping, 1 and h at it, cosh(b h) and sinh(b h) / b
-    above. The last two are multiplied out, since they overflow, and the slow pole is ``K / (a + b)``, since a - b
-    cancels.
-    """
-    a = 0.5 * damping
-    b = math.sqrt(abs(stiffness - a * a))
-    if b == 0.0:
-        C = np.exp(-a * h)
-        S = C * h
-    elif stiffness > a * a:
-        C, S = np.exp(-a * h) * (np.cos(b * h), np.sin(b * h) / b)
-    else:
-        slow = 0.5 * np.exp(-stiffness / (a + b) * h)
-        C, S = slow * (1.0 + np.exp(-2.0 * b * h)), -slow * np.expm1(-2.0 * b * h) / b
-    return np.stack((C + a * S, S, -stiffness * S, C - a * S), axis=1).reshape(-1, 2, 2)

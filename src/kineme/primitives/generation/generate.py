@@ -10,7 +10,6 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.files.movements import Columns
 from kineme.files.recordings import read_recording
-from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.primitives import Primitives
@@ -94,8 +93,8 @@ def _around_obstacles(primitive: Primitives, wishes: Wishes) -> Columns:
         )
     duration = float(primitive.durations[0]) if wishes.duration is None else wishes.duration
     steps = primitive.rollout(duration=duration, rate=wishes.rate).n_samples - 1
-    control = Controller(
-        primitive, duration / steps, start=wishes.start, goal=wishes.goal, duration=duration, settle=wishes.settle
+    control = primitive.controller(
+        duration / steps, start=wishes.start, goal=wishes.goal, duration=duration, settle=wishes.settle
     )
     states = [control.state]
     while not _arrived(states[-1], wishes) and len(states) <= _LONGEST * steps:

@@ -1,51 +1,48 @@
-"""One orientation or pose under live control."""
+"""One orientation or pose under live control: what a pose has besides what every controlled movement has."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+import warnings
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
+from kineme.primitives.control import inputs
 from kineme.primitives.control.controller import Controller
+from kineme.primitives.control.options import Options
+from kineme.primitives.control.plan import Plan
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.pose.quaternions import conjugate, normalized, product
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity, rotation_vector_rate
 from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
-if TYPE_CHECKING:
-    from kineme.primitives.pose.pose_primitives import PosePrimitives
 
+class PoseState(State):
+    """A pose at one moment: a `State` in the columns of the demonstrations.
 
-class PoseState(NamedTuple):
-    """A movement at one moment; see `kineme.control.State`.
-
-    Attributes
-    ----------
-    time, progress : float
-    pose : ndarray of shape (4,) or (7,)
-        As demonstrated: a unit quaternion, for poses after the position.
-    velocity, acceleration : ndarray of shape (3,) or (6,)
-        Angular in the world frame, for poses after the linear ones.
-    goal : ndarray of shape (4,) or (7,)
-    status : Status
+    ``position`` and ``goal`` have shape (4,), a unit quaternion, or (7,), the position before it; ``velocity`` and
+    ``acceleration`` have shape (3,), angular in the world frame, or (6,), the linear ones before them.
     """
 
-    time: float
-    progress: float
-    pose: Array
-    velocity: Array
-    acceleration: Array
-    goal: Array
-    status: Status
+    __slots__ = ()
+
+    @property
+    def pose(self) -> Array:
+        """The same as `position`."""
+        return self.position
+
+    @property
+    def orientation(self) -> Array:
+        """The unit quaternion (4,)."""
+        return self.position[-4:]
 
 
-class PoseController:
-    """Moves one pose primitive step by step; see `PosePrimitives.controller`.
+class PoseController(Controller):
+    """Moves one pose primitive step by step; see `PosePrimitives.controller` and `Controller`.
 
-    A `Controller` of position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
+    It steps through position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
     the rollout. A goal that turns in flight moves in that chart. A step costs some tenths of a millisecond, most of it
     on the way from rotation vectors to quaternions and angular velocities.
 
@@ -55,86 +52,98 @@ class PoseController:
         After the last step; at first the start.
     """
 
-    def __init__(
-        self,
-        primitives: PosePrimitives,
-        dt: float,
-        *,
-        start: ArrayLike | None = None,
-        goal: ArrayLike | None = None,
-        duration: float | None = None,
-        velocity: ArrayLike | None = None,
-        **options: Any,
-    ) -> None:
-        starts, goals, references, velocities = primitives.in_tangent(start, goal, velocity)
-        if len(starts) != 1:
-            raise SpecificationError(
-                f"expected one primitive, start and goal to control, got {len(starts)}; choose one: "
-                "primitives[0].controller(dt)"
-            )
-        v = None if velocities is None else velocities[0]
-        self._inner = Controller(
-            primitives.tangent, dt, start=starts[0], goal=goals[0], duration=duration, velocity=v, **options
-        )
-        self._reference, self._goal = references[0], goals[0]
-        self._n_columns = primitives.n_columns
-        self.state = self._as_pose(self._inner.state)
+    state: PoseState
 
-    def step(
+    def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
+        self._reference = reference
+        super().__init__(plan, dt, options)
+
+    def reset(self) -> PoseState:
+        """Back to the start, with the first goal; returns the state there."""
+        super().reset()
+        return self.state
+
+    def step(  # noqa: PLR0913 - what can happen, a parameter each
         self,
-        pose: Any = None,
-        velocity: Any = None,
-        goal: Any = None,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
         tempo: float = 1.0,
+        coupling: ArrayLike | None = None,
+        obstacles: ArrayLike | None = None,
+        *,
+        obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
+        pose: ArrayLike | None = None,
     ) -> PoseState:
         """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
 
         Parameters
         ----------
-        pose, velocity, goal : array_like, optional
-            Measured now, and where to go; in the columns of `PoseState`. Quaternions of either sign.
+        position, goal : array_like of shape (4,) or (7,), optional
+            Measured now, and where to go, in the columns of `PoseState`; quaternions of either sign.
+        velocity : array_like of shape (3,) or (6,), optional
+            Measured now: angular velocity in the world frame [rad/s], for poses after the linear velocity.
+        coupling : array_like of shape (3,) or (6,), optional
+            External angular acceleration during this step, for poses after the linear one.
+        obstacles, obstacle_velocities : array_like of shape (m, 3), optional
+            Points that the position steers around; orientations without a position have none.
         tempo, dt : float, optional
             See `Controller.step`.
+        pose : optional
+            Deprecated name of `position`.
+
+        Returns
+        -------
+        PoseState
         """
-        now = self._inner.state.position
-        x = None if pose is None else self._as_tangent(pose, now)
-        v = None if velocity is None else self._as_rates(velocity, now if x is None or np.isnan(x).any() else x)
-        g = None if goal is None else self._as_tangent(goal, self._goal)
-        state = self._inner.step(position=x, velocity=v, goal=g, tempo=tempo, dt=dt)
-        if g is not None and not state.status & Status.GOAL_REJECTED:
-            self._goal = g
-        self.state = self._as_pose(state)
+        if pose is not None:
+            warnings.warn("pose= is deprecated: write step(position=...)", DeprecationWarning, stacklevel=2)
+            position = pose
+        self._events = Status(0)
+        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
         return self.state
 
-    def _as_tangent(self, pose: Any, near: Array) -> Array:
-        """Position and the rotation vector closest to that of `near`; NaN for what is no pose."""
+    def _read_position(self, value: Any) -> Array | None:
+        return self._as_tangent(value, self._origin + self._motion[0])
+
+    def _read_goal(self, value: Any) -> Array | None:
+        return self._as_tangent(value, self._origin + self._goal.target)
+
+    def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
+        return self._as_rates(value, self._origin + self._motion[0] if position is None else position)
+
+    def _read_coupling(self, value: Any) -> Array | None:
+        return self._as_rates(value, self._origin + self._motion[0])  # J p'' is the part that is linear in p''
+
+    def _as_tangent(self, value: Any, near: Array) -> Array | None:
+        """Position and the rotation vector closest to that of `near`; None for what is no pose."""
+        array = inputs.vector(value, self._n_dims + 1)
+        if array is None:
+            return None
         try:
-            array = np.asarray(pose, dtype=np.float64)
-            if array.shape != (self._n_columns,):
-                return np.full_like(near, np.nan)
             p = log(product(normalized(array[-4:]), conjugate(self._reference)))
             return np.concatenate((array[:-4], nearest(p, near[-3:])))
-        except Exception:  # whatever a driver hands over, the motion goes on
-            return np.full_like(near, np.nan)
+        except Exception:  # a quaternion that is none: the motion goes on
+            return None
 
-    def _as_rates(self, velocity: Any, x: Array) -> Array:
-        try:
-            array = np.asarray(velocity, dtype=np.float64)
-            if array.shape != x.shape:
-                return np.full_like(x, np.nan)
-            return np.concatenate((array[:-3], rotation_vector_rate(x[-3:], array[-3:])))
-        except Exception:
-            return np.full_like(x, np.nan)
+    def _as_rates(self, value: Any, x: Array) -> Array | None:
+        """Rates of position and rotation vector at x, from linear and angular ones."""
+        array = inputs.vector(value, self._n_dims)
+        if array is None:
+            return None
+        rates = np.concatenate((array[:-3], rotation_vector_rate(x[-3:], array[-3:])))
+        return rates if inputs.usable(rates) else None
 
-    def _as_pose(self, state: State) -> PoseState:
-        p, rate, bend = (array[-3:] for array in (state.position, state.velocity, state.acceleration))
-        velocity = np.concatenate((state.velocity[:-3], angular_velocity(p, rate)))
-        acceleration = np.concatenate((state.acceleration[:-3], angular_acceleration(p, rate, bend)))
-        goal = self._placed(state.goal)
-        return PoseState(
-            state.time, state.progress, self._placed(state.position), velocity, acceleration, goal, state.status
-        )
+    def _derivatives(self) -> tuple[Array, Array]:
+        rate, bend = super()._derivatives()
+        p = self._origin[-3:] + self._motion[0, -3:]
+        velocity = np.concatenate((rate[:-3], angular_velocity(p, rate[-3:])))
+        return velocity, np.concatenate((bend[:-3], angular_acceleration(p, rate[-3:], bend[-3:])))
 
-    def _placed(self, x: Array) -> Array:
+    def _report(self, velocity: Array, acceleration: Array) -> PoseState:
+        state = super()._report(velocity, acceleration)
+        return PoseState(*state._replace(position=self._as_pose(state.position), goal=self._as_pose(state.goal)))
+
+    def _as_pose(self, x: Array) -> Array:
         return np.concatenate((x[:-3], product(exp(x[-3:]), self._reference)))

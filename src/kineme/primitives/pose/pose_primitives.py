@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.files.container import write_container
+from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
 from kineme.primitives.persistence import Arrays, check_array, load_as, pack, unpack
+from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout
 from kineme.primitives.pose.quaternions import conjugate, normalized, product
 from kineme.primitives.pose.rates import rotation_vector_rate
 from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.primitives.pose.pose_controller import PoseController
 
 _KIND = "pose primitives"  # in the file
 
@@ -165,23 +165,55 @@ class PosePrimitives:
         )
         return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
 
-    def controller(self, dt: float, **options: Any) -> PoseController:
+    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+        self,
+        dt: float,
+        *,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        velocity: ArrayLike | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+        settle: float | None = None,
+    ) -> PoseController:
         """One primitive under live control, in steps of `dt` [s].
 
         Parameters
         ----------
-        dt, **options
-            See `kineme.control.Controller`; start, goal and velocity as in `rollout`. Limits and `settle` hold for
-            positions and for the components of the rotation vector [rad].
+        dt : float
+            Time of a step [s], at most the duration.
+        start, goal, duration, velocity : optional
+            As in `rollout`, for one movement.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
+            What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`. Limits hold for
+            linear and angular velocities and accelerations, as the state reports them; obstacles are points (m, 3) that
+            the position steers around; `settle` holds for positions and the components of the rotation vector [rad].
+
+        Returns
+        -------
+        PoseController
+            At the start, with ``step``, ``reset`` and ``state``.
 
         Raises
         ------
         SpecificationError, TrajectoryError
             More than one primitive; an option out of its range; a start or goal that is no pose.
         """
-        from kineme.primitives.pose.pose_controller import PoseController
-
-        return PoseController(self, dt, **options)
+        starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
+        if len(starts) != 1:
+            raise SpecificationError(
+                f"expected one primitive, start and goal to control, got {len(starts)}; choose one: "
+                "primitives[0].controller(dt)"
+            )
+        v = None if velocities is None else velocities[0]
+        plan = replace(plan_of(self.tangent, starts[0], goals[0], duration, v), n_positions=self.n_columns - 4)
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
+        return PoseController(plan, dt, options, references[0])
 
     def in_tangent(
         self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None

@@ -1,181 +1,127 @@
-"""A limit cycle step by step, for what is not known ahead: pushes, and changes of amplitude, baseline and tempo."""
+"""A limit cycle under live control: what a rhythm has besides what every controlled movement has."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError, TrajectoryError
-from kineme.primitives.control.inputs import usable
-from kineme.primitives.control.state import Status
-from kineme.primitives.discrete.response import transition
-from kineme.primitives.discrete.rollout import check_durations, per_movement
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
-from kineme.primitives.rhythmic.rollout import cycle
-from kineme.validation import Array, check_number
-
-if TYPE_CHECKING:
-    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
-
-_NODES, _NODE_WEIGHTS = np.polynomial.legendre.leggauss(4)
-_MOST_PERIODS = 1000.0  # in one step: the forcing is followed all the way
-_LONGEST_STEP = 0.5  # of the distance between two centers, for one quadrature
+from kineme.primitives.control import inputs
+from kineme.primitives.control.controller import Controller
+from kineme.primitives.control.moving_goal import FilteredValue
+from kineme.primitives.control.options import Options
+from kineme.primitives.control.plan import Plan
+from kineme.primitives.control.state import State, Status
+from kineme.validation import LARGEST_STAMP, SHORTEST_STEP, Array
 
 
-class Stepping(NamedTuple):
-    """What a step is made of, as long as the periods stay; n_steps of them make one ``dt``."""
-
-    carry: Array  # (n, 2, 2), the state over a step
-    impulse: Array  # (n, 4, 2), to the state at the step's end from the forcing at its nodes
-    turns: Array  # (n, 5), phase passed at the nodes and at the end [rad]
-    n_steps: int
-
-
-def _stepping(dmp: RhythmicDMP, h: Array) -> Stepping:
-    """For steps of h (n,) periods."""
-    n_steps = max(1, int(np.ceil(h.max() * dmp.n_basis / _LONGEST_STEP)))
-    h = h[:, None] / n_steps
-    nodes = 0.5 * h * (_NODES + 1.0)
-    # An acceleration at a node reaches the end of the step through the second column.
-    impulse = transition(dmp.K, dmp.D, (h - nodes).ravel())[:, :, 1].reshape(*nodes.shape, 2)
-    impulse = impulse * (0.5 * h * _NODE_WEIGHTS)[:, :, None]
-    return Stepping(transition(dmp.K, dmp.D, h[:, 0]), impulse, 2 * np.pi * np.hstack((nodes, h)), n_steps)
-
-
-class RhythmicController:
-    """Runs n limit cycles of d dimensions, ``dt`` seconds per `step`.
-
-    The spring-damper is carried by its matrix exponential, so no step is too long for it, and the forcing enters by
-    Gauss-Legendre quadrature. Between steps every attribute may be set: the acceleration jumps then, position and
-    velocity do not, and the movement approaches the new limit cycle as ``e^(-sqrt(K) t / period)`` (critical damping).
+class RhythmicState(State):
+    """A rhythm at one moment: a `State` with three more attributes.
 
     Attributes
     ----------
-    positions, velocities : ndarray of shape (n, d)
-        The state, velocities per second. Set them to what the robot measures, or to push the movement.
-    phases : ndarray of shape (n,)
-        [rad], in [0, 2 pi).
-    baseline : ndarray of shape (n, d)
-    amplitude, period : ndarray of shape (n,)
-        A number sets all of them.
-    status : kineme.control.Status
-        Of the last step: MOVING, and MEASUREMENT_REJECTED where a measurement could not be used.
+    phase : float
+        Within the cycle [rad], in [0, 2 pi).
+    amplitude : float
+        In force; on the way to a new one where the controller filters goals.
+    period : float
+        In force [s], at tempo 1.
     """
 
-    def __init__(self, primitives: RhythmicPrimitives, dt: float, phase: ArrayLike = 0.0) -> None:
-        check_number("dt", dt, above=0.0)
-        self._primitives, self._dt = primitives, float(dt)
-        self.status = Status.MOVING
-        self.baseline = primitives.baselines
-        self.amplitude = primitives.amplitudes
-        self.period = primitives.periods
-        self._phases: Array = self._numbers(phase, "phase") % (2 * np.pi)
-        ratio = np.ones(len(primitives))
-        here = [cycle(primitives, ratio, self._phases, np.zeros(1), order)[:, :, 0] for order in (0, 1)]
-        self._positions: Array = self._baseline + here[0]
-        self._velocities: Array = here[1] / self._period[:, None]
+    phase: float
+    amplitude: float
+    period: float
 
-    def step(self, position: Any = None, velocity: Any = None) -> Array:
-        """Go on by ``dt``; returns the positions (n, d), a copy. Never raises, whatever a sensor delivers.
+
+class RhythmicController(Controller):
+    """Moves one limit cycle step by step; see `RhythmicPrimitives.controller` and `Controller`.
+
+    The goal is the baseline. After a push, and after a change of baseline, amplitude or period, position and velocity
+    go on from where they are, and the movement approaches the new limit cycle as ``exp(-sqrt(K) t / period)``
+    (critical damping).
+
+    Attributes
+    ----------
+    state : RhythmicState
+        After the last step; at first the start.
+    """
+
+    state: RhythmicState
+
+    def __init__(self, plan: Plan, dt: float, options: Options, learned_amplitude: float, gain: float) -> None:
+        self._learned_amplitude, self._first_gain = learned_amplitude, np.array([gain])
+        super().__init__(plan, dt, options)
+
+    def reset(self) -> RhythmicState:
+        """Back to the start, with the first baseline, amplitude and period; returns the state there."""
+        self._gain = FilteredValue(self._first_gain, self.options.goal_filter)
+        super().reset()
+        return self.state
+
+    def step(  # noqa: PLR0913 - what can happen, a parameter each
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        tempo: float = 1.0,
+        coupling: ArrayLike | None = None,
+        obstacles: ArrayLike | None = None,
+        *,
+        obstacle_velocities: ArrayLike | None = None,
+        dt: float | None = None,
+        amplitude: float | None = None,
+        period: float | None = None,
+    ) -> RhythmicState:
+        """Move on by dt. Never raises: what cannot be used is left out, and the status says so.
 
         Parameters
         ----------
-        position, velocity : array_like of shape (d,) or (n, d), optional
-            Measured now, before the step: the movement goes on from there. What cannot be used is left out, and
-            `status` says so.
+        position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt : optional
+            See `Controller.step`; the goal is a new baseline.
+        amplitude : float, optional
+            A new amplitude, for this step and all later ones.
+        period : float, optional
+            A new period [s], for this step and all later ones. Unlike `tempo` it does not change the velocity at once:
+            the spring acts per period, so the path bends until it is on the limit cycle of the new period.
+
+        Returns
+        -------
+        RhythmicState
         """
-        self.status = Status.MOVING
-        self._positions = self._measured(position, self._positions)
-        self._velocities = self._measured(velocity, self._velocities)
-        carry, impulse, turns, n_steps = self._stepping
-        weights = self._primitives.scaled_weights * (self._amplitude / self._primitives.amplitudes)[:, None, None]
-        state = np.stack((self._positions - self._baseline, self._velocities * self._period[:, None]), axis=1)
-        for _ in range(n_steps):
-            design = self._primitives.dmp.basis.design(self._phases[:, None] + turns[:, :-1])  # (n, 4, N)
-            forcing = weights @ design.transpose(0, 2, 1)  # (n, d, 4)
-            state = carry @ state + (forcing @ impulse).transpose(0, 2, 1)
-            self._phases = (self._phases + turns[:, -1]) % (2 * np.pi)
-        self._positions = state[:, 0] + self._baseline
-        self._velocities = state[:, 1] / self._period[:, None]
-        return self.positions
+        self._events = Status(0)
+        if amplitude is not None:
+            self._set_amplitude(amplitude)
+        if period is not None:
+            self._set_period(period)
+        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        return self.state
 
-    def _measured(self, value: Any, last: Array) -> Array:
-        if value is None:
-            return last
-        try:
-            array = self._vectors(value, "position")
-        except Exception:  # whatever a driver hands over, the motion goes on
-            array = None
-        if array is not None and usable(array):
-            return array
-        self.status |= Status.MEASUREMENT_REJECTED
-        return last
+    def _set_amplitude(self, amplitude: Any) -> None:
+        gain = np.array([inputs.number(amplitude) / self._learned_amplitude])
+        if inputs.usable(gain):
+            self._gain.set(gain)
+        else:
+            self._events |= Status.AMPLITUDE_REJECTED
 
-    @property
-    def positions(self) -> Array:  # noqa: D102 - documented by the class
-        return self._positions.copy()
+    def _set_period(self, period: Any) -> None:
+        period = inputs.number(period)
+        if not (SHORTEST_STEP <= period <= LARGEST_STAMP and self.dt <= period * self._plan.longest_step):
+            self._events |= Status.PERIOD_REJECTED
+            return
+        motion = self._motion.copy()
+        motion[1] *= period / self._tau  # the velocity in time stays
+        self._motion = motion
+        self._rate *= self._tau / period
+        self._tau = period
 
-    @positions.setter
-    def positions(self, value: ArrayLike) -> None:
-        self._positions = self._vectors(value, "positions")
+    def _follow(self, dt: float) -> tuple[Array, Array]:
+        goal, ratio = super()._follow(dt)
+        return goal, ratio * self._gain.mean(dt)
 
-    @property
-    def velocities(self) -> Array:  # noqa: D102
-        return self._velocities.copy()
-
-    @velocities.setter
-    def velocities(self, value: ArrayLike) -> None:
-        self._velocities = self._vectors(value, "velocities")
-
-    @property
-    def baseline(self) -> Array:  # noqa: D102
-        return self._baseline.copy()
-
-    @baseline.setter
-    def baseline(self, value: ArrayLike) -> None:
-        self._baseline = self._vectors(value, "baseline")
-
-    @property
-    def amplitude(self) -> Array:  # noqa: D102
-        return self._amplitude.copy()
-
-    @amplitude.setter
-    def amplitude(self, value: ArrayLike) -> None:
-        self._amplitude = self._numbers(value, "amplitude")
-
-    @property
-    def period(self) -> Array:  # noqa: D102
-        return self._period.copy()
-
-    @period.setter
-    def period(self, value: ArrayLike) -> None:
-        period = self._numbers(value, "period")
-        check_durations("period", period)
-        if self._dt > _MOST_PERIODS * period.min():
-            raise SpecificationError(
-                f"expected dt of at most {_MOST_PERIODS:g} periods of {period.min():g} s, got {self._dt:g} s"
-            )
-        self._period = period
-        self._stepping = _stepping(self._primitives.dmp, self._dt / period)
-
-    @property
-    def phases(self) -> Array:  # noqa: D102
-        return self._phases.copy()
-
-    @phases.setter
-    def phases(self, value: ArrayLike) -> None:
-        self._phases = self._numbers(value, "phases") % (2 * np.pi)
-
-    def _vectors(self, value: ArrayLike, name: str) -> Array:
-        return self._own(per_movement(value, name, self._primitives.n_dims), name, self._primitives.baselines)
-
-    def _numbers(self, value: ArrayLike, name: str) -> Array:
-        return self._own(per_movement(value, name, None), name, self._primitives.periods)
-
-    def _own(self, value: Array | None, name: str, like: Array) -> Array:
-        if value is None or len(value) not in (1, len(like)):
-            got = None if value is None else len(value)
-            raise TrajectoryError(f"expected {name} for one or all of the {len(like)} movements, got {got}")
-        return np.broadcast_to(value, like.shape).copy()
+    def _report(self, velocity: Array, acceleration: Array) -> RhythmicState:
+        state = RhythmicState(*super()._report(velocity, acceleration))
+        state.phase = 2.0 * np.pi * self._clock.u
+        state.amplitude = float(self._gain.now[0]) * self._learned_amplitude
+        state.period = self._tau
+        return state

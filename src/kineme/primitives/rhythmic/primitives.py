@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.primitives.batch import Batch
+from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.rhythmic.controller import RhythmicController
 from kineme.primitives.rhythmic.operators import forcing_matrix
+from kineme.primitives.rhythmic.plan import plan_of
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
 from kineme.validation import Array, check_count, check_samples
-
-if TYPE_CHECKING:
-    from kineme.primitives.rhythmic.controller import RhythmicController
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,11 +132,46 @@ class RhythmicPrimitives(Batch):
         wishes |= {"baseline": baseline, "start": start, "velocity": velocity}
         return rollout(self, wishes, n_periods, rate, n_samples)
 
-    def controller(self, dt: float, phase: ArrayLike = 0.0) -> RhythmicController:
-        """Live running, `dt` seconds per step, from the limit cycle at `phase` (a number or (n,)) on.
+    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+        self,
+        dt: float,
+        *,
+        phase: ArrayLike = 0.0,
+        period: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        baseline: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+    ) -> RhythmicController:
+        """One limit cycle under live control, in steps of `dt` [s].
 
-        Amplitude, baseline and period may change, and the state may be pushed, between steps; see `RhythmicController`.
+        Parameters
+        ----------
+        dt : float
+            Time of a step [s], at most 1000 periods.
+        phase, period, amplitude, baseline, start, velocity : optional
+            As in `rollout`, for one movement.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance : optional
+            What to do with measurements, new baselines and amplitudes, limits and obstacles; see
+            `kineme.control.Options`.
+
+        Returns
+        -------
+        RhythmicController
+            With ``step``, ``reset`` and ``state``. Its goal is the baseline; amplitude and period may change in a step.
+
+        Raises
+        ------
+        SpecificationError
+            More than one primitive; a wish or an option out of its range.
         """
-        from kineme.primitives.rhythmic.controller import RhythmicController
-
-        return RhythmicController(self, dt, phase)
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
+        wishes: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
+        plan, gain = plan_of(self, wishes | {"baseline": baseline, "start": start, "velocity": velocity})
+        return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
-from kineme.primitives.discrete.response import transition
 from kineme.primitives.discrete.rollout import broadcast_length, check_durations, per_movement
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import limit_cycle
 from kineme.primitives.rhythmic.periods import SAMPLES_PER_PERIOD
+from kineme.primitives.spring_damper import transitions
 from kineme.validation import Array, check_count, check_number, check_samples
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class RhythmicRollout(BaseRollout):
         offset = 0.0 if self.start is None else self.start - self.baselines - on_cycle[0]
         push = 0.0 if self.velocity is None else self.velocity * self.periods[:, None] - on_cycle[1]
         off_cycle = np.stack(np.broadcast_arrays(offset, push, on_cycle[0])[:2], axis=2)
-        free = transition(dmp.K, dmp.D, u)  # (T, 2, 2)
+        free = transitions(dmp.K, dmp.D, u)  # (T, 2, 2)
         rows = (free[:, 0], free[:, 1], -dmp.K * free[:, 0] - dmp.D * free[:, 1])[order]
         return np.asarray(result + off_cycle @ rows.T)
 

@@ -1,0 +1,59 @@
+"""A discrete movement as the plan that a controller steps through."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.primitives.control.options import check_one, one_vector
+from kineme.primitives.control.plan import Plan
+from kineme.primitives.discrete.rollout import rollout
+from kineme.validation import Array, check_number
+
+if TYPE_CHECKING:
+    from kineme.primitives.discrete.primitives import Primitives
+
+_SETTLED = 1e-3  # of the demonstration's largest extent
+
+
+def plan_of(
+    primitive: Primitives,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    duration: float | None = None,
+    velocity: ArrayLike | None = None,
+) -> Plan:
+    """The plan of one primitive, with the wishes of `Primitives.rollout` checked for one movement."""
+    check_one(len(primitive))
+    if duration is not None:
+        check_number("duration", duration, above=0.0)
+    d, dmp = primitive.n_dims, primitive.dmp
+    movement = rollout(
+        primitive,
+        one_vector("start", start, d),
+        one_vector("goal", goal, d),
+        duration,
+        one_vector("velocity", velocity, d),
+    )
+    x0, tau = movement.starts[0].copy(), float(movement.durations[0])
+    learned, extents = primitive.goals - primitive.starts, primitive.extents
+
+    def shape(u: Array) -> Array:
+        forcing = dmp.basis.design(u) @ primitive.scaled_weights[0].T
+        return np.column_stack((forcing, dmp.system.coupling(dmp.K, dmp.basis.phase(u))))
+
+    return Plan(
+        dmp.K,
+        dmp.D,
+        shape,
+        n_gaps=dmp.n_basis - 1,
+        ratio=lambda goal: np.array(dmp.system.ratio(goal[None], learned, extents)[0]),
+        origin=x0,
+        goal=movement.goals[0] - x0,
+        state=np.vstack((np.zeros(d), movement.velocities_at_start[0] * tau)),
+        duration=tau,
+        settle=_SETTLED * float(extents.max()),
+        n_positions=d,
+    )

@@ -1,0 +1,54 @@
+"""A limit cycle as the plan that a controller steps through."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.primitives.control.options import check_one, one_vector
+from kineme.primitives.control.plan import Plan
+from kineme.primitives.rhythmic.rollout import rollout
+from kineme.validation import Array
+
+if TYPE_CHECKING:
+    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+
+_LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
+
+
+def plan_of(primitive: RhythmicPrimitives, wishes: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
+    """The plan of one limit cycle and its amplitude, with the wishes of `rollout` checked for one movement.
+
+    A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.
+    """
+    check_one(len(primitive))
+    d, dmp = primitive.n_dims, primitive.dmp
+    vectors = {name: one_vector(name, wishes[name], d) for name in ("baseline", "start", "velocity")}
+    movement = rollout(primitive, wishes | vectors, 1.0, None, n_samples=2)
+    check_one(len(movement))
+    origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
+    gain, ones = float(movement.ratio[0]), np.ones(d)
+
+    def shape(u: Array) -> Array:
+        forcing = dmp.basis.design(2 * np.pi * u) @ primitive.scaled_weights[0].T
+        return np.column_stack((forcing, np.zeros(len(u))))
+
+    plan = Plan(
+        dmp.K,
+        dmp.D,
+        shape,
+        n_gaps=dmp.n_basis,
+        ratio=lambda goal: ones,
+        origin=origin,
+        goal=np.zeros(d),
+        state=np.vstack((movement.positions[0, 0] - origin, movement.velocities[0, 0] * tau)),
+        duration=tau,
+        settle=0.0,
+        n_positions=d,
+        begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
+        periodic=True,
+        longest_step=_LONGEST_STEP,
+    )
+    return plan, gain
