@@ -145,7 +145,9 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Dem
     names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
     labeled = None if None in labels else label_array(labels, len(labels), names)
-    return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names))
+    columns = {one.detected.columns for one in files if one.detected}
+    dimensions = columns.pop() if len(columns) == 1 else None
+    return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names, dimensions))
 
 
 def _joined(arrays: Sequence[Any]) -> Any:

@@ -11,7 +11,6 @@ from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards
@@ -130,5 +129,5 @@ def _with_paths(demonstrations: Demonstrations, paths: Array) -> Demonstrations:
     old = demonstrations.movements
     positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
     offsets = np.arange(n + 1) * n_samples
-    new = Movements(positions, offsets, old.durations, None, old.labels, old.names)
+    new = replace(old, positions=positions, offsets=offsets, times=None)
     return Demonstrations.of_movements(new, demonstrations.steps)

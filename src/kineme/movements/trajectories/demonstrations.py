@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast, overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.tables.data_frame import is_data_frame
+from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
+from kineme.movements.trajectories.data_frames import collect_data_frames
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array, describe
 
+_SHOWN = 8  # names of dimensions
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
 
@@ -80,6 +84,45 @@ class Demonstrations(Sequence[Trajectory]):
         return cls.of_movements(collect_arrays(arrays, labels, times, names, copy))
 
     @classmethod
+    def from_dataframe(
+        cls,
+        frames: Any,
+        *,
+        time: Column | None = None,
+        columns: Column | Sequence[Column] | None = None,
+        movement: Column | Sequence[Column] | None = None,
+        label: Column | None = None,
+        units: str | float | None = None,
+    ) -> Demonstrations:
+        """Collect the movements of data frames of pandas or polars, by the names of their columns, as in files.
+
+        A frame is one movement, or many that a column tells apart. What is not said is found by name: time stamps in a
+        column, or an index, called ``t``, ``time [ms]``, ``timestamp``; movements by ``demo``, ``trial``, ``episode``;
+        labels by ``label``, ``gesture``. All other columns of numbers are coordinates, and `dimensions` says which they
+        are; counters such as ``frame``, and velocities ``v_x`` beside ``x``, are left aside.
+
+        Parameters
+        ----------
+        frames : DataFrame or sequence of DataFrame
+            With the same coordinates in the same order.
+        time, label : str or int, optional
+            Columns by name, or counted from 0.
+        columns, movement : str or int or sequence of them, optional
+            Columns of the coordinates, and of what tells movements apart.
+        units : {"s", "ms", "us", "ns"} or float, optional
+            Unit of the time stamps, or its length in seconds; by default told by the name or by the stamps' size. As a
+            number it is also the step between samples of frames without time stamps.
+
+        Raises
+        ------
+        TrajectoryError
+            No column of times that is known by its name or given, several of them, no coordinates, or samples that
+            are no movement; the message lists the columns.
+        """
+        several = [frames] if is_data_frame(frames) else list(frames)
+        return cls.of_movements(collect_data_frames(several, Layout(time, columns, movement, label, units)))
+
+    @classmethod
     def of(cls, movements: MovementsLike) -> Demonstrations:
         """Whatever public functions accept as movements, as `Demonstrations`.
 
@@ -90,6 +133,7 @@ class Demonstrations(Sequence[Trajectory]):
               and rollouts.
             - One `Trajectory`, or one array of shape (T, d) or (T,): one movement.
             - One array of shape (n, T, d): n movements, used without a copy.
+            - One data frame of pandas or polars, see `from_dataframe`.
             - A list of `Trajectory`, of (T_i, d) arrays, or of anything above. A list is always many movements, also
               one of plain numbers in lists.
 
@@ -103,16 +147,15 @@ class Demonstrations(Sequence[Trajectory]):
         """
         if isinstance(movements, Demonstrations):
             return movements
-        if isinstance(movements, Trajectory):
-            return cls([movements])
-        if isinstance(movements, np.ndarray):
-            return cls.from_arrays(movements, copy=False)
-        held = getattr(movements, "demonstrations", None)
-        if held is not None:
+        if (held := getattr(movements, "demonstrations", None)) is not None:
             return cls.of(held)
-        if isinstance(movements, Sequence) and (held := _held_by_each(movements)) is not None:
-            return cls(held)
-        return cls.from_arrays(cast("ArrayLike", movements), copy=False)
+        several: Any = [movements] if isinstance(movements, Trajectory) or is_data_frame(movements) else movements
+        if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
+            if any(map(is_data_frame, several)):
+                return cls.from_dataframe(several)
+            if (held := _held_by_each(several)) is not None:
+                return cls(held)
+        return cls.from_arrays(several, copy=False)
 
     @classmethod
     def of_movements(cls, movements: Movements, steps: tuple[Any, ...] = ()) -> Demonstrations:
@@ -136,6 +179,11 @@ class Demonstrations(Sequence[Trajectory]):
     @property
     def names(self) -> tuple[str | None, ...] | None:  # noqa: D102
         return self.movements.names
+
+    @property
+    def dimensions(self) -> tuple[str, ...] | None:
+        """What the d dimensions are called, where they come from named columns."""
+        return self.movements.dimensions
 
     @property
     def times(self) -> Array:
@@ -194,13 +242,17 @@ class Demonstrations(Sequence[Trajectory]):
         n_labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
         low, high = int(self.lengths.min()), int(self.lengths.max())
         samples = f"{low}" if low == high else f"{low} to {high}"
-        return f"Demonstrations({len(self)} movements, {self.n_dims} dims, {samples} samples each{n_labels})"
+        dims = f"{self.n_dims} dims{_listed(self.dimensions)}"
+        return f"Demonstrations({len(self)} movements, {dims}, {samples} samples each{n_labels})"
+
+
+def _listed(names: tuple[str, ...] | None) -> str:
+    """Names in brackets, of many the first ones."""
+    return f" ({', '.join(names[:_SHOWN])}{', ...' if len(names) > _SHOWN else ''})" if names else ""
 
 
 def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
     """The movements of a list of trajectories and of what holds them, one by one; None of a list of arrays."""
-    if set(map(type, several)) <= _ARRAYS:
-        return None
     held = [one if isinstance(one, Demonstrations) else getattr(one, "demonstrations", None) for one in several]
     if not any(some is not None or isinstance(one, Trajectory) for one, some in zip(several, held, strict=True)):
         return None

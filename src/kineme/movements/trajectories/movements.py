@@ -32,6 +32,7 @@ class Movements:
     times: Array | None = None  # (total,)
     labels: NDArray[Any] | None = None  # (n,)
     names: Names = None
+    dimensions: tuple[str, ...] | None = None  # what the d columns are called, where that is known
 
     def __post_init__(self) -> None:
         for field in ("positions", "offsets", "durations", "times", "labels"):
@@ -99,4 +100,5 @@ class Movements:
             None if self.times is None else self.times[rows],
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
+            self.dimensions,
         )

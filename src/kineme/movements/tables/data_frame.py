@@ -1,0 +1,113 @@
+"""Data frames of pandas and polars; the roles of the columns are found as in files. Neither package is imported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.movements.tables.columns import Roles, choose_roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, no_lines
+from kineme.movements.tables.table import Table
+from kineme.movements.tables.table_movements import table_movements
+from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates
+
+_KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
+
+
+def is_data_frame(value: Any) -> bool:
+    """Whether this is a data frame, of pandas, of polars, or of another package with their names."""
+    return hasattr(value, "columns") and hasattr(value, "to_numpy") and hasattr(value, "__getitem__")
+
+
+def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
+    """The movements of a data frame: one, or many that are told apart by columns.
+
+    The levels of a pandas index that have a name, or hold dates, count as columns that cannot be coordinates.
+
+    Raises
+    ------
+    DataError
+        No column of times that is named so or that `layout` names, several of them, no coordinates, no rows, or
+        something else than numbers where numbers are needed.
+    """
+    read = [(head, _values(series), inside) for head, series, inside in _columns(frame)]
+    heads = tuple(head for head, _, _ in read)
+    arrays = [values for _, values, _ in read]
+    kinds = [_KINDS.get(values.dtype.kind, "text") if inside else "text" for _, values, inside in read]
+    if not heads or not len(arrays[0]):
+        raise DataError("expected samples, got a data frame without rows")
+    roles = choose_roles(heads, kinds, layout)
+    columns, dates_in = _by_role(heads, arrays, roles)
+    parsed = table_movements(Table(heads, columns, len(arrays[0]), no_lines, dates_in=dates_in), roles, layout, "frame")
+    if roles.label is not None and arrays[roles.label].dtype.kind in "iu":  # numbers stay numbers
+        numbers = [None if one is None else int(one) for one in parsed.block.labels]
+        parsed.block.labels[:] = numbers  # type: ignore[assignment]
+    return parsed
+
+
+def _columns(frame: Any) -> Iterator[tuple[str, Any, bool]]:
+    """Head and values of each column, and whether it is one of the frame rather than of its index."""
+    at = getattr(frame, "iloc", None)
+    for k, name in enumerate(frame.columns):
+        head = "_".join(map(str, name)) if isinstance(name, tuple) else str(name)
+        yield head, frame[name] if at is None else at[:, k], True
+    for level, name in enumerate(getattr(getattr(frame, "index", None), "names", ())):
+        values = frame.index.get_level_values(level)
+        if name is not None or getattr(values.dtype, "kind", "") in "Mm":
+            yield "time" if name is None else str(name), values, False
+
+
+def _values(series: Any) -> NDArray[Any]:
+    """Numbers, dates, or texts as objects; missing numbers are NaN, missing texts are empty."""
+    values: NDArray[Any] = np.asarray(series.to_numpy())
+    if values.dtype.kind != "O":
+        return values if values.dtype.kind in _KINDS else _texts(values.tolist())
+    known = [one for one in values.tolist() if not _is_missing(one)]
+    if known and all(isinstance(one, datetime) for one in known):
+        return np.asarray(series.to_numpy(dtype="datetime64[ns]"))
+    if known and all(isinstance(one, Real) and not isinstance(one, bool) for one in known):
+        return np.array([np.nan if _is_missing(one) else float(one) for one in values.tolist()])
+    return _texts(values.tolist())
+
+
+def _texts(values: list[Any]) -> NDArray[Any]:
+    texts = np.empty(len(values), dtype=object)
+    texts[:] = ["" if _is_missing(one) else str(one) for one in values]
+    return texts
+
+
+def _is_missing(one: Any) -> bool:
+    return one is None or type(one).__name__ in ("NAType", "NaTType") or (isinstance(one, float) and one != one)  # noqa: PLR0124
+
+
+def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -> tuple[list[Any], str | None]:
+    """Columns as `table_movements` takes them, and the unit of times that are dates."""
+    columns: list[Any] = list(arrays)
+    for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
+        columns[k] = arrays[k] if arrays[k].dtype.kind == "O" else _texts(arrays[k].tolist())
+    for k in roles.positions:
+        columns[k] = _numbers(heads[k], arrays[k])
+    dates_in, k = None, roles.time
+    if k is not None and arrays[k].dtype.kind in "Mm":
+        columns[k], dates_in = nanoseconds(arrays[k]), "ns"
+    elif k is not None and arrays[k].dtype.kind == "O":
+        columns[k], others = seconds_of_dates(arrays[k].tolist())
+        if others:
+            raise DataError(f"expected times in {heads[k]!r}, got {next(iter(others.values()))!r}")
+        dates_in = "s"
+    elif k is not None:
+        columns[k] = _numbers(heads[k], arrays[k])
+    return columns, dates_in
+
+
+def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
+    if _KINDS.get(values.dtype.kind) != "number":
+        raise DataError(f"expected numbers in the column {head!r}, got {values[0]!r}")
+    return values.astype(np.float64)

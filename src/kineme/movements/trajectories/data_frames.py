@@ -1,0 +1,49 @@
+"""From data frames to one contiguous block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from kineme.errors import DataError, TrajectoryError
+from kineme.movements.tables.data_frame import is_data_frame, parse_data_frame
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+from kineme.movements.trajectories.collect import collect_arrays
+from kineme.movements.trajectories.movements import Movements
+
+
+def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
+    """The movements of all frames, with their dimensions' names; see `Demonstrations.from_dataframe`."""
+    if not frames:
+        raise TrajectoryError("expected at least one data frame, got none")
+    parsed = [_parse(frame, i, layout) for i, frame in enumerate(frames)]
+    dimensions = parsed[0].detected.columns
+    for i, one in enumerate(parsed):
+        if one.detected.columns != dimensions:
+            raise TrajectoryError(
+                f"data frame {i}: expected the coordinates {list(dimensions)} as in data frame 0, got "
+                f"{list(one.detected.columns)}; say which with columns= of Demonstrations.from_dataframe"
+            )
+    blocks = [one.block for one in parsed]
+    pieces = [(block, slice(*rows)) for block in blocks for rows in zip(block.offsets, block.offsets[1:], strict=False)]
+    labels: Any = [label for block in blocks for label in block.labels]
+    places = [place or None for block in blocks for place in block.places]
+    movements = collect_arrays(
+        [block.positions[rows] for block, rows in pieces],
+        None if labels.count(None) == len(labels) else labels,
+        [block.times[rows] for block, rows in pieces if block.times is not None],
+        places if any(places) else None,
+        copy=True,
+    )
+    return replace(movements, dimensions=dimensions)
+
+
+def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
+    if not is_data_frame(frame):
+        raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
+    try:
+        return parse_data_frame(frame, layout)
+    except DataError as error:
+        raise TrajectoryError(f"data frame {i}: {error} (of Demonstrations.from_dataframe)") from error
