@@ -121,7 +121,7 @@ class TwoStageSearch:
             order = np.argsort(chosen, kind="stable")
             squares = np.concatenate((squares, others), axis=2)[:, :, order]
             chosen, logs = chosen[order], np.concatenate((logs, other_logs))[order]
-        return chosen, logs, self._compared(one, held, chosen).knowing(squares)
+        return chosen, logs, self._compared(one, held, chosen).with_squares(squares)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
