@@ -1,4 +1,4 @@
-"""Representations of a movement: of which quantity, over which phase."""
+"""Representations of movements: a quantity along a phase."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Representation:
         The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
         DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
     arc_share : float
-        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Over arc length uneven
-        timing makes no difference; over time, movements differ that differ in timing only.
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
+        timing; time distinguishes movements that differ in timing only.
     n_points : int, default 100
         Samples along the phase.
     n_basis, stiffness, ridge
@@ -48,7 +48,7 @@ class Representation:
     def __post_init__(self) -> None:
         check_choice("quantity", self.quantity, QUANTITIES)
         check_number("arc_share", self.arc_share, least=0.0)
-        if self.arc_share > 1:  # a phase that turns back
+        if self.arc_share > 1:  # above 1 the phase could decrease
             raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
         check_count("n_points", self.n_points, 2, most=MOST_POINTS)
         check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
@@ -71,8 +71,8 @@ class Representation:
     def describe(self, paths: Array, translation: bool = True) -> Array:
         """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
 
-        Where `translation` is not taken out, the mean position is added to the forcing term: f alone does not depend on
-        the position, so the average over representations would forgive a wrong one.
+        Without `translation` the paths still have their position, and it is added to the forcing term: f itself does
+        not depend on it, so that movements at other positions would be similar in that representation.
         """
         described = paths
         if self.quantity == "forcing":
@@ -82,7 +82,7 @@ class Representation:
         return described.reshape(len(paths), -1)
 
 
-#: Three representations that fail on different movements. In an average of narrow kernels one that is close suffices.
+#: Three representations that fail on different movements; in an average of kernels one that succeeds suffices.
 DEFAULT_REPRESENTATIONS = (
     Representation("positions", arc_share=1.0),
     Representation("forcing", arc_share=1.0),
@@ -91,7 +91,7 @@ DEFAULT_REPRESENTATIONS = (
 
 
 def check_representations(representations: Any) -> tuple[Representation, ...]:
-    """Refuse what is not one representation or several."""
+    """Refuse anything but one or several representations."""
     try:
         given = tuple(representations)
     except TypeError:
@@ -106,7 +106,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
 
 @lru_cache(maxsize=32)
 def _forcing_operator(representation: Representation) -> Array:
-    """From positions to f at as many points, (T, T): relative to the start, encode, then Eq. (2)."""
+    """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
     dmp = DMP(
         "bio-inspired",
         n_basis=representation.n_basis,

@@ -1,4 +1,4 @@
-"""Evenly spaced samples of many, where all would take too long."""
+"""Evenly spaced subsets of movements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The full answer to a movement: what it is, how sure, like which demonstration, and how it maps onto it."""
+"""The answer to a movement: label, confidence, nearest demonstrations, and the map from the nearest one."""
 
 from __future__ import annotations
 

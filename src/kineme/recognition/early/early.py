@@ -1,4 +1,4 @@
-"""Classes of many movements of which only the beginning is given."""
+"""Recognize many movements by their beginnings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which stored movement, and how much of it: hypotheses about a movement that is not over yet."""
+"""Hypotheses about a movement that is not over yet: which stored movement, and how much of it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Early:
 
 
 def as_early(early: Any) -> Early:
-    """What a user passed, or the defaults for None."""
+    """The user's options, or the defaults for None."""
     if early is not None and not isinstance(early, Early):
         raise SpecificationError(
             f"expected early to be kineme.recognition.early.hypotheses.Early(...) or None, got {early!r}"

@@ -1,4 +1,4 @@
-"""The beginnings of movements, described so that neither translation nor size matters."""
+"""Beginnings of movements, described independently of position and size."""
 
 from __future__ import annotations
 
