@@ -45,7 +45,7 @@ class Neighbor:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a recognizer answers to one movement.
+    """The answer of a recognizer to one movement.
 
     Attributes
     ----------
