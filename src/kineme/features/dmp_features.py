@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 
 
@@ -45,7 +46,7 @@ class DMPFeatures(MovementFeatures[DMP]):
 
     _kind: ClassVar[type] = DMP
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and store the number of dimensions; y is ignored."""
         self.dmp_ = self._checked()
         self.n_dims_ = Demonstrations.of(X).n_dims

@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.axes import axis_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.discrete.primitives import Primitives
@@ -97,7 +98,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
             self.dmp = replace(self._specification(), **nested)
         return self
 
-    def transform(self, X: Any) -> NDArray[Any]:
+    def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
         Raises

@@ -9,6 +9,7 @@ import numpy as np
 
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
@@ -37,7 +38,7 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
 
     _kind: ClassVar[type] = RhythmicDMP
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and choose the dimension to align on; y is ignored.
 
         Raises

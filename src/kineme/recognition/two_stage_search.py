@@ -16,6 +16,7 @@ from kineme.comparison.references import References
 from kineme.comparison.stored import OnDemand, Rows, StoredReferences
 from kineme.kernels.procrustes import Prepared
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, answers_to
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate, distances
@@ -55,7 +56,7 @@ class TwoStageSearch:
     classes: NDArray[Any]
     stored: StoredReferences
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> list[Answer]:
+    def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
         """An answer for each movement; ``nearest[k].index`` is a row of the features, and names are left out."""
         check_error_rate(error_rate)
         demos = self.comparison.checked(X)

@@ -19,6 +19,7 @@ from kineme.comparison.describe import Described
 from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import known_labels
 from kineme.recognition.conformal import REACH, check_error_rate
 from kineme.recognition.conformal import distances as in_widths
@@ -61,7 +62,7 @@ class Placement:
         )
 
 
-def place(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Placement:
+def place(movements: MovementsLike, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Placement:
     """Let movements join the symbols that they are recognized as, and gather the unknown into new kinds.
 
     Parameters

@@ -16,6 +16,7 @@ from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.two_stage_search import TwoStageSearch
@@ -36,10 +37,10 @@ class LibraryRecognizer:
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _model: Recognizer | TwoStageSearch | None = None
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
+    def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
         model = self.model()
-        demos = Demonstrations.of([X] if is_one(X) else X)
+        demos = Demonstrations.of(X)
         if isinstance(model, TwoStageSearch):
             found = model.recognize(demos, error_rate)
         else:
