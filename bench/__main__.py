@@ -14,6 +14,7 @@ SUBJECTS = (
     "gram",
     "startup",
     "reconstruction",
+    "dmp_defaults",
     "rhythm",
     "control",
     "recognize",

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from movement_samples import draw_shapes
 
 from kineme import Demonstrations, Recognizer
+from kineme.comparison import stored
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import feature_rows
 from kineme.comparison.stored import StoredReferences
@@ -36,8 +37,8 @@ def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
         return tuple(block[rows] for block in features)
 
     first = recognizer.references_.first
-    stored = StoredReferences(bases, parts, np.argsort(order), first, fetch, lambda rows: demos[order[rows]])
-    return TwoStageSearch(recognizer.comparison_, recognizer.calibration(), recognizer.classes_, stored), asked
+    references = StoredReferences(bases, parts, np.argsort(order), first, fetch, lambda rows: demos[order[rows]])
+    return TwoStageSearch(recognizer.comparison_, recognizer.calibration(), recognizer.classes_, references), asked
 
 
 def _same(ours, theirs, places):
@@ -144,3 +145,23 @@ def test_an_error_rate_is_a_share():
     two, _ = _two_stages(Recognizer().fit(draw_shapes([2, 2], 2, 0)))
     with pytest.raises(SpecificationError, match=r"error_rate below 1, got 1\.5"):
         two.recognize(draw_shapes([1], 2, 0), error_rate=1.5)
+
+
+def test_what_many_questions_share_is_read_once():
+    recognizer = Recognizer(classifier="nearest").fit(draw_shapes([6] * 12, 2, 3))
+    two, fetched = _two_stages(recognizer)
+    asked = draw_shapes([4] * 12, 2, 5, spread=0.3)
+    fetched.clear()
+    two.recognize(asked)
+    assert sum(fetched) <= len(recognizer.references_)
+
+
+@pytest.mark.parametrize("held", [1, 40])
+def test_answers_do_not_depend_on_how_many_references_are_held(held, monkeypatch):
+    recognizer = Recognizer(classifier="nearest").fit(draw_shapes([6] * 12, 2, 3))
+    asked = draw_shapes([2] * 12, 2, 3, spread=0.3)
+    plain = _two_stages(recognizer)[0].recognize(asked)
+    monkeypatch.setattr(stored, "_HELD", held)
+    for a, b in zip(plain, _two_stages(recognizer)[0].recognize(asked), strict=True):
+        assert (a.label, a.p_values, a.ranked, a.nearest) == (b.label, b.p_values, b.ranked, b.nearest)
+        np.testing.assert_array_equal(a.transform.matrix, b.transform.matrix)

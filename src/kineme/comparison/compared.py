@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,12 @@ class Compared:
 
     def __len__(self) -> int:
         return len(self.described)
+
+    def knowing(self, squares: Array) -> Compared:
+        """The same with `squares` that were computed before."""
+        known = replace(self)
+        vars(known)["squares"] = squares
+        return known
 
     @cached_property
     def squares(self) -> Array:

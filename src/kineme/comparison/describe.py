@@ -53,6 +53,11 @@ class Described:
         """The chosen movements: a slice, a mask or indices."""
         return Described(tuple(block.take(chosen) for block in self.blocks), self.procrustes, self.mean)
 
+    def empty(self, n: int) -> Described:
+        """Room for n movements that are described in the same way."""
+        blocks = tuple(Prepared(*(np.empty((n, *one.shape[1:]), one.dtype) for one in block)) for block in self.blocks)
+        return Described(blocks, self.procrustes, self.mean)
+
     def select(self, representations: Iterable[int]) -> Described:
         """The same movements in some of the representations."""
         return Described(tuple(self.blocks[r] for r in representations), self.procrustes, self.mean)

@@ -18,6 +18,8 @@ from kineme.validation import Array
 
 Rows = NDArray[np.intp]
 
+_HELD = 8192  # references that are held described, at most: some 50 MB in space
+
 
 @dataclass(frozen=True, eq=False)
 class StoredReferences:
@@ -73,6 +75,45 @@ class StoredReferences:
         """The movements of some rows, ready for comparison."""
         blocks = tuple(map(similarity.procrustes.prepare, self.features(rows)))
         return Described(blocks, similarity.procrustes, similarity.mean)
+
+
+class HeldReferences:
+    """Stored references that are described once: movements asked about together are compared with many of the same.
+
+    Parameters
+    ----------
+    stored : StoredReferences
+    similarity : AveragedSimilarity
+    """
+
+    def __init__(self, stored: StoredReferences, similarity: AveragedSimilarity) -> None:
+        self._stored, self._similarity = stored, similarity
+        self.n_rows = sum(len(block[0].values) for block in stored.reduced)
+        self._at = np.zeros(self.n_rows, dtype=np.int32)  # 1 + where a row is held, 0 if it is not
+        self._held: Described | None = None
+        self._n_held = 0
+
+    def described(self, rows: Rows) -> Described:
+        """The movements of some rows, ready for comparison; those not held are read, all at once."""
+        missing = np.unique(rows[self._at[rows] == 0])
+        if self._n_held + len(missing) > _HELD:
+            self._at[:], self._n_held, missing = 0, 0, np.unique(rows)
+        if len(missing) > _HELD:
+            return self._stored.described(self._similarity, rows)
+        if len(missing):
+            self._hold(missing)
+        assert self._held is not None
+        return self._held.take(self._at[rows] - 1)
+
+    def _hold(self, missing: Rows) -> None:
+        new = self._stored.described(self._similarity, missing)
+        if self._held is None:
+            self._held = new.empty(_HELD)
+        stop = self._n_held + len(missing)
+        for ours, theirs in zip(self._held.blocks, new.blocks, strict=True):
+            ours.rows[self._n_held : stop], ours.squares[self._n_held : stop] = theirs
+        self._at[missing] = np.arange(self._n_held, stop) + 1
+        self._n_held = stop
 
 
 @dataclass(frozen=True, eq=False)

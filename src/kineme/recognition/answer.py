@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kineme.comparison.compared import Compared, for_compared
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Tile, recorded_paths
-from kineme.comparison.references import References
+from kineme.comparison.references import IndexedMovements, References
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -126,6 +126,24 @@ def answers_to(
     error_rate: float,
 ) -> list[Answer]:
     """An answer for each movement of a tile that was compared; `paths` (n, d, T) are where they were recorded."""
+    verdicts = judge(compared, classifier, calibration, error_rate)
+    return with_transforms(verdicts, compared.comparison, compared.references.demonstrations, demos, paths)
+
+
+class Verdict(NamedTuple):
+    """An `Answer` without its transform."""
+
+    label: Label | None
+    confidence: float
+    p_values: Mapping[Label, float]
+    calibrated: bool
+    ranked: tuple[Label, ...]
+    nearest: tuple[Neighbor, ...]
+    responsibilities: Mapping[str, float]
+
+
+def judge(compared: Compared, classifier: Classifier, calibration: Calibration, error_rate: float) -> list[Verdict]:
+    """What each movement is, from how it compares."""
     scores = classifier.scores(compared)
     p = calibration.p_values(compared.nearest, error_rate)
     calibrated = bool(calibration.calibrated(error_rate).all())
@@ -137,26 +155,38 @@ def answers_to(
     shown = np.array([ranks[i, 0] if label is None else index_of[label] for i, label in enumerate(labels)])
     slices = list(references.slices())
     like = [_nearest(references, compared.log_average[i], slices[c]) for i, c in enumerate(shown.tolist())]
-    example = np.array([near[0].index for near in like], dtype=np.intp)
-    share = compared.shares(example)
-    transforms = map_onto(compared, example, demos, paths, share)
+    share = compared.shares(np.array([near[0].index for near in like], dtype=np.intp))
     names = [one.name for one in compared.comparison.representations]
     others = p.copy()
     known = np.array([label is not None for label in labels])
     others[known, shown[known]] = 0.0
+    confidence = (1.0 - others.max(axis=1)).tolist()
     return [
-        Answer(
+        Verdict(
             labels[i],
-            1.0 - float(others[i].max()),
+            confidence[i],
             dict(zip(classes, p[i].tolist(), strict=True)),
             calibrated,
-            tuple(classes[c] for c in ranks[i]),
+            tuple(classes[c] for c in ranks[i].tolist()),
             like[i],
-            transforms[i],
             dict(zip(names, share[:, i].tolist(), strict=True)),
         )
-        for i in range(len(demos))
+        for i in range(len(labels))
     ]
+
+
+def with_transforms(
+    verdicts: Sequence[Verdict],
+    comparison: Comparison,
+    references: IndexedMovements,
+    demos: Demonstrations,
+    paths: Array,
+) -> list[Answer]:
+    """The answers to movements: with the transforms from those of the references that they are most like."""
+    example = np.array([one.nearest[0].index for one in verdicts], dtype=np.intp)
+    share = np.array([list(one.responsibilities.values()) for one in verdicts]).T
+    transforms = map_onto(comparison, references, example, demos, paths, share)
+    return [Answer(**one._asdict(), transform=each) for one, each in zip(verdicts, transforms, strict=True)]
 
 
 def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:

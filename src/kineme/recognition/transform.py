@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.alignment import fit_maps
-from kineme.comparison.compared import Compared
+from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import even_paths, recorded_paths
+from kineme.comparison.references import IndexedMovements
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -55,9 +56,14 @@ class Transform:
 
 
 def map_onto(
-    compared: Compared, example: NDArray[np.intp], demos: Demonstrations, paths: Array, share: Array
+    comparison: Comparison,
+    references: IndexedMovements,
+    example: NDArray[np.intp],
+    demos: Demonstrations,
+    paths: Array,
+    share: Array,
 ) -> list[Transform]:
-    """Transforms from the references `example` (n,) onto the n movements that were compared with them.
+    """Transforms from the references `example` (n,) onto as many movements.
 
     Fitted to positions over the phase of the representation with the largest share (R, n), one batch for each phase.
 
@@ -68,10 +74,9 @@ def map_onto(
     paths : ndarray of shape (n, d, T)
         Of the movements, where they were recorded.
     """
-    comparison = compared.comparison
     phases = np.array([one.arc_share for one in comparison.representations])[share.argmax(axis=0)]
     used, which = np.unique(example, return_inverse=True)  # one example may be that of many
-    stored = compared.references.demonstrations[used]
+    stored = references[used]
     examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]
     ratios = (demos.durations / stored.durations[which]).tolist()
     found: dict[int, Transform] = {}

@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.averages import LOG_MEANS
 from kineme.comparison.bounds import ReducedFeatures, Single, reduce_features
 from kineme.comparison.compared import Compared
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe_tile, recorded_paths
 from kineme.comparison.references import References
-from kineme.comparison.stored import OnDemand, Rows, StoredReferences
-from kineme.kernels.procrustes import Prepared
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.comparison.stored import HeldReferences, OnDemand, Rows, StoredReferences
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.answer import Answer, answers_to
+from kineme.recognition.answer import Answer, Verdict, judge, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate, distances
 from kineme.validation import Array
@@ -26,7 +25,8 @@ _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
 _CLASSES = 64  # classes that an answer speaks of
 _MOST = 4096  # movements compared afterwards, where bounds leave doubt about the nearest of all
 _OF_CLASSES = 256  # and about the nearest of each class
-_ASKED = 16  # questions whose bounds are computed in one matrix product
+_ASKED, _MOST_ASKED = 16, 256  # movements whose bounds are computed in one matrix product: least, most
+_BOUNDS = 1_000_000  # bounds at a time, where that is more than the least
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,24 +61,28 @@ class TwoStageSearch:
         check_error_rate(error_rate)
         demos = self.comparison.checked(X)
         found: list[Answer] = []
-        for start in range(0, len(demos), _ASKED):
-            some = demos[start : start + _ASKED] if len(demos) > _ASKED else demos
+        held = HeldReferences(self.stored, self.comparison.similarity)
+        step = max(_ASKED, min(_MOST_ASKED, _BOUNDS // len(self.stored.members)))
+        for start in range(0, len(demos), step):
+            some = demos[start : start + step] if len(demos) > step else demos
             tile = describe_tile(some, 0, len(some), self.comparison, self.comparison.procrustes)
-            found += self._answers(tile.described, some, recorded_paths(some, tile.paths), error_rate)
+            verdicts = self._verdicts(tile.described, held, error_rate)
+            every = OnDemand(np.arange(held.n_rows), self.stored.movements)
+            found += with_transforms(verdicts, self.comparison, every, some, recorded_paths(some, tile.paths))
         return found
 
-    def _answers(self, described: Described, demos: Demonstrations, paths: Array, error_rate: float) -> list[Answer]:
+    def _verdicts(self, described: Described, held: HeldReferences, error_rate: float) -> list[Verdict]:
+        """What each movement is; ``nearest[k].index`` is a row of the features."""
         bounds = self.stored.bounds(self.comparison.similarity, self.reduced(described))
+        held.described(self.stored.members[np.unique(np.concatenate([self._promising(one) for one in bounds]))])
         found = []
-        for i in range(len(demos)):
-            one = described.take(slice(i, i + 1))
-            places, _, near = self.compare(one, bounds[i])
-            compared, calibration = self._compared(one, places, near)
-            part = paths[i : i + 1]
-            answer = answers_to(compared, Nearest(), calibration, demos[i : i + 1], part, error_rate)[0]
+        for i in range(len(described)):
+            places, _, compared = self.compare(described.take(slice(i, i + 1)), bounds[i], held)
+            owners = np.searchsorted(self.stored.first, places, side="right") - 1
+            verdict = judge(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
             rows = self.stored.members[places]
-            named = tuple(replace(other, index=int(rows[other.index])) for other in answer.nearest)
-            found.append(replace(answer, nearest=named))
+            near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.nearest)
+            found.append(verdict._replace(nearest=near))
         return found
 
     def reduced(self, described: Described) -> tuple[ReducedFeatures, ...]:
@@ -89,14 +93,17 @@ class TwoStageSearch:
         )
         return reduce_features(self.stored.bases, rows, self.comparison.n_dims)
 
-    def compare(self, one: Described, bounds: Single) -> tuple[Rows, Array, Described]:
-        """Which members one movement was compared with, ascending; log similarities; the members described.
+    def compare(
+        self, one: Described, bounds: Single, held: HeldReferences | None = None
+    ) -> tuple[Rows, Array, Compared]:
+        """Which members one movement was compared with, ascending; log similarities; the comparison with them.
 
         First the most promising of all and of each class; then whoever could still be nearer than the nearest of its
         class found so far or, in a class not compared with yet, than the nearest of all.
         """
+        held = held or HeldReferences(self.stored, self.comparison.similarity)
         places = self._promising(bounds)
-        described, logs = self._exact(one, places)
+        squares, logs = self._exact(one, held.described(self.stored.members[places]))
         near = np.full(len(self.classes), logs.max())
         owners = np.searchsorted(self.stored.first, places, side="right") - 1
         begins = np.flatnonzero(np.diff(owners, prepend=-1))
@@ -108,16 +115,13 @@ class TwoStageSearch:
         n_more = min(decisive, _MOST) + _OF_CLASSES
         if len(more) > n_more:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
-        if not len(more):
-            return places, logs, described
-        others, other_logs = self._exact(one, more)
-        order = np.argsort(np.concatenate((places, more)), kind="stable")
-        merged = tuple(
-            Prepared(np.concatenate((a.rows, b.rows))[order], np.concatenate((a.squares, b.squares))[order])
-            for a, b in zip(described.blocks, others.blocks, strict=True)
-        )
-        logs = np.concatenate((logs, other_logs))[order]
-        return np.concatenate((places, more))[order], logs, replace(described, blocks=merged)
+        if len(more):
+            others, other_logs = self._exact(one, held.described(self.stored.members[more]))
+            places = np.concatenate((places, more))
+            order = np.argsort(places, kind="stable")
+            squares = np.concatenate((squares, others), axis=2)[:, :, order]
+            places, logs = places[order], np.concatenate((logs, other_logs))[order]
+        return places, logs, self._compared(one, held, places).knowing(squares)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
@@ -133,13 +137,15 @@ class TwoStageSearch:
         top = [first[c] + int(bounds[first[c] : first[c] + counts[c]].argmax()) for c in classes]
         return np.unique(np.concatenate([*best, top]))
 
-    def _exact(self, one: Described, places: Rows) -> tuple[Described, Array]:
-        described = self.stored.described(self.comparison.similarity, self.stored.members[places])
-        return described, self.comparison.similarity.log_average(one, described)[0]
+    def _exact(self, one: Described, others: Described) -> tuple[Array, Array]:
+        """Squared distances (R, 1, k) and log similarities (k,) of one movement to others."""
+        squares = self.comparison.similarity.squared_distances(one, others)
+        return squares, LOG_MEANS[self.comparison.mean](self.comparison.similarity.logs_at(squares))[0]
 
-    def _compared(self, one: Described, places: Rows, described: Described) -> tuple[Compared, Calibration]:
-        """One movement compared with some members, and the calibration of their classes."""
+    def _compared(self, one: Described, held: HeldReferences, places: Rows) -> Compared:
+        """One movement and the members that it is compared with."""
+        rows = self.stored.members[places]
         owners = np.searchsorted(self.stored.first, places, side="right") - 1
-        demonstrations = OnDemand(self.stored.members[places], self.stored.movements)
-        references = References.of(demonstrations, described, self.classes[owners])
-        return Compared(self.comparison, references, one), self.calibration.select(np.unique(owners))
+        demonstrations = OnDemand(rows, self.stored.movements)
+        references = References.of(demonstrations, held.described(rows), self.classes[owners])
+        return Compared(self.comparison, references, one)
