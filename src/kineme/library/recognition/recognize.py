@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.describe import describe_rows
+from kineme.comparison.references import References
 from kineme.comparison.stored import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
 from kineme.library.recognition.code_cache import Index, open_index, refreshed
@@ -15,10 +17,9 @@ from kineme.library.recognition.members import Members, members_of
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Neighbor, is_one
-from kineme.recognition.recognizer import Recognizer
+from kineme.recognition.known_classes import KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
@@ -35,21 +36,15 @@ class LibraryRecognizer:
     _version: int | None = None
     _index: Index | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: Recognizer | TwoStageSearch | None = None
+    _model: KnownClasses | TwoStageSearch | None = None
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
-        model = self.model()
-        demos = Demonstrations.of(X)
-        if isinstance(model, TwoStageSearch):
-            found = model.recognize(demos, error_rate)
-        else:
-            found = model.recognize(demos, error_rate)
-        found = self._named(found)
+        found = self._named(self.model().recognize(X, error_rate))
         return found[0] if is_one(X) else found
 
-    def model(self) -> Recognizer | TwoStageSearch:
-        """The recognizer of the library as it is now: a `Recognizer`, or a two-stage one."""
+    def model(self) -> KnownClasses | TwoStageSearch:
+        """What recognizes the symbols as they are now: by all of their movements, or in two stages."""
         version = self.store.version
         if self._model is None or version != self._version:
             members = members_of(self.store)
@@ -57,10 +52,9 @@ class LibraryRecognizer:
             self._version = version
         return self._model
 
-    def _small(self, members: Members) -> Recognizer:
-        self._ids = members.ids  # `fit` orders by label, and keeps the order within
-        demos = read.movements(self.store, members.ids)
-        return self.store.specification.recognizer().fit(demos, members.labels)
+    def _small(self, members: Members) -> KnownClasses:
+        self._ids = members.ids
+        return known_members(self.store, members)
 
     def _large(self, members: Members) -> TwoStageSearch:
         self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
@@ -77,6 +71,14 @@ class LibraryRecognizer:
             return Neighbor(key, names[key], near.similarity)
 
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
+
+
+def known_members(store: Store, members: Members) -> KnownClasses:
+    """What recognizes the symbols of a small library: all members, by their stored features."""
+    how = store.specification
+    described = describe_rows(read.features(store, members.ids), store.n_dims or 0, how.comparison)
+    references = References.of(read.movements(store, members.ids), described, members.labels)
+    return fit_known_classes(how.comparison, references, how.weights, how.classifier)
 
 
 def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe_rows
 from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage import read
@@ -18,10 +19,11 @@ from kineme.movements.trajectories.labels import label_array
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 
 
-def described(store: Store, ids: ArrayLike) -> Described:
-    """Movements in the representations of the library, from their stored features."""
-    rows = read.features(store, np.asarray(ids, dtype=np.int64))
-    return describe_rows(rows, store.n_dims or 0, store.specification.comparison)
+def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
+    """Movements in the representations of the library, or in those of a comparison, from their stored features."""
+    rows, how = read.features(store, np.asarray(ids, dtype=np.int64)), store.specification.comparison
+    every = describe_rows(rows, store.n_dims or 0, how)
+    return every if comparison is None else every.select(map(how.representations.index, comparison.representations))
 
 
 def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:
