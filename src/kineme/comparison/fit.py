@@ -1,4 +1,4 @@
-"""From labeled movements to a fitted comparison and the movements as references."""
+"""Fit a comparison to labeled movements, which become its references."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def fit_comparison(
     fitted = _fits(weights, specification.mean, np.unique(labels, return_counts=True)[1])
     if fitted and candidates is not None:
         specification = replace(specification, representations=candidates)
-    with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
+    with single_threaded_blas():  # products of few rows: a second thread mostly waits
         rows = feature_rows(demos, specification)
         references = References.of(demos, prepare(rows, specification, specification.procrustes(demos.n_dims)), labels)
         return fit_to_references(specification, references, weights, n_defaults)

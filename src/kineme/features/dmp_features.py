@@ -44,7 +44,7 @@ class DMPFeatures(MovementFeatures[DMP]):
     1.0
     """
 
-    _kind: ClassVar[type] = DMP
+    _specification_type: ClassVar[type] = DMP
 
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and store the number of dimensions; y is ignored."""

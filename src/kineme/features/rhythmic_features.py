@@ -36,7 +36,7 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
         Dimensions d of the training movements.
     """
 
-    _kind: ClassVar[type] = RhythmicDMP
+    _specification_type: ClassVar[type] = RhythmicDMP
 
     def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and choose the dimension to align on; y is ignored.

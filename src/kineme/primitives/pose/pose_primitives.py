@@ -106,7 +106,7 @@ class PosePrimitives(Batch):
         """Demonstrated goals, shape (n, 4) or (n, 7)."""
         return self._poses(self.tangent.goals)
 
-    def rollout(  # noqa: PLR0913 - a wish per parameter
+    def rollout(  # noqa: PLR0913 - an option per parameter
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
@@ -152,7 +152,7 @@ class PosePrimitives(Batch):
         )
         return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
 
-    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+    def controller(  # noqa: PLR0913 - an option per parameter
         self,
         dt: float,
         *,
@@ -205,7 +205,7 @@ class PosePrimitives(Batch):
     def in_tangent(
         self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
     ) -> tuple[Array, Array, Array, Array | None]:
-        """Start, goal, reference orientations and initial velocity of the movements that these wishes make."""
+        """Start, goal, reference orientations and initial velocity of the movements that these options make."""
         starts, goals, references = self._endpoints(start, goal)
         return starts, goals, references, self._tangent_velocity(velocity, starts)
 
@@ -226,15 +226,15 @@ class PosePrimitives(Batch):
         return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
 
     def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
-        wish = per_movement(velocity, "velocity", self.tangent.n_dims)
-        if wish is None:
+        option = per_movement(velocity, "velocity", self.tangent.n_dims)
+        if option is None:
             return None
-        n = broadcast_length(len(starts), {"velocity": wish})
-        rates = rotation_vector_rate(starts[:, -3:], wish[:, -3:])
-        return np.concatenate((np.broadcast_to(wish[:, :-3], (n, wish.shape[1] - 3)), rates), axis=1)
+        n = broadcast_length(len(starts), {"velocity": option})
+        rates = rotation_vector_rate(starts[:, -3:], option[:, -3:])
+        return np.concatenate((np.broadcast_to(option[:, :-3], (n, option.shape[1] - 3)), rates), axis=1)
 
-    def _as_poses(self, wish: ArrayLike | None, name: str) -> Array | None:
-        poses = per_movement(wish, name, self.n_columns)
+    def _as_poses(self, option: ArrayLike | None, name: str) -> Array | None:
+        poses = per_movement(option, name, self.n_columns)
         if poses is None:
             return None
         try:
