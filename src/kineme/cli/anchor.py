@@ -131,7 +131,7 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
         return []
     folder.mkdir(parents=True, exist_ok=True)
     movements = library.movements(ids=proposals.ids)
-    like = library.specification.recognizer()
+    like = library.specification.comparison
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
     for number, one in enumerate(proposals.found.proposals, 1):
         paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))

@@ -83,7 +83,7 @@ class ActionLibrary:
         specification = Specification.of(recognizer, dmp) if create else None
         self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
         made = self.specification
-        if Specification.of(recognizer or made.recognizer(), dmp or made.dmp) != made:
+        if Specification.of(recognizer, dmp, made) != made:
             self.close()
             raise SpecificationError(
                 f"expected the recognizer and dmp that the library in {folder} was made with, got others; its features "

@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import describe_rows
-from kineme.comparison.references import References
 from kineme.comparison.stored import StoredReferences
-from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
-from kineme.library.recognition.code_cache import Index, open_index, refreshed
-from kineme.library.recognition.members import Members, members_of
+from kineme.library.recognition.calibration_cache import calibrated, sample_comparison
+from kineme.library.recognition.members import Members, described_references, members_of
+from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
@@ -34,7 +32,7 @@ class LibraryRecognizer:
     store: Store
     exhaustive: int = EXHAUSTIVE
     _version: int | None = None
-    _index: Index | None = None
+    _reduced: ReducedMovements | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _model: KnownClasses | TwoStageSearch | None = None
 
@@ -57,9 +55,9 @@ class LibraryRecognizer:
         return known_members(self.store, members)
 
     def _large(self, members: Members) -> TwoStageSearch:
-        self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
-        self._ids = self._index.ids
-        return two_stages(self.store, self._index, members)
+        self._reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
+        self._ids = self._reduced.ids
+        return two_stages(self.store, self._reduced, members)
 
     def _named(self, found: list[Answer]) -> list[Answer]:
         """The answers with ids and names of movements instead of rows."""
@@ -76,28 +74,28 @@ class LibraryRecognizer:
 def known_members(store: Store, members: Members) -> KnownClasses:
     """What recognizes the symbols of a small library: all members, by their stored features."""
     how = store.specification
-    described = describe_rows(read.features(store, members.ids), store.n_dims or 0, how.comparison)
-    references = References.of(read.movements(store, members.ids), described, members.labels)
+    references = described_references(store, members.ids, members.labels)
+    references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
     return fit_known_classes(how.comparison, references, how.weights, how.classifier)
 
 
-def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
+def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
-    comparison = sample_recognizer(store, members).comparison_
+    comparison = sample_comparison(store, members)
     kept = [store.specification.representations.index(one) for one in comparison.representations]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
     def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
-        blocks = np.split(read.features(store, index.ids[rows]), ends[:-1], axis=1)
+        blocks = np.split(read.features(store, reduced.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in kept)
 
     stored = StoredReferences(
-        tuple(index.bases[r] for r in kept),
-        tuple(tuple(block[r] for r in kept) for block in index.blocks),
-        index.rows(members.ids),
+        tuple(reduced.bases[r] for r in kept),
+        tuple(tuple(block[r] for r in kept) for block in reduced.blocks),
+        reduced.rows(members.ids),
         members.first,
         features,
-        lambda rows: read.movements(store, index.ids[rows]),
+        lambda rows: read.movements(store, reduced.ids[rows]),
     )
-    calibration = calibrate(store, members, comparison.similarity, stored)
+    calibration = calibrated(store, members, comparison.similarity, stored)
     return TwoStageSearch(comparison, calibration, members.names, stored)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +13,13 @@ from kineme.anchoring.proposals.assign import assign_described
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import SpecificationError
+from kineme.library.recognition.members import described
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
 from kineme.library.storage.symbols import exists
-from kineme.library.symbols.described_members import described
 from kineme.library.symbols.recognized import Recognized, known_symbols
+from kineme.movements.trajectories.demonstrations import Demonstrations
 
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
@@ -49,6 +52,12 @@ class LibraryProposals:
     def left_over(self) -> Ids:
         """Movements in no proposal."""
         return self.ids[self.found.left_over]
+
+    def movements(self, library: Any) -> Demonstrations:
+        """Deprecated: ``library.movements(ids=proposals.ids)``."""
+        warn("LibraryProposals.movements is now library.movements(ids=proposals.ids)", DeprecationWarning, stacklevel=2)
+        found: Demonstrations = library.movements(ids=self.ids)
+        return found
 
     def __repr__(self) -> str:
         clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
-from kineme.comparison.references import References
-from kineme.comparison.stored import OnDemand
+from kineme.library.recognition.members import described, described_references
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import symbols
-from kineme.library.symbols.described_members import described, evenly_many_members
+from kineme.library.symbols.some_members import evenly_many_members
 from kineme.recognition.known_classes import KnownClasses, fit_known_classes, open_set_labels
 
 
@@ -42,8 +40,7 @@ def known_symbols(store: Store) -> KnownClasses | None:
     if not any(map(len, symbols(store))):
         return None
     ids, labels = evenly_many_members(store)
-    references = References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)
-    how = store.specification
+    how, references = store.specification, described_references(store, ids, labels)
     return fit_known_classes(how.comparison, references, how.weights, how.classifier)
 
 
