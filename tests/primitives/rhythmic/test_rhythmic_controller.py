@@ -211,5 +211,6 @@ def test_what_was_set_between_steps_still_can_be(learned, name, told, value):
         setattr(one, name, value)
     np.testing.assert_array_equal(one.step().position, other.step(**{told: value}).position)
     np.testing.assert_allclose(getattr(one, name), value)
-    with pytest.warns(DeprecationWarning), pytest.raises(SpecificationError, match="expected .* got 'wide'"):
+    wrong = pytest.raises(SpecificationError, match=r"expected .* got 'wide'")
+    with pytest.warns(DeprecationWarning, match="setting it is deprecated"), wrong:
         setattr(one, name, "wide")
