@@ -8,13 +8,13 @@ from sklearn.utils import Bunch
 from unlabeled_samples import draw_kinds
 
 from kineme import DMP, Demonstrations, Recognizer
-from kineme.anchoring.clustering import count
+from kineme.anchoring.clustering import number_of_clusters
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals import merge_split
 from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import Split, suggest_splits
-from kineme.anchoring.proposals.subsample import radii, spread_sample
+from kineme.anchoring.proposals.subsample import radii, subsample
 from kineme.comparison.describe import describe
 
 
@@ -91,7 +91,7 @@ def test_a_sample_leaves_out_no_rare_kind():
     """Four movements of 604, in a sample of 80: drawn evenly, they would be missed every other time."""
     described = describe(draw_kinds([60] * 10 + [4], spread=0.02))
     for seed in range(8):
-        sample, _ = spread_sample(described, 80, seed)
+        sample, _ = subsample(described, 80, seed)
         assert len(sample) == 80
         assert (sample >= 600).any(), seed
 
@@ -100,10 +100,12 @@ def test_a_sample_leaves_out_no_rare_kind():
 def test_of_numbers_of_kinds_as_stable_as_the_most_stable_the_best_fit_is_taken(stability, found, monkeypatch):
     """As stable: within 0.05 of the adjusted Rand index."""
     stable, fitting = {2: 1.0, 3: stability, 4: 0.5}, {2: 0.4, 3: 0.6, 4: 0.9}
-    monkeypatch.setattr(count, "mean_silhouettes", lambda _, whole: np.array([fitting[one.max() + 1] for one in whole]))
-    monkeypatch.setattr(count, "_agreement", lambda *given: np.array([stable[c] for c in given[2]]))
+    monkeypatch.setattr(
+        number_of_clusters, "mean_silhouettes", lambda _, whole: np.array([fitting[one.max() + 1] for one in whole])
+    )
+    monkeypatch.setattr(number_of_clusters, "_agreement", lambda *given: np.array([stable[c] for c in given[2]]))
     points = np.random.default_rng(0).uniform(size=8)
-    assert count.count_kinds(np.abs(points[:, None] - points)) == found
+    assert number_of_clusters.count_clusters(np.abs(points[:, None] - points)) == found
 
 
 @pytest.mark.parametrize(("stability", "n"), [(0.74, 0), (0.76, 1)])
@@ -120,4 +122,6 @@ def test_symbols_shown_once_agree_up_to_six_tenths_of_the_way_to_the_nearest_oth
     K = np.exp(known.log_similarity(known.demonstrations_))
     np.fill_diagonal(K, 0.0)
     away = np.sqrt(-2.0 * np.log(K.max(axis=1)))
-    assert agreement(known) == pytest.approx(np.exp(-0.5 * (0.6 * np.median(away)) ** 2), rel=1e-3)
+    assert agreement(known.comparison_, known.references_) == pytest.approx(
+        np.exp(-0.5 * (0.6 * np.median(away)) ** 2), rel=1e-3
+    )

@@ -9,9 +9,9 @@ from unlabeled_samples import draw_kinds
 
 import kineme
 import kineme.anchoring
+from kineme.anchoring.figures.all_proposals import draw_proposals
 from kineme.anchoring.figures.drawing import flat, principal_axes
 from kineme.anchoring.figures.proposal import draw_proposal
-from kineme.anchoring.figures.proposal_sheet import draw_proposals
 from kineme.anchoring.figures.symbol_map import draw_map
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals.propose import propose
@@ -98,5 +98,5 @@ def test_pictures_of_other_movements():
 def test_every_public_name_leads_somewhere():
     for name in kineme.anchoring.__all__:
         assert getattr(kineme.anchoring, name).__doc__
-    with pytest.raises(AttributeError, match=r"'kineme\.anchoring' has no attribute 'draw'; it has ConceptualSpace, "):
+    with pytest.raises(AttributeError, match=r"'kineme\.anchoring' has no attribute 'draw'; it has Assignment, Con"):
         _ = kineme.anchoring.draw

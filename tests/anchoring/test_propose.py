@@ -14,7 +14,7 @@ from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 import kineme
 from kineme.anchoring.proposals.proposals import describe_clusters
 from kineme.anchoring.proposals.propose import propose
-from kineme.anchoring.proposals.subsample import assign
+from kineme.anchoring.proposals.subsample import extend
 from kineme.comparison.describe import describe, describe_rows, feature_rows
 from kineme.comparison.similarity import averaged, similarities
 from kineme.comparison.specification import ComparisonSpecification
@@ -155,7 +155,7 @@ def test_what_was_not_sampled_joins_its_kind_or_none():
     K = similarities(some, widths=similarity.widths)
     clusters = np.repeat([0, 1], [8, 7])
     found = describe_clusters(K, clusters, np.ones(2), similarity.widths)
-    joined = assign(described, sample, K, found, similarity)
+    joined = extend(described, sample, K, found, similarity)
     assert joined.clusters.tolist() == [0] * 12 + [1] * 10 + [-1, -1]
     assert [len(one) for one in joined.proposals] == [12, 10]
     assert [one.nearest for one in joined.proposals] == [1, 0]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
 import kineme
-from kineme.anchoring.proposals.assign import place
+from kineme.anchoring.proposals.assign import assign
 from kineme.anchoring.proposals.merge_split import suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
 
@@ -32,43 +32,43 @@ def _old_and_new(seed, shown=5, d=2):
 @quick
 def test_new_movements_join_raise_a_kind_or_stay_unknown(shown, seed, d):
     known, new = _old_and_new(seed, shown, d)
-    placement = place(new, known)
-    joined = np.array([label is not None for label in placement.labels])
+    assignment = assign(new, known)
+    joined = np.array([label is not None for label in assignment.labels])
     assert not joined[8:].any()  # nothing new joins
-    assert (placement.labels[joined] == new.labels[joined]).all()
+    assert (assignment.labels[joined] == new.labels[joined]).all()
     assert joined[:8].mean() >= 0.5  # with so few, the law of distances is an assumption
-    clusters = placement.proposals.clusters
+    clusters = assignment.proposals.clusters
     assert (clusters[joined] == -1).all()
     # Old movements that stay unknown are too few of a kind to be proposed.
-    found = {frozenset(new.labels[one.members].tolist()) for one in placement.proposals.proposals}
+    found = {frozenset(new.labels[one.members].tolist()) for one in assignment.proposals.proposals}
     assert found == {frozenset({"kind 04"}), frozenset({"kind 05"})}
-    assert sorted(len(one) for one in placement.proposals.proposals) == [4, 5]
-    assert placement.unknown.tolist() == [*np.flatnonzero(~joined[:8]), len(new) - 1]
+    assert sorted(len(one) for one in assignment.proposals.proposals) == [4, 5]
+    assert assignment.unknown.tolist() == [*np.flatnonzero(~joined[:8]), len(new) - 1]
 
 
 def test_a_fitted_recognizer_gives_the_same_and_its_answers():
     known, new = _old_and_new(3)
     fitted = Recognizer().fit(known)
-    one, other = place(new, known), place(new, fitted)
+    one, other = assign(new, known), assign(new, fitted)
     assert one.labels.tolist() == other.labels.tolist() == fitted.predict_known(new).tolist()
     np.testing.assert_array_equal(one.proposals.clusters, other.proposals.clusters)
     np.testing.assert_array_equal(one.p_values, fitted.p_values(new).max(axis=1))
-    assert repr(one).endswith("2 new kinds proposed, 1 unknown)")
+    assert repr(one).endswith("2 new clusters proposed, 1 unknown)")
 
 
 def test_too_few_that_agree_stay_unknown():
     known, new = _old_and_new(3)
-    placement = place(new, known, min_members=5)
-    assert [len(one) for one in placement.proposals.proposals] == [5]
-    assert len(place(new[[8, 9]], known).proposals) == 0
-    assert place(new[[8, 9]], known).unknown.tolist() == [0, 1]
+    assignment = assign(new, known, min_members=5)
+    assert [len(one) for one in assignment.proposals.proposals] == [5]
+    assert len(assign(new[[8, 9]], known).proposals) == 0
+    assert assign(new[[8, 9]], known).unknown.tolist() == [0, 1]
 
 
 def test_many_unknown_are_gathered_through_a_sample(monkeypatch):
     monkeypatch.setattr(import_module("kineme.anchoring.proposals.assign"), "largest_clustered", lambda n_dims: 40)
     demos = draw_kinds([6, 6, 6, 40, 60], 2, 0, spread=0.03)
-    placement = place(demos[18:], demos[:18])
-    found = [demos.labels[18 + one.members] for one in placement.proposals.proposals]
+    assignment = assign(demos[18:], demos[:18])
+    found = [demos.labels[18 + one.members] for one in assignment.proposals.proposals]
     assert [set(labels.tolist()) for labels in found] == [{"kind 04"}, {"kind 03"}]
     assert sum(map(len, found)) > 90
 
@@ -78,11 +78,11 @@ def test_new_kinds_of_handwriting():
     shapes = np.unique(demos.labels)[:16]
     known = np.isin(demos.labels, shapes) & (np.arange(len(demos)) % 7 < 5)
     new = demos[~known]
-    placement = place(new, demos[known])
-    joined = np.array([label is not None for label in placement.labels])
-    assert (placement.labels[joined] == new.labels[joined]).all()
+    assignment = assign(new, demos[known])
+    joined = np.array([label is not None for label in assignment.labels])
+    assert (assignment.labels[joined] == new.labels[joined]).all()
     assert joined[np.isin(new.labels, shapes)].mean() > 0.85
-    for one in placement.proposals.proposals:
+    for one in assignment.proposals.proposals:
         assert len(set(new.labels[one.members].tolist())) == 1
 
 
@@ -145,4 +145,4 @@ def test_what_cannot_be_compared():
     with pytest.raises(
         kineme.SpecificationError, match="expected min_members to be a whole number of at least 2, got 1"
     ):
-        place(demos, demos, min_members=1)
+        assign(demos, demos, min_members=1)

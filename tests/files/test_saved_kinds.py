@@ -145,45 +145,45 @@ def test_poses_need_three_or_six_dimensions(tmp_path):
 
 
 @every_kind
-def test_join_undoes_a_split(kind):
+def test_concatenation_undoes_a_split(kind):
     whole = KINDS[kind]()
-    assert_same(type(whole).join([whole[:1], whole[1:]]), whole)
-    assert len(type(whole).join([whole, whole])) == 6
+    assert_same(type(whole).concatenate([whole[:1], whole[1:]]), whole)
+    assert len(type(whole).concatenate([whole, whole])) == 6
 
 
 @every_kind
 def test_batches_of_different_specifications_do_not_mix(kind):
     a, b = KINDS[kind](n_basis=12), KINDS[kind](n_basis=13)
     with pytest.raises(kineme.SpecificationError, match=r"batch 1: expected n_basis=12 as in batch 0, got 13; .*again"):
-        type(a).join([a, b])
+        type(a).concatenate([a, b])
 
 
 @every_kind
-def test_only_batches_of_the_same_kind_join(kind):
+def test_only_batches_of_the_same_kind_can_be_concatenated(kind):
     a = KINDS[kind]()
     with pytest.raises(kineme.TrajectoryError, match=rf"{type(a).__name__}, got str"):
-        type(a).join([a, "b"])
+        type(a).concatenate([a, "b"])
     with pytest.raises(kineme.TrajectoryError, match="got none"):
-        type(a).join([])
+        type(a).concatenate([])
 
 
-def test_labels_and_dimensions_must_agree_to_join():
+def test_labels_and_dimensions_must_agree_to_be_concatenated():
     a = kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, ["a"]))
     b = kineme.DMP().learn(np.arange(40.0).reshape(1, 20, 2) ** 2)
     with pytest.raises(kineme.TrajectoryError, match="labels on every batch or on none, got them on 1 of 2"):
-        kineme.Primitives.join([a, b])
+        kineme.Primitives.concatenate([a, b])
     with pytest.raises(kineme.TrajectoryError, match="batch 1: expected 2 dimensions as in batch 0, got 1"):
-        kineme.Primitives.join([b, kineme.DMP().learn([np.arange(20.0) ** 2])])
+        kineme.Primitives.concatenate([b, kineme.DMP().learn([np.arange(20.0) ** 2])])
 
 
-def test_labels_must_be_of_one_type_to_join():
+def test_labels_must_be_of_one_type_to_be_concatenated():
     a, b = (
         kineme.DMP().learn(kineme.Demonstrations.from_arrays(np.arange(40.0).reshape(1, 20, 2) ** 2, [label]))
         for label in ("a", 1)
     )
     with pytest.raises(kineme.TrajectoryError, match="labels of one type, got texts, int64"):
-        kineme.Primitives.join([a, b])
-    assert len(kineme.Primitives.join(one for one in (a, a))) == 2
+        kineme.Primitives.concatenate([a, b])
+    assert len(kineme.Primitives.concatenate(one for one in (a, a))) == 2
 
 
 @every_kind
@@ -192,3 +192,20 @@ def test_a_batch_shows_itself_in_one_line(kind):
     assert shown.startswith(type(KINDS[kind]()).__name__ + "(3 movements")
     assert "\n" not in shown
     assert len(shown) < 400
+
+
+@every_kind
+def test_the_former_name_join_still_works(kind):
+    whole = KINDS[kind]()
+    with pytest.warns(DeprecationWarning, match="join is deprecated: use concatenate"):
+        assert len(type(whole).join([whole, whole])) == 6
+
+
+@every_kind
+def test_a_primitive_is_a_batch_of_one(kind):
+    whole = KINDS[kind]()
+    assert [len(one) for one in whole] == [1, 1, 1]
+    assert_same(type(whole).concatenate(whole), whole)
+    assert_same(type(whole).concatenate([whole[0], whole[1], whole[-1]]), whole)
+    with pytest.raises(IndexError):
+        whole[3]

@@ -12,11 +12,12 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary
-from kineme.library.recognition import calibration_cache, code_cache
+from kineme.library.recognition import calibration_cache
+from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.members import members_of
 from kineme.library.recognition.recognize import LibraryRecognizer
 
-CODES, CALIBRATION = code_cache.FILE, calibration_cache.FILE
+CODES, CALIBRATION = features_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
 
 
@@ -41,27 +42,27 @@ def test_a_good_cache_is_believed(tmp_path, monkeypatch, labels):
         library.learn(draw_movements(12, n_samples=12, labels=labels))
         expected = _answers(library)
         monkeypatch.setattr(calibration_cache, "calibrate_sample", None)
-        monkeypatch.setattr(code_cache, "_write", None)
+        monkeypatch.setattr(features_cache, "_write", None)
         assert _answers(library) == expected
 
 
 def _header(data, **changes):
     """Codes with another header, and the checksum that fits."""
-    header = json.loads(data[: code_cache._HEADER].rstrip(b"\0")) | changes
+    header = json.loads(data[: features_cache._HEADER].rstrip(b"\0")) | changes
     return _headed(json.dumps(header).encode(), data)
 
 
 def _headed(header, data):
-    return header.ljust(code_cache._HEADER, b"\0") + data[code_cache._HEADER :]
+    return header.ljust(features_cache._HEADER, b"\0") + data[features_cache._HEADER :]
 
 
 def _codes(change):
     """Codes changed as floats and as whole numbers, with the checksum that fits."""
 
     def spoil(data, _):
-        body = bytearray(data[code_cache._HEADER :])
+        body = bytearray(data[features_cache._HEADER :])
         change(body)
-        return _header(data[: code_cache._HEADER] + bytes(body), crc=zlib.crc32(body))
+        return _header(data[: features_cache._HEADER] + bytes(body), crc=zlib.crc32(body))
 
     return spoil
 
@@ -95,7 +96,7 @@ HOSTILE = {
     "codes without end": (CODES, lambda data, _: _header(data, n=1 << 60)),
     "an endless number": (CODES, lambda data, _: _header(data, n=float("inf"))),
     "an endless version": (CODES, lambda data, _: _header(data, version=1 << 80)),
-    "a nested header": (CODES, lambda data, _: _headed(b"[" * code_cache._HEADER, data)),
+    "a nested header": (CODES, lambda data, _: _headed(b"[" * features_cache._HEADER, data)),
     "a header that is a list": (CODES, lambda data, _: _headed(b"[]", data)),
     "an empty file": (CODES, lambda data, _: b""),
     "no archive": (CALIBRATION, lambda data, key: calibration_cache._seal(b"evil", key) + b"evil"),

@@ -10,7 +10,8 @@ from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, Recognizer
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.library.recognition import calibration_cache, code_cache
+from kineme.library.recognition import calibration_cache
+from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.recognize import LibraryRecognizer
 
 
@@ -121,11 +122,11 @@ def served(tmp_path_factory):
     with ActionLibrary(tmp_path_factory.mktemp("actions"), create=True) as library:
         library.learn(_kinds([3] * 5))
         before = _plain(LibraryRecognizer(library.store, exhaustive=0).recognize(asked))
-        caches = {name: (library.folder / name).read_bytes() for name in (code_cache.FILE, calibration_cache.FILE)}
+        caches = {name: (library.folder / name).read_bytes() for name in (features_cache.FILE, calibration_cache.FILE)}
     return library.folder, asked, before, caches
 
 
-@pytest.mark.parametrize("name", [code_cache.FILE, calibration_cache.FILE])
+@pytest.mark.parametrize("name", [features_cache.FILE, calibration_cache.FILE])
 @pytest.mark.parametrize("damage", DAMAGES)
 @given(where=st.floats(0, 0.999))
 def test_a_damaged_cache_is_made_again(served, name, damage, where):
@@ -148,7 +149,7 @@ def test_the_caches_of_another_library_are_not_believed(make):
     asked = _questions(counts, seed=2)
     before = _plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked))
     LibraryRecognizer(one.store, exhaustive=0).recognize(asked)
-    for name in (code_cache.FILE, calibration_cache.FILE):
+    for name in (features_cache.FILE, calibration_cache.FILE):
         (other.folder / name).write_bytes((one.folder / name).read_bytes())
     _same(_plain(LibraryRecognizer(other.store, exhaustive=0).recognize(asked)), before)
 
@@ -165,7 +166,7 @@ def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_
     with again:
         again.learn(_kinds(counts, seed=5)[8:])
         before = _plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked))
-        (again.folder / code_cache.FILE).write_bytes((library.folder / code_cache.FILE).read_bytes())
+        (again.folder / features_cache.FILE).write_bytes((library.folder / features_cache.FILE).read_bytes())
         _same(_plain(LibraryRecognizer(again.store, exhaustive=0).recognize(asked)), before)
 
 

@@ -164,9 +164,9 @@ def saved(demos: Demonstrations) -> list[dict[str, Any]]:
         return learned(demos, Primitives.load(path))
 
 
-def joined(demos: Demonstrations) -> list[dict[str, Any]]:
+def concatenated(demos: Demonstrations) -> list[dict[str, Any]]:
     primitives = DMP(n_basis=20).learn(demos)
-    return moved(demos, type(primitives).join([primitives[i] for i in range(len(primitives))]).rollout())
+    return moved(demos, type(primitives).concatenate([primitives[i] for i in range(len(primitives))]).rollout())
 
 
 def arc(demos: Demonstrations) -> list[dict[str, Any]]:
@@ -368,7 +368,7 @@ def pose_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
     unit, tau = pose_extents(demos)[:, None], demos.durations[:, None]
     units = np.column_stack((unit, unit, unit, np.ones((len(demos), 3))))
     primitives = PoseDMP(DMP(n_basis=20)).learn(demos)
-    primitives = type(primitives).join([primitives[i] for i in range(len(primitives))])
+    primitives = type(primitives).concatenate([primitives[i] for i in range(len(primitives))])
     assert primitives.labels.tolist() == demos.labels.tolist()
     assert primitives.names == demos.names
     asked = primitives.rollout(primitives.goals, primitives.starts, velocity=0.5 * units / tau)
@@ -456,7 +456,7 @@ TABLE = [
     *(feature_row(formulation, feature, fit) for formulation in FORMULATIONS for feature in FEATURES for fit in FITS),
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
-    Batched("Primitives.join", joined, 1e-8),
+    Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),
     step_row(Resample(60), 1e-10),
     step_row(Smooth(6.0), 1e-8),

@@ -37,14 +37,13 @@ OTHER_PARTS = {
 
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
+    "primitives.batch.Batch.join": "the former name of concatenate",
     "primitives.base_rollout.BaseRollout.axis_names": "of columns",
     "primitives.base_rollout.BaseRollout.plot": "one picture",
     "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
     "primitives.rollout_figure.draw_rollout": "one picture",
     "primitives.pose.pose_rollout.PoseRollout.axis_names": "of columns",
     "primitives.pose.pose_primitives.PosePrimitives.controller": "one movement by contract",
-    "primitives.pose.pose_primitives.PosePrimitives.load": "the same file as Primitives.load, which is in the table",
-    "primitives.pose.pose_primitives.PosePrimitives.save": "the same file as Primitives.save, which is in the table",
     "primitives.discrete.primitives.Primitives.controller": "one movement by contract",
     "primitives.rhythmic.primitives.RhythmicPrimitives.controller": "one movement by contract",
     "primitives.pose.pose_controller.PoseState.orientation": "of one movement at one moment",

@@ -7,7 +7,7 @@ import pytest
 from movement_samples import draw_shapes
 
 from kineme import Recognizer, Trajectory
-from kineme.anchoring.proposals.assign import place
+from kineme.anchoring.proposals.assign import assign
 from kineme.comparison import describe
 
 QUESTIONS = ["predict", "predict_proba", "decision_function", "p_values", "predict_known", "novelty", "describe"]
@@ -63,7 +63,7 @@ def test_movements_that_are_assigned_to_symbols_are_described_once(asked, monkey
     strange = draw_shapes([6], seed=9)
     both = [one.positions for one in (*movements, *strange)]
     counts = _Counts(monkeypatch)
-    place(both, recognizer)
+    assign(both, recognizer)
     assert (counts.smoothed, counts.described) == (len(both), len(both))
 
 

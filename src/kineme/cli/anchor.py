@@ -59,7 +59,7 @@ def anchor(folder: Path, **options: Any) -> None:
     from kineme.cli.anchor_session import Session
     from kineme.library.library import ActionLibrary
     from kineme.library.symbols.proposals import propose
-    from kineme.library.symbols.recognized import assign_recognized, recognized
+    from kineme.library.symbols.recognized import Recognized, assign_recognized, recognized
 
     scripted = options["accept"] is not None or options["reject"] is not None
     interactive = not scripted and not options["as_json"] and sys.stdin.isatty()
@@ -68,19 +68,16 @@ def anchor(folder: Path, **options: Any) -> None:
     with ActionLibrary(folder, read_only=not writes) as library:
         # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
         # listed and when it is accepted.
-        joining = recognized(library.store) if options["join"] else {}
-        members = [one for ids in joining.values() for one in ids.tolist()]
-        proposals = propose(
-            library.store, None, options["method"], options["clusters"], options["min_members"], members
-        )
+        found = recognized(library.store) if options["join"] else Recognized()
+        proposals = propose(library.store, None, options["method"], options["clusters"], options["min_members"], found)
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
         if both := set(accepted) & set(rejected):
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
-            "joined": assign_recognized(library.store, joining) if writes else {},
-            "would_join": {} if writes else {name: len(ids) for name, ids in joining.items()},
+            "joined": assign_recognized(library.store, found) if writes else {},
+            "would_join": {} if writes else {name: len(ids) for name, ids in found.ids.items()},
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
         }
@@ -126,15 +123,15 @@ def _names(path: Path | None) -> dict[int, str]:
 
 def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     """Draw an overview of all proposals, then a picture of each."""
+    from kineme.anchoring.figures.all_proposals import draw_proposals
     from kineme.anchoring.figures.proposal import draw_proposal
-    from kineme.anchoring.figures.proposal_sheet import draw_proposals
     from kineme.output.figures import save_figure
 
     if not len(proposals):
         return []
     folder.mkdir(parents=True, exist_ok=True)
     movements = library.movements(ids=proposals.ids)
-    like = library.specification.recognizer()
+    like = library.specification.comparison
     paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
     for number, one in enumerate(proposals.found.proposals, 1):
         paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))

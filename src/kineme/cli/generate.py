@@ -59,12 +59,12 @@ def generate(**options: Any) -> None:
 
     output = options["output"]
     primitive = _primitive(options)
-    wishes = _wishes(options)
-    made = make(primitive, wishes)
+    wanted = _movement_options(options)
+    made = make(primitive, wanted)
     if options["save"]:
         primitive.save(options["save"])
     if options["plot"]:
-        _plot(options["plot"], primitive, made, wishes.obstacles)
+        _plot(options["plot"], primitive, made, wanted.obstacles)
     _write(output, made, ".json" if options["as_json"] else ".csv")
 
 
@@ -98,15 +98,15 @@ def _is_symbol(source: str, folder: Path | None) -> bool:
     return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 
 
-def _wishes(options: dict[str, Any]) -> Any:
+def _movement_options(options: dict[str, Any]) -> Any:
     import numpy as np
 
-    from kineme.primitives.generation.generate import Wishes
+    from kineme.primitives.generation.generate import MovementOptions
 
     obstacles = options["obstacles"]
     if len({len(point) for point in obstacles}) > 1:
         raise click.BadParameter("expected obstacles of equally many dimensions", param_hint="--obstacle")
-    return Wishes(
+    return MovementOptions(
         start=None if options["start"] is None else np.array(options["start"]),
         goal=None if options["goal"] is None else np.array(options["goal"]),
         duration=options["duration"],

@@ -1,1 +1,1 @@
-"""How alike movements are: representations, description, widths, averaged kernel, alignment, bounds."""
+"""Comparison of movements: representations, descriptions, kernel widths, averaged kernel, alignment, bounds."""

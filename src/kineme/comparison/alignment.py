@@ -16,7 +16,7 @@ from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.validation import Array
 
-_POSITIONS = Representation("positions", arc_share=1.0)  # over arc length: uneven timing turns nothing
+_POSITIONS = Representation("positions", arc_share=1.0)  # over arc length: independent of timing
 
 
 class Maps(NamedTuple):
@@ -43,10 +43,10 @@ class Maps(NamedTuple):
 
 
 def fit_maps(paths: Array, targets: Array, normalization: Normalization, procrustes: Procrustes) -> Maps:
-    """From each path (n, d, S) onto the same one of the targets (n, d, S), or onto the only one (1, d, S).
+    """Maps of each path (n, d, S) onto the target of the same index (n, d, S), or onto the only one (1, d, S).
 
-    Center onto center, size onto size, and the rotation within the limit that brings samples closest (Procrustes). What
-    the normalization keeps stays as it is.
+    Center onto center, size onto size, and the rotation within the limit that brings samples closest (Procrustes).
+    Translation and size are mapped only if the normalization removes them.
     """
     n, d = paths.shape[:2]
     centers, sizes = normalization.center(paths), normalization.size(paths)
@@ -59,7 +59,7 @@ def fit_maps(paths: Array, targets: Array, normalization: Normalization, procrus
 
 
 def maps_onto(paths: Array, onto: Array, like: Compares | None = None) -> Maps:
-    """From each path (n, d, T) onto the one path (d, T): the best fit over arc length within the invariances.
+    """Maps of each path (n, d, T) onto one path (d, T): the best fit over arc length within the invariances.
 
     See `fit_maps`; it is fitted to positions at even arc lengths.
     """
@@ -69,14 +69,14 @@ def maps_onto(paths: Array, onto: Array, like: Compares | None = None) -> Maps:
 
 
 def paths_of(movements: Demonstrations | Primitives, like: Compares | None = None) -> Array:
-    """Even paths over time (n, d, T) where they were recorded; smoothed as for comparison, or rolled out."""
+    """Paths at even times (n, d, T) in recorded coordinates; smoothed as for comparison, or rolled out."""
     if isinstance(movements, Primitives):
         return np.ascontiguousarray(movements.rollout(n_samples=N_POINTS).positions.transpose(0, 2, 1))
     return recorded_paths(movements, even_paths(movements, 0, len(movements), specification_of(like).cutoff))
 
 
 def moved(primitives: Primitives, maps: Maps) -> Primitives:
-    """Primitives whose paths are those of the given ones, mapped; exact, nothing is learned again.
+    """Primitives whose paths are the mapped paths of the given ones; exact, without learning again.
 
     A path is linear in theta = [W, x0, g, tau v0], and the coefficients of x0 and g sum to 1 at every phase, so
     ``x -> M x + b`` is ``theta -> M theta``, with b added to x0 and to g.

@@ -23,11 +23,11 @@ Single = NDArray[np.float32]
 N_REDUCED = 12  # per representation and dimension: on handwriting, hardly any of 200,000 is then in doubt
 _TILE_ROWS = 16_384  # movements at a time: what is computed of them stays in a core's cache
 _ROUNDING = 4e-6  # of the squared norms, for single precision: a bound must hold
-_NEWTON_STEPS = 6  # each brings the bound in space closer, and none below what it bounds
+_NEWTON_STEPS = 6  # each makes the bound in space tighter, and keeps it a bound
 
 
 class ReducedFeatures(NamedTuple):
-    """Feature rows of one representation in k coordinates per dimension, and the norm of what these leave out.
+    """Feature rows of one representation in k coordinates per dimension, and the norms of their residuals.
 
     With P (S, k) orthonormal, each dimension of a row is ``x = P y + e``. The same P serves every dimension, so the
     reduced features y turn with the movement.
@@ -43,7 +43,7 @@ class ReducedFeatures(NamedTuple):
 
 
 def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_REDUCED) -> tuple[Array, ...]:
-    """For each representation, the k functions (S, k) that hold most of the rows' energy: principal components.
+    """For each representation, the k functions (S, k) with most of the rows' energy: uncentered principal components.
 
     Dimensions are pooled and nothing is centered, so that turned rows have turned reduced features. Bounds hold for any
     orthonormal basis; movements unlike those that it was fitted to only make them less tight.
@@ -90,9 +90,9 @@ def log_bounds(
     """
     n, m = len(asked[0].values), len(stored[0].values)
     bounds = np.empty((n, m), dtype=np.float32)
-    average: Any = LOG_MEANS[similarity.mean]  # keeps single precision
+    average: Any = LOG_MEANS[similarity.mean]  # Any keeps single precision
     log_weights = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
-    # What does not depend on the stored movements is multiplied by 1 / sigma^2 beforehand.
+    # Factors that do not depend on the stored movements include 1 / sigma^2.
     scaled = [
         ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in one))
         for one, width in zip(asked, similarity.widths, strict=True)

@@ -1,4 +1,4 @@
-"""Described movements beside the references: similarities and scores, each computed once and only if asked for."""
+"""Described movements compared with the references: similarities and scores, computed once and only if needed."""
 
 from __future__ import annotations
 

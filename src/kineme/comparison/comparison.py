@@ -1,4 +1,4 @@
-"""How movements are compared, with widths and weights that were estimated from some."""
+"""The comparison of movements: a specification with estimated kernel widths and weights."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What is needed to describe movements and to compare the descriptions; made by `fit_comparison`.
+    """Everything that is needed to describe and compare movements; made by `fit_comparison`.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Movements are described: smoothed, then one block of rows per representation."""
+"""Describe movements: smooth them, and compute one block of rows per representation."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
-_TILE_SAMPLES = 200_000  # numbers in one tile of paths: smaller ones make two threads wait for each other in Python
-N_POINTS = 199  # even samples between the recording and the phases; every second is one of 100
+_TILE_SAMPLES = 200_000  # numbers in one tile of paths: with smaller ones, threads wait for each other
+N_POINTS = 199  # even samples from which the phases are computed; every second one is one of 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def for_described(
 ) -> None:
     """Describe movements tile by tile, in threads, and call `work` with each tile of at most `most` movements.
 
-    So the rows of a movement are compared before they leave the core's cache.
+    So that the rows of a movement are compared while they are in the core's cache.
     """
     how = like.specification
 
@@ -186,7 +186,7 @@ def _tile_rows(
     """Paths of movements start:stop, as `even_paths` gives them, and their feature rows."""
     relative = even_paths(demos, start, stop, how.cutoff)
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
-    normalized: dict[tuple[float, int], Array] = {}  # representations share their phases
+    normalized: dict[tuple[float, int], Array] = {}  # representations of equal phase share it
     rows = []
     for one in how.representations:
         phase = (one.arc_share, one.n_points)

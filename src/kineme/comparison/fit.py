@@ -1,4 +1,4 @@
-"""From labeled movements to a fitted comparison and the movements as references."""
+"""Fit a comparison to labeled movements, which become its references."""
 
 from __future__ import annotations
 
@@ -57,15 +57,32 @@ def fit_comparison(
     """
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
-    fitted = _fits(weights, specification.mean, np.unique(labels, return_counts=True)[1])
     n_defaults = len(specification.representations)
+    fitted = _fits(weights, specification.mean, np.unique(labels, return_counts=True)[1])
     if fitted and candidates is not None:
         specification = replace(specification, representations=candidates)
-    procrustes = specification.procrustes(demos.n_dims)
-    with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
-        described = prepare(feature_rows(demos, specification), specification, procrustes)
-        similarity = AveragedSimilarity(procrustes, impostor_widths(described, labels), specification.mean)
-        if fitted:
+    with single_threaded_blas():  # products of few rows: a second thread mostly waits
+        rows = feature_rows(demos, specification)
+        references = References.of(demos, prepare(rows, specification, specification.procrustes(demos.n_dims)), labels)
+        return fit_to_references(specification, references, weights, n_defaults)
+
+
+def fit_to_references(
+    specification: ComparisonSpecification,
+    references: References,
+    weights: str | Sequence[float] = "auto",
+    n_defaults: int | None = None,
+) -> tuple[Comparison, References]:
+    """As `fit_comparison`, of movements that are described already, in all representations of the specification.
+
+    The first `n_defaults` representations, by default all, have equal weights where none are fitted.
+    """
+    described, labels = references.described, references.labels
+    n_defaults = len(specification.representations) if n_defaults is None else n_defaults
+    with single_threaded_blas():
+        widths = impostor_widths(described, labels)
+        similarity = AveragedSimilarity(described.procrustes, widths, specification.mean)
+        if _fits(weights, specification.mean, references.counts):
             values = fitted_weights(similarity, described, labels, n_defaults)
         elif isinstance(weights, str):
             values = np.full(n_defaults, 1.0 / n_defaults)
@@ -78,7 +95,7 @@ def fit_comparison(
         specification.cutoff,
         replace(similarity, weights=values),
     )
-    return whole.select(kept), References.of(demos, described.select(kept), labels)
+    return whole.select(kept), replace(references, described=described.select(kept))
 
 
 def _fits(weights: str | Sequence[float], mean: str, per_class: NDArray[np.intp]) -> bool:

@@ -1,4 +1,4 @@
-"""What may differ between two movements of the same kind, taken out: place and size."""
+"""Normalization: translation and size of movements are removed before they are compared."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from kineme.errors import TrajectoryError
 from kineme.validation import Array, check_choice, check_switch
 
 SCALES = ("path", "per-dimension", "none")
-SMALLEST, LARGEST = 1e-15, 1e15  # of movements that keep their size
-_FLAT = 1e-6  # of the whole extent; a dimension flatter than this is not blown up
+SMALLEST, LARGEST = 1e-15, 1e15  # range of sizes of movements that keep their size
+_FLAT = 1e-6  # share of the whole extent; flatter dimensions are not scaled up
 
 
 @dataclass(frozen=True)
@@ -21,12 +21,12 @@ class Normalization:
     Parameters
     ----------
     translation : bool, default True
-        Take out the place. Merges movements that differ only in where they are done.
+        Remove the position. Movements that differ only in their position become equal.
     scale : {"path", "per-dimension", "none"}, default "path"
-        "path" divides by the root mean square distance from the center, one number for all dimensions. Merges a dot and
-        a circle. "per-dimension" divides each dimension by its own. Merges a circle and an ellipse too. "none" keeps
-        the size, in the unit of the data, in which movements must measure 1e-15 to 1e15: they are compared in single
-        precision, whose squares reach no further.
+        "path" divides by the root mean square distance from the center, one number for all dimensions: a dot and a
+        circle become equal. "per-dimension" divides each dimension by its own: a circle and an ellipse become equal
+        too. "none" keeps the size, which must be 1e-15 to 1e15 in the unit of the data: movements are compared in
+        single precision, where squares of other sizes overflow or underflow.
     """
 
     translation: bool = True
@@ -37,7 +37,7 @@ class Normalization:
         check_choice("scale", self.scale, SCALES)
 
     def apply(self, paths: Array) -> Array:
-        """Paths (n, d, T) minus their place, divided by their size."""
+        """Paths (n, d, T) minus their center, divided by their size."""
         centered = paths - self.center(paths)
         if self.scale == "none":
             _check_size(centered)
@@ -47,7 +47,7 @@ class Normalization:
         return np.asarray(centered)
 
     def center(self, paths: Array) -> Array:
-        """The place of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
+        """The center of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
         return paths.mean(axis=2, keepdims=True) if self.translation else np.zeros((*paths.shape[:2], 1))
 
     def size(self, paths: Array) -> Array:

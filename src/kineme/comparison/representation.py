@@ -1,4 +1,4 @@
-"""How a recognizer looks at a movement: which phase, which quantity."""
+"""Representations of movements: a quantity along a phase."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Representation:
         The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
         DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
     arc_share : float
-        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length does not see uneven
-        timing; time tells movements apart that differ in nothing else.
+        The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
+        timing; time distinguishes movements that differ in timing only.
     n_points : int, default 100
         Samples along the phase.
     n_basis, stiffness, ridge
@@ -45,7 +45,7 @@ class Representation:
     def __post_init__(self) -> None:
         check_choice("quantity", self.quantity, QUANTITIES)
         check_number("arc_share", self.arc_share, least=0.0)
-        if self.arc_share > 1:  # a phase that turns back
+        if self.arc_share > 1:  # above 1 the phase could decrease
             raise SpecificationError(f"expected arc_share to be a share of at most 1, got {self.arc_share!r}")
         check_count("n_points", self.n_points, 2, most=MOST_POINTS)
         check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
@@ -66,10 +66,10 @@ class Representation:
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
     def describe(self, paths: Array, translation: bool = True) -> Array:
-        """Rows (n, d * n_points), dimension-major, of paths (n, d, n_points) along the phase, place and size taken out.
+        """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
 
-        Without `translation` the place is still in the paths, and the forcing term gets it back: f does not know the
-        place, so the average over representations would forgive a wrong one.
+        Without `translation` the paths still have their position, and it is added to the forcing term: f itself does
+        not depend on it, so that movements at other positions would be similar in that representation.
         """
         described = paths
         if self.quantity == "forcing":
@@ -79,7 +79,7 @@ class Representation:
         return described.reshape(len(paths), -1)
 
 
-#: Three views that fail on different movements: averaged as kernels, each need only say "this one is close".
+#: Three representations that fail on different movements; in an average of kernels one that succeeds suffices.
 DEFAULT_REPRESENTATIONS = (
     Representation("positions", arc_share=1.0),
     Representation("forcing", arc_share=1.0),
@@ -88,7 +88,7 @@ DEFAULT_REPRESENTATIONS = (
 
 
 def check_representations(representations: Any) -> tuple[Representation, ...]:
-    """Refuse what is not one representation or several."""
+    """Refuse anything but one or several representations."""
     try:
         given = tuple(representations)
     except TypeError:
@@ -103,7 +103,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
 
 @lru_cache(maxsize=32)
 def _forcing_operator(representation: Representation) -> Array:
-    """From positions to f at as many points, (T, T): relative to the start, encode, then Eq. (2)."""
+    """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
     dmp = DMP(
         "bio-inspired",
         n_basis=representation.n_basis,

@@ -1,4 +1,4 @@
-"""Some of many, when all would take too long."""
+"""Evenly spaced subsets of movements."""
 
 from __future__ import annotations
 

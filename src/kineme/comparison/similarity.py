@@ -1,4 +1,4 @@
-"""The averaged kernel over representations: how alike movements are."""
+"""The kernel averaged over representations: the similarity of movements."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class AveragedSimilarity:
     """An A-average of one RBF kernel per representation, each on its Procrustes distance.
 
     ``k_r(a, b) = exp(-d_r(a, b)^2 / (2 sigma_r^2))`` and ``K = mean_r k_r``, or ``sum_r w_r k_r``. Each kernel is
-    narrow and bounded: it can only add that a movement is close, so one representation that is misled cannot outweigh
-    the others, as it does in a sum of distances. Logarithms keep the order of movements that are far in every
-    representation, where each k_r has long underflowed.
+    narrow and bounded: a representation in which two movements are far contributes nothing, while in a sum of distances
+    it would dominate the others. Logarithms keep the order of movements that are far in every representation, where
+    each k_r underflows.
 
     The arithmetic mean is positive semi-definite where each k_r is: with ``max_angle = 0``. A Procrustes distance is
     not Euclidean, and no claim is made for it.

@@ -1,4 +1,4 @@
-"""How movements are to be compared, before any are known."""
+"""The specification of a comparison: its parameters, without estimates from movements."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ComparisonSpecification:
     representations : tuple of R Representation
         By default positions over arc length, forcing term over arc length, forcing term over time.
     normalization : Normalization
-        What is taken out of translation and size.
+        The normalization of translation and size.
     cutoff : float or None, default 10.0
         Movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
     max_angle : float, optional
@@ -67,7 +67,7 @@ class ComparisonSpecification:
 
 
 class Compares(Protocol):
-    """Whatever says how it compares movements: a specification, a `Comparison`, a recognizer."""
+    """An object with the specification of a comparison: a specification itself, a `Comparison`, a recognizer."""
 
     @property
     def specification(self) -> ComparisonSpecification:

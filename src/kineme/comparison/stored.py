@@ -1,4 +1,4 @@
-"""References that are too many for memory: their reduced features, and where to get everything else."""
+"""References that do not fit in memory: reduced features, and functions that read everything else."""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.validation import Array
 
-ENOUGH = 8  # demonstrations of every class, from which on weights are fitted
+ENOUGH = 8  # demonstrations of every class from which on weights are fitted
 _ROWS = 500  # movements that they are fitted to, at most
-_LEAST = 0.02  # a representation with a smaller weight costs more time than it is worth
+_LEAST = 0.02  # smaller weights become 0, to save the time of their representation
 _DEFAULTS = 0.5  # of the weight always belongs to the default representations
 
 #: Representations whose weights are fitted by default: both quantities over time, arc length, and between.
@@ -38,9 +38,9 @@ def fitted_weights(
 ) -> Array:
     """Half of the weight as `aligned_weights` fits it, half shared equally by the first `n_defaults` representations.
 
-    The training movements tell which representations separate *them*. A default representation that does not help on
-    them may be the one that recognizes a movement perturbed in a way that they do not show, so the defaults keep half
-    of the weight whatever is fitted.
+    The fitted weights are those of representations that separate the training movements. A default representation
+    that does not help on them may still be needed for perturbations that they do not contain, so the defaults always
+    keep half of the weight.
 
     Returns
     -------
@@ -82,13 +82,13 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
     kernels = np.stack([_centered(one) for one in np.exp(similarity.logs(some, some))], axis=1)
     weights, _ = nnls(kernels, _centered(same))
     weights = np.where(weights >= _LEAST * weights.sum(), weights, 0.0)
-    if not weights.any():  # no kernel is like that of the labels
+    if not weights.any():  # no kernel is aligned with that of the labels
         return np.full(len(described.blocks), 1.0 / len(described.blocks))
     return np.asarray(weights / weights.sum())
 
 
 def given_weights(weights: ArrayLike, n: int) -> Array:
-    """Weights as a user gave them, summing to 1.
+    """A user's weights, scaled to a sum of 1.
 
     Raises
     ------
@@ -104,14 +104,15 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
             f"expected weights to be 'auto', 'equal' or {n} numbers from 0, not all 0, one for each representation, "
             f"got {weights!r}"
         )
-    array = array / array.max()  # the sum of what is left is a number, however large the weights are
+    array = array / array.max()  # so that the sum does not overflow
     return np.asarray(array / array.sum())
 
 
 def _centered(gram: Array) -> Array:
     """The pairs of different movements, after rows and columns are centered."""
     gram, n = gram.copy(), len(gram)
-    np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))  # the diagonal moves no mean
+    # So that the diagonal does not change the means.
+    np.fill_diagonal(gram, (gram.sum(axis=1) - gram.diagonal()) / (n - 1))
     gram -= gram.mean(axis=0)
     gram -= gram.mean(axis=1, keepdims=True)
     return gram[~np.eye(n, dtype=bool)]

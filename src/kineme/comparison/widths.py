@@ -1,4 +1,4 @@
-"""Kernel widths: how far apart movements typically are, with labels and without."""
+"""Kernel widths, estimated from the typical distances of movements, with labels and without."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
 SHARE = 0.35
-_LEAST = 0.01  # of the typical size: movements closer than that are the same, as recordings go
-_SAME = 1e-3  # of the size: what single precision leaves between a movement and itself is less
-_COPIES = 1e-5  # of the size: of movements without labels, nearer ones are copies, and rounding alone says how near
+_LEAST = 0.01  # share of the typical size; smallest distance that is used
+_SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
+_COPIES = 1e-5  # share of the size; unlabeled movements at smaller distances are copies
 _ROWS = 500  # movements that widths are estimated from, at most
 _BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
 _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
@@ -23,10 +23,10 @@ _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     """Width sigma_r of each representation: a share of the typical distance to the nearest movement of another class.
 
-    At 0.35 of it a movement as far as an impostor counts exp(-4), under two in a hundred: what is closer than the
-    nearest impostor decides, everything farther hardly counts. Where there is one class, any other movement is the
-    impostor. Where classes coincide, as N and Z do under any rotation, the width is at least a hundredth of the
-    movements' size. Estimated from at most 500 evenly spaced movements, so that its cost does not grow.
+    At 0.35 of it, a movement at the distance of an impostor has a similarity of exp(-4), under 0.02: only movements
+    closer than the nearest impostor have an influence. With one class, any other movement is the impostor. If classes
+    coincide, as N and Z do under any rotation, the width is a hundredth of the movements' size. Estimated from at most
+    500 evenly spaced movements, which bounds the cost.
 
     Returns
     -------
@@ -71,9 +71,9 @@ def gap_widths(described: Described) -> Array:
     `impostor_widths` takes that share of the distance to the nearest movement of another class. Without labels the
     class is told by its edge: sorted by distance, ``d_1 <= d_2 <= ...``, the neighbors of a movement are first those of
     its own class, then the others, and where classes are apart the largest ratio ``d_{k+1} / d_k`` lies between them.
-    ``d_{k+1}`` stands for the nearest impostor; the median over movements forgives those whose gap lies elsewhere. k
-    runs from 1 to n / 2, so neither the number of classes nor their sizes are assumed. A fixed k would be within the
-    class for some sizes and beyond it for others.
+    ``d_{k+1}`` replaces the distance to the nearest impostor; the median over movements is robust to some whose largest
+    ratio is elsewhere. k runs from 1 to n / 2, so neither the number of classes nor their sizes are assumed. A fixed k
+    would be within the class for some sizes and beyond it for others.
 
     This is the gap by which agglomerative clusterings are cut (the largest step of merge heights), looked for around
     each movement by itself, where the scale is local.

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 
 
@@ -43,9 +44,9 @@ class DMPFeatures(MovementFeatures[DMP]):
     1.0
     """
 
-    _kind: ClassVar[type] = DMP
+    _specification_type: ClassVar[type] = DMP
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and store the number of dimensions; y is ignored."""
         self.dmp_ = self._checked()
         self.n_dims_ = Demonstrations.of(X).n_dims

@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.axes import axis_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.discrete.primitives import Primitives
@@ -48,7 +49,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
     the specification, which is itself never changed.
     """
 
-    _kind: ClassVar[type]  # of the specification
+    _specification_type: ClassVar[type]  # of the specification
     dmp_: Specification
     n_dims_: int
 
@@ -78,7 +79,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         parameters = super().get_params(deep=False)
         if deep:
             dmp = self._specification()
-            parameters |= {_NESTED + field.name: getattr(dmp, field.name) for field in fields(self._kind)}
+            parameters |= {_NESTED + field.name: getattr(dmp, field.name) for field in fields(self._specification_type)}
         return parameters
 
     def set_params(self, **parameters: Any) -> Self:
@@ -97,7 +98,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
             self.dmp = replace(self._specification(), **nested)
         return self
 
-    def transform(self, X: Any) -> NDArray[Any]:
+    def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S), or (n, d * N) for weights.
 
         Raises
@@ -131,9 +132,9 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         return self._specification()
 
     def _specification(self) -> Specification:
-        dmp = self._kind() if self.dmp is None else self.dmp
-        if not isinstance(dmp, self._kind):
-            name = self._kind.__name__
+        dmp = self._specification_type() if self.dmp is None else self.dmp
+        if not isinstance(dmp, self._specification_type):
+            name = self._specification_type.__name__
             raise SpecificationError(
                 f"expected dmp to be a kineme.{name}, got {dmp!r}; write {type(self).__name__}(dmp=kineme.{name}())"
             )
@@ -141,7 +142,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
 
     def _nested(self, parameters: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         """Split into fields of the specification, by their names there, and all other parameters."""
-        names = [field.name for field in fields(self._kind)]
+        names = [field.name for field in fields(self._specification_type)]
         nested: dict[str, Any] = {}
         others: dict[str, Any] = {}
         old: list[str] = []
@@ -155,13 +156,15 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
             else:
                 others[name] = value
         if unknown := [name for name in nested if name not in names]:
-            raise ValueError(f"{self._kind.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}")
+            raise ValueError(
+                f"{self._specification_type.__name__} has no parameter {', '.join(map(repr, unknown))}; it has {names}"
+            )
         if old:
-            this, kind = type(self).__name__, self._kind.__name__
+            this, fields_of_dmp = type(self).__name__, [_RENAMED.get(name, name) for name in old]
+            made = f"kineme.{self._specification_type.__name__}({', '.join(f'{name}=...' for name in fields_of_dmp)})"
             warnings.warn(
-                f"{', '.join(old)} of {this} are now fields of its dmp; write "
-                f"{this}(dmp=kineme.{kind}({', '.join(f'{_RENAMED.get(name, name)}=...' for name in old)})), and "
-                f"{_NESTED}{_RENAMED.get(old[0], old[0])} in set_params and searches",
+                f"{', '.join(old)} of {this} are now fields of its dmp; write {this}(dmp={made}), and "
+                f"{_NESTED}{fields_of_dmp[0]} in set_params and searches",
                 DeprecationWarning,
                 stacklevel=3,
             )

@@ -13,6 +13,7 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import TrajectoryError
 from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.pose.tangent import to_tangent
 from kineme.validation import check_number
 
@@ -51,7 +52,7 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         self.features = features
         self.orientation_weight = orientation_weight
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
@@ -62,7 +63,7 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         self.features_.fit(self._tangent(demonstrations))
         return self
 
-    def transform(self, X: Any) -> NDArray[Any]:
+    def transform(self, X: MovementsLike) -> NDArray[Any]:
         """Features of movements, shape (n, d * S) with d = 3 (orientations) or 6 (poses); see `DMPFeatures`.
 
         Raises

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from sklearn.utils.validation import check_is_fitted
 from kineme.errors import SpecificationError
 from kineme.kernels import TruncatedEuclidean
 from kineme.validation import Array, as_numbers, check_count, check_number, check_seed
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _COLUMNS = np.iinfo(np.int32).max
 _MOST_SHIFTS = 100_000
@@ -39,14 +42,18 @@ class RandomBinning(TransformerMixin, BaseEstimator):
     Attributes
     ----------
     m_ : float
+        The difference at which the kernel is truncated.
+    pitch_ : float
+        Width of a bin, ``min(1, sigma) m``.
     n_features_in_ : int
+        Columns of the training rows.
     n_columns_ : int
         Columns of Z. Values outside the bins of the training rows have no column: they share no bin with those rows.
 
     References
     ----------
-    A. Rahimi and B. Recht, "Random features for large-scale kernel machines", NIPS 2007, Section 4; there over random
-    pitches, here with the one pitch whose kernel is the hat itself.
+    A. Rahimi and B. Recht, "Random features for large-scale kernel machines", NIPS 2007, Section 4. They draw the
+    pitch, too; the fixed pitch here gives the triangle of Eq. (7).
 
     Examples
     --------
@@ -91,7 +98,7 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         self.n_columns_ = int(counts.sum()) + (self.sigma > 1)
         return self
 
-    def transform(self, X: ArrayLike) -> Any:
+    def transform(self, X: ArrayLike) -> csr_array:
         """Features Z, a `scipy.sparse.csr_array` of shape (n, n_columns_)."""
         from scipy.sparse import csr_array, diags_array, hstack
 
@@ -101,11 +108,11 @@ class RandomBinning(TransformerMixin, BaseEstimator):
             raise SpecificationError(f"expected {self.n_features_in_} columns as in fit, got {rows.shape[1]}")
         n, per_row = len(rows), self.shifts_.size
         bins = np.floor((rows[:, :, None] + self.shifts_) / self.pitch_).astype(np.int64) - self.lowest_
-        seen = (bins >= 0) & (bins < self.bins_)
-        columns = np.where(seen, bins + self.first_, 0).astype(np.int32).reshape(n, per_row)
+        inside = (bins >= 0) & (bins < self.bins_)
+        columns = np.where(inside, bins + self.first_, 0).astype(np.int32).reshape(n, per_row)
         # sigma > 1: k = m (1 - 1/sigma) + (m / sigma) hat; sigma < 1: k = m hat of pitch sigma m.
         weight = np.sqrt(self.m_ / (max(1.0, float(self.sigma)) * per_row))
-        values = (weight * seen).reshape(-1)
+        values = (weight * inside).reshape(-1)
         index = np.int32 if n * per_row <= _COLUMNS else np.int64  # scikit-learn's linear models need 32-bit indices
         ends = np.arange(n + 1, dtype=index) * per_row  # keeps that type
         Z = csr_array((values, columns.ravel(), ends), shape=(n, int(self.bins_.sum())))

@@ -9,6 +9,7 @@ import numpy as np
 
 from kineme.features.movement_features import MovementFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
@@ -35,9 +36,9 @@ class RhythmicFeatures(MovementFeatures[RhythmicDMP]):
         Dimensions d of the training movements.
     """
 
-    _kind: ClassVar[type] = RhythmicDMP
+    _specification_type: ClassVar[type] = RhythmicDMP
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: Any = None) -> Self:
         """Check the parameters and choose the dimension to align on; y is ignored.
 
         Raises

@@ -83,15 +83,15 @@ class Averaged(Kernel):
         for band in _bands(len(A), self.n_dims * len(b[0]) * A.itemsize):
             rows = [block[band] for block in a]
             if B is not None:
-                self._join(rows, b, gram[band])
+                self._average(rows, b, gram[band])
                 continue
-            self._join(rows, None, gram[band, band])
+            self._average(rows, None, gram[band, band])
             if band.start:  # below the diagonal, and its mirror image
                 before = slice(0, band.start)
-                self._join(rows, [block[before] for block in b], gram[band, before])
+                self._average(rows, [block[before] for block in b], gram[band, before])
                 gram[before, band] = gram[band, before].T
 
-    def _join(self, a: list[Rows], b: list[Rows] | None, gram: Rows) -> None:
+    def _average(self, a: list[Rows], b: list[Rows] | None, gram: Rows) -> None:
         """Write the average over dimensions of the similarities of `a` and `b` to `gram`."""
         mean = MEANS[self.mean]
         similarities = np.empty((len(a), *gram.shape), gram.dtype)
@@ -104,7 +104,7 @@ class Averaged(Kernel):
                 )
 
         def work(start: int, stop: int) -> None:
-            gram[start:stop] = mean.join(similarities[:, start:stop])
+            gram[start:stop] = mean.average(similarities[:, start:stop])
 
         for_tiles(work, len(gram), 64)
 

@@ -16,7 +16,7 @@ class Mean:
 
     Attributes
     ----------
-    join : callable
+    average : callable
         Similarities (d, ...) to their average (...).
     formula : str
     psd : {"always", "infinitely divisible", "not claimed"}
@@ -27,7 +27,7 @@ class Mean:
         Whether it is defined for non-negative similarities only.
     """
 
-    join: Callable[[Rows], Rows]
+    average: Callable[[Rows], Rows]
     formula: str
     psd: str
     reason: str

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -71,7 +70,7 @@ def _exp_of_product(a: Rows, b: Rows, a2: Rows, b2: Rows, gram: Rows) -> None:
     """Write exp(min(0, a·b - a2 - b2)) to `gram`."""
     np.matmul(a, b.T, out=gram)  # the threads of the linear algebra library; a·a is exactly symmetric
 
-    def work(start: int, stop: int) -> Any:
+    def work(start: int, stop: int) -> None:
         strip = gram[start:stop]
         strip -= np.add.outer(a2[start:stop], b2)  # in this order it keeps the symmetry
         np.minimum(strip, 0, out=strip)

@@ -82,7 +82,7 @@ class ActionLibrary:
         specification = Specification.of(recognizer, dmp) if create else None
         self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
         made = self.specification
-        if Specification.of(recognizer or made.recognizer(), dmp or made.dmp) != made:
+        if Specification.of(recognizer, dmp, made) != made:
             self.close()
             raise SpecificationError(
                 f"expected the recognizer and dmp that the library in {folder} was made with, got others; its features "
@@ -346,9 +346,9 @@ class ActionLibrary:
         """Propose symbols for the movements without one, or for `ids`; a person names them.
 
         If there are symbols, their members define how similar movements of one symbol are, see
-        `kineme.anchoring.proposals.assign.place`. If there are none, or if `method` or `n_clusters` is given, the
-        movements are clustered, see `kineme.anchoring.proposals.propose.propose`. A proposal is left out if four fifths
-        of its movements were in one rejected proposal. Fewer than three movements make no proposal.
+        `kineme.anchoring.assign`. If there are none, or if `method` or `n_clusters` is given, the movements are
+        clustered, see `kineme.anchoring.propose`. A proposal is left out if four fifths of its movements were in one
+        rejected proposal. Fewer than three movements make no proposal.
         """
         from kineme.library.symbols.proposals import propose
 

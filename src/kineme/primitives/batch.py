@@ -1,17 +1,27 @@
-"""Base class of batches of learned primitives: length, indexing, `join`, `save` and `load`."""
+"""Base class of batches of learned primitives: length, indexing, `concatenate`, `save` and `load`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import fields, replace
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.labels import label_array
+from kineme.primitives.persistence import (
+    Arrays,
+    checked_rows,
+    header_of,
+    labels_and_names,
+    load_as,
+    save_as,
+    specification_from_dict,
+)
 
 
 class Batch:
@@ -27,9 +37,19 @@ class Batch:
     #: Name of the content in saved files.
     KIND: ClassVar[str]
 
-    dmp: Any
-    labels: NDArray[Any] | None
-    names: tuple[str | None, ...] | None
+    if TYPE_CHECKING:  # read-only here: fields or properties of the subclass
+
+        @property
+        def dmp(self) -> Any:
+            """The specification."""
+
+        @property
+        def labels(self) -> NDArray[Any] | None:
+            """Labels of the demonstrations, shape (n,), or None."""
+
+        @property
+        def names(self) -> tuple[str | None, ...] | None:
+            """Where each demonstration comes from, or None."""
 
     def __post_init__(self) -> None:
         for name in self.ROWS:
@@ -40,16 +60,19 @@ class Batch:
             object.__setattr__(self, "labels", label_array(self.labels))
 
     def __len__(self) -> int:
-        return len(getattr(self, next(iter(self.ROWS))))
+        return len(self._row(next(iter(self.ROWS))))
 
     def __getitem__(self, index: Any) -> Self:
         """The chosen primitives as a batch; an integer gives a batch of one."""
         chosen = np.atleast_1d(np.arange(len(self))[index])
         return self._with(
-            {name: getattr(self, name)[chosen] for name in self.ROWS},
+            {name: self._row(name)[chosen] for name in self.ROWS},
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
         )
+
+    def __iter__(self) -> Iterator[Self]:
+        return (self[i] for i in range(len(self)))
 
     def __repr__(self) -> str:
         labels = "" if self.labels is None else f", {len(np.unique(self.labels))} labels"
@@ -58,10 +81,10 @@ class Batch:
     @property
     def n_dims(self) -> int:
         """Number of dimensions d."""
-        return int(getattr(self, next(iter(self.ROWS))).shape[1])
+        return int(self._row(next(iter(self.ROWS))).shape[1])
 
     @classmethod
-    def join(cls, batches: Iterable[Self]) -> Self:
+    def concatenate(cls, batches: Iterable[Self]) -> Self:
         """Concatenate several batches, in the order given.
 
         Raises
@@ -88,7 +111,7 @@ class Batch:
             raise TrajectoryError(f"expected labels of one type, got {', '.join(types)}")
         named = any(batch.names is not None for batch in batches)
         return first._with(
-            {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in cls.ROWS},
+            {name: np.concatenate([batch._row(name) for batch in batches]) for name in cls.ROWS},
             np.concatenate(labels) if labels else None,
             tuple(name for batch in batches for name in batch.names or (None,) * len(batch)) if named else None,
         )
@@ -103,9 +126,8 @@ class Batch:
         OSError
             The file cannot be written; what was there before stays.
         """
-        from kineme.primitives.persistence import save_batch
-
-        return save_batch(self, path)
+        rows = {name: self._row(name) for name in self.ROWS}
+        return save_as(self.KIND, path, header_of(self.dmp, self.labels, self.names), rows)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -116,13 +138,33 @@ class Batch:
         DataError
             The file is foreign, truncated, damaged, of another kind or of a later version.
         """
-        from kineme.primitives.persistence import load_batch
+        return load_as(cls.KIND, path, cls._from_file)
 
-        return load_batch(cls, path)
+    @classmethod
+    def join(cls, batches: Iterable[Self]) -> Self:
+        """Deprecated name of `concatenate`."""
+        warnings.warn("join is deprecated: use concatenate", DeprecationWarning, stacklevel=2)
+        return cls.concatenate(batches)
+
+    def _row(self, name: str) -> NDArray[Any]:
+        """The array of that name in `ROWS`."""
+        return np.asarray(getattr(self, name))
 
     def _with(self, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None) -> Self:
-        changed: Self = replace(self, **arrays, labels=labels, names=names)  # type: ignore[type-var]
-        return changed
+        return self._of_rows(self.dmp, arrays, labels, names)
+
+    @classmethod
+    def _of_rows(
+        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None
+    ) -> Self:
+        build: Callable[..., Self] = cls
+        return build(dmp, **arrays, labels=labels, names=names)
+
+    @classmethod
+    def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> Self:
+        dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
+        rows = checked_rows(cls.ROWS, arrays, dmp.n_basis)
+        return cls._of_rows(dmp, rows, *labels_and_names(header, len(next(iter(rows.values())))))
 
 
 def _check_alike(first: Batch, batch: Batch, i: int) -> None:

@@ -16,7 +16,6 @@ from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import label_array
-from kineme.primitives.batch import Batch
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
@@ -24,18 +23,12 @@ STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
 _LABEL_TYPES = (str, int, float, bool)
 
 Arrays = Mapping[str, NDArray[Any]]
-B = TypeVar("B", bound=Batch)
 T = TypeVar("T")
 
 
-def save_batch(batch: Batch, path: str | Path) -> Path:
-    """Write a batch of primitives to one file; see `Batch.save`."""
-    return write_container(Path(path), batch.KIND, *pack(batch))
-
-
-def load_batch(cls: type[B], path: str | Path) -> B:
-    """Read a file of `save_batch`; see `Batch.load`."""
-    return load_as(cls.KIND, path, lambda header, arrays: unpack(cls, header, arrays))
+def save_as(kind: str, path: str | Path, header: dict[str, Any], arrays: Arrays) -> Path:
+    """Write a header of plain data and arrays to one file, with the name of its content."""
+    return write_container(Path(path), kind, header, dict(arrays))
 
 
 def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays], T]) -> T:
@@ -50,33 +43,31 @@ def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays
         ) from error
 
 
-def pack(batch: Batch) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """A batch as a header of plain data and arrays."""
-    labels = None if batch.labels is None else np.asarray(batch.labels).tolist()
-    if labels is not None and not all(isinstance(label, _LABEL_TYPES) for label in labels):
-        raise DataError(f"expected labels that are text or numbers, to save them, got {type(labels[0]).__name__}")
-    header = {
-        "dmp": specification_to_dict(batch.dmp),
-        "labels": labels,
-        "names": None if batch.names is None else list(batch.names),
+def header_of(dmp: Any, labels: NDArray[Any] | None, names: tuple[str | None, ...] | None) -> dict[str, Any]:
+    """Specification, labels and names of a batch as plain data."""
+    plain = None if labels is None else np.asarray(labels).tolist()
+    if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
+        raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
+    return {
+        "dmp": specification_to_dict(dmp),
+        "labels": plain,
+        "names": None if names is None else list(names),
     }
-    return header, {name: getattr(batch, name) for name in batch.ROWS}
 
 
-def unpack(cls: type[B], header: dict[str, Any], arrays: Arrays) -> B:
-    """What `pack` has packed."""
-    dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
-    sizes = {"N": dmp.n_basis} | dict(zip("nd", arrays[next(iter(cls.ROWS))].shape, strict=False))
-    for name, letters in cls.ROWS.items():
-        check_array(name, arrays[name], tuple(sizes[letter] for letter in letters))
-    labels, names = (_one_each(sizes["n"], header, name) for name in ("labels", "names"))
-    build: Callable[..., B] = cls
-    return build(
-        dmp,
-        **{name: arrays[name] for name in cls.ROWS},
-        labels=None if labels is None else label_array(labels, sizes["n"]),
-        names=None if names is None else tuple(names),
-    )
+def labels_and_names(header: dict[str, Any], n: int) -> tuple[NDArray[Any] | None, tuple[str | None, ...] | None]:
+    """Labels and names of the header of a batch of n, checked."""
+    labels, names = (_one_each(n, header, name) for name in ("labels", "names"))
+    return None if labels is None else label_array(labels, n), None if names is None else tuple(names)
+
+
+def checked_rows(rows: Mapping[str, str], arrays: Arrays, n_basis: int) -> dict[str, NDArray[Any]]:
+    """The arrays of a batch, refused unless they have the shapes of `rows`, in the letters n, d, N and digits."""
+    sizes = {"N": n_basis} | dict(zip("nd", arrays[next(iter(rows))].shape, strict=False))
+    for name, letters in rows.items():
+        shape = tuple(int(letter) if letter.isdigit() else sizes[letter] for letter in letters)
+        check_array(name, arrays[name], shape)
+    return {name: arrays[name] for name in rows}
 
 
 def _one_each(n: int, header: dict[str, Any], name: str) -> list[Any] | None:

@@ -1,1 +1,1 @@
-"""Recognizing movements: representations, averaged kernels, classifiers, answers."""
+"""Recognition of movements: classifiers, open set, early recognition, spotting."""

@@ -1,4 +1,4 @@
-"""The full answer to a movement: what it is, how sure, like which demonstration, and how it maps onto it."""
+"""The answer to a movement: label, confidence, nearest demonstrations, and the map from the nearest one."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ class Neighbor:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a recognizer says about one movement.
+    """The answer of a recognizer to one movement.
 
     Attributes
     ----------
     label : label or None
         The best-ranked class whose p-value is above the error rate; None if there is none: unknown.
     confidence : float
-        1 minus the largest p-value of what was not answered: of the other classes, or, if unknown, of all
+        1 minus the largest p-value of the other classes, or, if unknown, of all classes
         (Vovk et al. 2005, section 3.4).
     p_values : mapping from label to float
-        How many members of the class would look as strange or stranger; see `Calibration`.
+        Share of members of the class that would be at least as far from it; see `Calibration`.
     calibrated : bool
         Whether enough demonstrations were left out and scored, for every class compared with, that the error rate is
         kept. If not, as with one demonstration of each class, p-values and confidence are a guess.

@@ -1,4 +1,4 @@
-"""From similarities to a score per class: nearest reference, nearest prototype, support vectors."""
+"""Classifiers on the averaged kernel: nearest reference, nearest prototype, support vectors."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from kineme.validation import Array
 
 _MANY = 8  # demonstrations of every class, from which on "auto" takes the SVM
 _LARGEST_GRAM = 4000  # demonstrations; beyond, "auto" keeps memory linear in them
-_WIDER = 2.0  # times the width: an impostor counts exp(-1)
+_WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-1)
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
 
 
 class Classifier(Protocol):
-    """What gives each class a score."""
+    """A fitted classifier: scores of each class."""
 
     def scores(self, compared: Compared) -> Array:
         """A score per class, shape (n, C): larger is more like it."""
@@ -64,8 +64,8 @@ class Prototype:
 class SupportVectors:
     """scikit-learn's SVM on the averaged kernel, one class against the others.
 
-    The kernels are twice as wide as for the nearest neighbor. That one should be decided by the closest movement alone;
-    an SVM weighs many, and where the similarities of different demonstrations are almost zero it has nothing to weigh.
+    The kernels are twice as wide as for the nearest neighbor, which should depend on the closest movement alone. An SVM
+    combines many movements, which needs similarities of different demonstrations that are not almost zero.
 
     Attributes
     ----------

@@ -18,10 +18,10 @@ from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.validation import Array, check_number
 
-_CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spread
+_CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced
 _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
 _LEAST = 5e-3  # smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart
-#: Of the typical distance to another class: within it, 95 % of members are expected where nothing calibrates.
+#: Share of the typical distance to another class within which 95 % of members are expected without calibration.
 REACH = 0.6
 
 
@@ -39,9 +39,9 @@ def distances(logs: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What the demonstrations say about how far members of each class are from their nearest demonstration.
+    """Distances of members of each class from their nearest demonstration, estimated from the demonstrations.
 
-    One demonstration of each class says nothing about that: p-values are then a guess, see 3. below.
+    With one demonstration of each class they cannot be estimated: p-values are then a guess, see 3. below.
 
     The nonconformity of a movement to class c is ``a_c = d_c / s_c``: its distance d_c to the nearest demonstration of
     the class, ``d = sqrt(-2 log K)``, over the scale s_c of the class. Each demonstration gets the same score with

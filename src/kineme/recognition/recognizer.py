@@ -42,10 +42,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         By default positions over arc length, forcing term over arc length, forcing term over time; where `weights`
         are fitted, also positions over time and both over a blend of time and arc length.
     max_angle : float, optional
-        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0. Each
-        invariance merges something: pi merges N and Z, more than a right angle V and caret.
+        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0. With
+        pi, N and Z become equal; above a right angle, V and caret.
     scale : {"path", "per-dimension", "none"}, default "path"
-        What of the size is taken out, see `Normalization`. "path" merges a dot and a circle.
+        Normalization of the size, see `Normalization`. With "path", a dot and a circle become equal.
     translation : bool, default True
         Whether translation is taken out.
     cutoff : float or None, default 10.0
@@ -200,7 +200,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def predict_proba(self, X: Any) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.
 
-        A ranking made comparable, not a calibrated probability; `recognize` gives p-values, and says whether those are
+        A softmax of the scores, not a calibrated probability; `recognize` gives p-values and states whether they are
         calibrated.
         """
         scores = self._scores(X)
@@ -208,7 +208,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
     def score(self, X: Any, y: Any = None, sample_weight: Any = None) -> float:
-        """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
+        """Share of movements whose class is right; labels `y` are by default those of the demonstrations."""
         demos = Demonstrations.of(X)
         return float(super().score(demos, check_labels(demos, y), sample_weight))
 
@@ -217,16 +217,16 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     @overload
     def recognize(self, X: Demonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
     def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
-        """What each movement is, or that it is unknown, and why.
+        """Recognize movements: label or unknown, confidence, and nearest demonstrations.
 
         Parameters
         ----------
         X : one movement or many
             A `Trajectory` or an array (T, d) is one; else whatever `Demonstrations.of` accepts.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. It is kept where the answer is `calibrated`, which
-            takes at least ``1 / error_rate - 1`` demonstrations of classes shown twice or more. With one demonstration
-            of each class p-values are a guess, and the share may be anything; see `Calibration`.
+            Share of known movements that may be called unknown. It holds if the answer is `calibrated`, which takes at
+            least ``1 / error_rate - 1`` demonstrations of classes with two or more. With one demonstration of each
+            class p-values are a guess, and the share may be anything; see `Calibration`.
 
         Returns
         -------
@@ -241,8 +241,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def p_values(self, X: Any, error_rate: float = 0.05) -> Array:
         """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`.
 
-        With one demonstration of each class they are a guess, not a promise: ``calibration().calibrated(error_rate)``
-        tells which classes keep the rate, see `Calibration`.
+        With one demonstration of each class they are a guess: ``calibration().calibrated(error_rate)`` tells for which
+        classes the rate holds, see `Calibration`.
         """
         check_error_rate(error_rate)
         return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
@@ -258,11 +258,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return known_labels(self.classes_, scores, p_values, error_rate)
 
     def novelty(self, X: Any) -> Array:
-        """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
+        """Smallest nonconformity to any class, shape (n,): larger for movements less like any known class."""
         return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
 
     def calibration(self) -> Calibration:
-        """Of the p-values; made when first asked for, since it compares the demonstrations with each other."""
+        """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
         if self._calibration is None:
             self._calibration = calibrate(comparison.similarity, references)

@@ -1,4 +1,4 @@
-"""Calibration where not every movement can be compared with every other one: on a sample, against the whole."""
+"""Calibration of very many movements: a sample is compared with all."""
 
 from __future__ import annotations
 

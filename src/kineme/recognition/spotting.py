@@ -1,4 +1,4 @@
-"""Known movements inside one long recording, with unknown between them."""
+"""Spotting: find known movements in one long recording, with unknown motion between them."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from kineme.validation import Array, check_count
 
 _MIN_SAMPLES = 8
 _TEMPO = 1.5  # one standard deviation of the ratio of durations, for one person's movements of one class
-_MAX_TEMPO = 3.0  # beyond this ratio of durations it is not looked for
+_MAX_TEMPO = 3.0  # largest ratio of durations that is considered
 _IMPOSTOR = -4.0  # log similarity of a typical impostor: the kernels' width is 0.35 of its distance
-_PER_MOVEMENT = 0.5  # typical durations that a movement costs: it pays from half way to an impostor on
+_PER_MOVEMENT = 0.5  # cost in typical durations: positive scores from half way to an impostor on
 
 
 class Spotted(NamedTuple):
-    """One stretch of motion: from when to when [s], what it is (None: no known movement), and how sure.
+    """One stretch of motion: start and end [s], label (None: no known movement), and confidence.
 
-    `confidence` is 1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
+    `confidence` is 1 minus the largest p-value of the other classes, or, for None, of all classes.
     """
 
     start: float
@@ -143,7 +143,7 @@ def _durations(references: References) -> Array | None:
 
 
 def _log_tempo(references: References, durations: Array) -> Array:
-    """How far, in logarithms, each duration is from those demonstrated for each class, shape (n, C)."""
+    """Logarithmic distance of each duration from the demonstrated ones of each class, shape (n, C)."""
     known = _durations(references)
     if known is None:
         return np.zeros((len(durations), len(references.classes)))

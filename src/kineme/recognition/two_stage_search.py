@@ -22,7 +22,7 @@ from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
-_CLASSES = 64  # classes that an answer speaks of
+_CLASSES = 64  # classes with p-values in an answer
 _MOST = 4096  # movements compared afterwards, where bounds leave doubt about the nearest of all
 _OF_CLASSES = 256  # and about the nearest of each class
 _ASKED, _MOST_ASKED = 16, 256  # movements whose bounds are computed in one matrix product: least, most

@@ -78,7 +78,7 @@ def test_one_long_label_costs_its_own_length(tmp_path):
     demos = recordings.demonstrations
     kept = Demonstrations(list(demos))[np.arange(len(demos))]
     learned = kineme.DMP(n_basis=5).learn(kept)
-    kineme.Primitives.join([learned, learned]).save(tmp_path / "learned")
+    kineme.Primitives.concatenate([learned, learned]).save(tmp_path / "learned")
     assert kineme.Primitives.load(tmp_path / "learned").labels[7] == long
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import DMP
-from kineme.primitives.discrete.basis import GaussianBasis
-from kineme.primitives.discrete.phase import ExponentialPhase
+from kineme.primitives.discrete.basis import ExponentialPhase, GaussianBasis
 
 bases = st.builds(
     lambda n, overlap, gating, end: GaussianBasis(n, overlap, gating, ExponentialPhase(end)),

@@ -9,7 +9,7 @@ import pytest
 
 from kineme import DMP
 from kineme.primitives.discrete import response
-from kineme.primitives.discrete.differentiation import differentiation_matrices
+from kineme.primitives.discrete.fits import differentiation_matrices
 
 
 def _orders(errors):

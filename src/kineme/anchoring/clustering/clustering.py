@@ -1,14 +1,17 @@
-"""From distances to clusters: the methods by name."""
+"""From distances to clusters: the methods by name, and the tree that average linkage makes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
 
-from kineme.anchoring.clustering.resampling import Clusters
-from kineme.anchoring.clustering.tree import average_linkage, cuts
 from kineme.validation import Array
+
+Clusters = NDArray[np.intp]
 
 
 def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Clusters:
@@ -43,3 +46,24 @@ def without_small(clusters: Clusters, min_members: int) -> Clusters:
     large = np.flatnonzero(sizes >= min_members)
     kept[large] = np.arange(len(large))
     return np.asarray(kept[clusters])
+
+
+def average_linkage(distances: Array) -> Array:
+    """Merges (n - 1, 4) of the two clusters whose mean distance is smallest, as SciPy's `linkage` gives them.
+
+    scikit-learn's ``AgglomerativeClustering(metric="precomputed", linkage="average")`` finds the same clusters, but a
+    tree can be cut many times.
+    """
+    return np.asarray(linkage(squareform(distances, checks=False), "average"))
+
+
+def cuts(tree: Array, counts: Sequence[int]) -> list[NDArray[np.intp]]:
+    """Clusters 0, 1, ... of each movement for each number of clusters: the first n - c merges are made."""
+    rank = np.arange(len(tree), dtype=np.float64)  # of the merges: heights may be equal, ranks are not
+    ends = [len(tree) - count for count in counts]
+    return [np.asarray(fcluster(tree, end, "monocrit", monocrit=rank), dtype=np.intp) - 1 for end in ends]
+
+
+def cut_at(tree: Array, height: float) -> NDArray[np.intp]:
+    """Clusters of movements whose mean distance does not exceed `height`."""
+    return np.asarray(np.unique(fcluster(tree, height, "distance"), return_inverse=True)[1], dtype=np.intp)

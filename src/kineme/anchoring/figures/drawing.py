@@ -1,4 +1,4 @@
-"""Small drawings of movements: in the plane as they are, in space from where most is seen, one dimension over time."""
+"""Small drawings of movements: in the plane as they are, in space in their widest view, one dimension over time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture of one kind: its members overlaid, so that a person can say what it is."""
+"""A picture of one proposal: its members overlaid, so that a person can say what it is."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Com
     proposal : Proposal
     title : str, optional
         By default its size, cohesion and stability.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take out.
 
     Raises
@@ -41,7 +41,7 @@ def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Com
     figure = new_figure(4.2, 3.4)
     axes = figure.subplots()
     overlay(axes, recorded, medoid, like)
-    # Up to 60 members lie anywhere, so the inset has a place of its own, beside the drawing.
+    # Up to 60 members lie anywhere, so the inset lies beside the drawing.
     inset = axes.inset_axes((1.03, 0.66, 0.32, 0.32))
     drawn = flat(recorded, medoid[0])
     plot_paths(inset, drawn, GRAY, linewidth=0.6)

@@ -68,7 +68,7 @@ def ground(
         Of the positions, as "mm", or of each dimension.
     medoid : int, optional
         Which demonstration it is, where that is known.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take out before means and styles.
 
     Returns
@@ -76,7 +76,7 @@ def ground(
     dict
         The primitive (specification, scaled weights, start, goal, velocity, duration), the demonstrated ranges of
         start, goal, displacement ``g - x0``, extent and duration, and from three demonstrations on the styles
-        in which they differ, if they do, place, size and direction taken out.
+        in which they differ, if they do, beside position, size and direction.
 
     Raises
     ------

@@ -17,9 +17,9 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
     """Movements on the way from `a` to `b`, one for each share of the way: 0 is a, 1 is b.
 
     b is laid onto a, and ``theta = (1 - s) theta_a + s theta_b`` is the mean of their paths at equal phase (see
-    `kineme.primitives.styles.parameters`); then place, size (geometrically) and direction (about one axis) go the same
-    share of the way back to b's own. So no movement shrinks half way because the two face different ways, as a plain
-    mean of paths does.
+    `kineme.primitives.styles.parameters`); then position, size (geometrically) and direction (about one axis) go the
+    same share of the way back to b's own. So no movement shrinks half way because the two face different ways, as a
+    plain mean of paths does.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def morph(a: Primitives, b: Primitives, shares: ArrayLike, like: Compares | None
         Batches of one with the same specification: two prototypes, say.
     shares : array_like of shape (m,)
         From 0 to 1.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take.
 
     Raises

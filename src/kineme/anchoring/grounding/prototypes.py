@@ -1,4 +1,4 @@
-"""What stands for a kind: its most typical member, and the mean of its members."""
+"""What stands for a symbol: its most typical member, and the mean of its members."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from kineme.primitives.styles.parameters import check_primitives
 
 @dataclass(frozen=True, eq=False)
 class Prototype:
-    """A kind of movement as one movement.
+    """A symbol as one movement.
 
     Attributes
     ----------
     medoid : int
         The member most similar to the others.
     average : AveragePrimitive
-        Mean of the members and their spread, each laid onto the medoid first; in the medoid's place, size and
+        Mean of the members and their spread, each laid onto the medoid first; at the medoid's position, size and
         direction, and with the (geometric) mean of all durations.
     maps : Maps
         From each member onto the medoid.
@@ -41,7 +41,7 @@ class Prototype:
 
 
 def prototype(primitives: Primitives, medoid: int | None = None, like: Compares | None = None) -> Prototype:
-    """The prototype of the members of one kind.
+    """The prototype of the members of one symbol.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def prototype(primitives: Primitives, medoid: int | None = None, like: Compares 
         Of the members.
     medoid : int, optional
         Where it is known; by default the member with the largest mean similarity to the others.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take out before the mean.
 
     Raises
@@ -72,7 +72,7 @@ def medoid_of(movements: object, like: Compares | None = None) -> int:
     described = describe(movements, like)
     if len(described) < 3:
         return 0
-    # One width serves all of them: it only weighs the representations, by how much they differ within the kind.
+    # One width serves all of them: it only weighs the representations, by how much they differ within the symbol.
     widths = median_distances(described)
     if widths.min() <= 0:
         return 0

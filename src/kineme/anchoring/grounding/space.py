@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,7 +54,7 @@ class ConceptualSpace:
     def nearest(self, symbol: Any, k: int = 3) -> tuple[Near, ...]:
         """The `k` symbols nearest to one, nearest first; all of them where there are fewer."""
         check_count("k", k, 1)
-        i = self.place(symbol)
+        i = self.index(symbol)
         order = [j for j in np.argsort(self.distances[i], kind="stable").tolist() if j != i][:k]
         return tuple(Near(self.symbols[j], float(self.distances[i, j])) for j in order)
 
@@ -65,7 +66,7 @@ class ConceptualSpace:
         between is also nearer to each of the two than they are to each other.
         """
         check_number("eps", eps, least=0.0)
-        i, j = self.place(a), self.place(b)
+        i, j = self.index(a), self.index(b)
         if i == j:
             raise SpecificationError(f"expected two different symbols, got {a!r} twice")
         d, ab = self.distances, self.distances[i, j]
@@ -78,11 +79,16 @@ class ConceptualSpace:
             found.append(Between(self.symbols[c], float((ac + cb) / ab - 1.0), float(np.clip(share, 0.0, 1.0))))
         return tuple(sorted(found, key=lambda one: one.excess))
 
-    def place(self, symbol: Any) -> int:
-        """Index of a symbol."""
+    def index(self, symbol: Any) -> int:
+        """Index of a symbol among `symbols`."""
         if symbol not in self.symbols:
             raise SpecificationError(f"expected one of the symbols {list(self.symbols)}, got {symbol!r}")
         return self.symbols.index(symbol)
+
+    def place(self, symbol: Any) -> int:
+        """Deprecated name of `index`."""
+        warn("ConceptualSpace.place is now ConceptualSpace.index", DeprecationWarning, stacklevel=2)
+        return self.index(symbol)
 
 
 def conceptual_space(
@@ -101,7 +107,7 @@ def conceptual_space(
     symbols : sequence of s symbols, all different
     prototypes : Described, or s movements
         One for each symbol: its medoid, say.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose representations and invariances to take.
     widths : array_like of shape (R,), optional
         By default the median distance of the prototypes in each representation, so that all of them matter alike.

@@ -1,4 +1,4 @@
-"""New movements beside known symbols: they join one, stay unknown, or raise a new proposal."""
+"""New movements beside known symbols: each is assigned to a symbol or to a new proposal, or stays unknown."""
 
 from __future__ import annotations
 
@@ -8,39 +8,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.anchoring.clustering.clustering import without_small
-from kineme.anchoring.clustering.resampling import Clusters, stabilities
-from kineme.anchoring.clustering.tree import average_linkage, cut_at
+from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cut_at, without_small
+from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
-from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
-from kineme.comparison.compared import nearest, score
-from kineme.comparison.describe import Described
+from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described, describe
+from kineme.comparison.references import References
 from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import compare
-from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.answer import known_labels
-from kineme.recognition.conformal import REACH, check_error_rate
+from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
-from kineme.recognition.recognizer import Recognizer
+from kineme.recognition.known_classes import KnownClasses, known_classes, open_set_labels
 from kineme.validation import Array, check_count
 
 _REPEATS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
-    """Where new movements belong.
+class Assignment:
+    """What new movements are.
 
     Attributes
     ----------
     labels : ndarray of n labels or None
-        The symbol that each movement joins; None is unknown.
+        The symbol that each movement is assigned to; None is unknown.
     p_values : ndarray of shape (n,)
         The largest conformal p-value of each movement for any symbol.
     proposals : Proposals
-        Kinds among the unknown; members are places among the new movements, and so are the `clusters`, -1 for
-        movements that joined a symbol or stay unknown.
+        Clusters of unknown movements; members are indices of the new movements. `clusters` is -1 for movements that are
+        assigned to a symbol or stay unknown.
     """
 
     labels: NDArray[np.object_]
@@ -49,69 +47,79 @@ class Placement:
 
     @property
     def unknown(self) -> NDArray[np.intp]:
-        """Places of the movements that neither join a symbol nor raise a proposal."""
-        nowhere = np.array([label is None for label in self.labels], dtype=bool)
-        return np.flatnonzero(nowhere & (self.proposals.clusters < 0))
+        """Indices of the movements that are in no symbol and in no proposal."""
+        unlabeled = np.array([label is None for label in self.labels], dtype=bool)
+        return np.flatnonzero(unlabeled & (self.proposals.clusters < 0))
 
     def __repr__(self) -> str:
-        n_joined = sum(label is not None for label in self.labels)
+        n_assigned = sum(label is not None for label in self.labels)
         return (
-            f"Placement({n_joined} of {len(self.labels)} join a symbol, {len(self.proposals)} new kinds proposed, "
+            f"Assignment({n_assigned} of {len(self.labels)} to a symbol, {len(self.proposals)} new clusters proposed, "
             f"{len(self.unknown)} unknown)"
         )
 
 
-def place(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Placement:
-    """Let movements join the symbols that they are recognized as, and gather the unknown into new kinds.
+def assign(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Assignment:
+    """Assign movements to the symbols that they are recognized as, and cluster the unknown ones.
 
     Parameters
     ----------
     movements : movements as `Demonstrations.of` accepts them
-    symbols : fitted Recognizer, or labeled Demonstrations
-        What is known. Widths and the scale of likeness are its own.
+    symbols : fitted Recognizer, or labeled movements
+        The known symbols. Kernel widths and the height at which clusters are cut are theirs.
     error_rate : float, default 0.05
-        Share of a symbol's true movements that may stay out of it, see `Recognizer.recognize`.
+        Share of a symbol's true movements that may stay unknown, see `kineme.Recognizer.recognize`.
     min_members : int, default 3
-        Unknown movements that must agree to be proposed. They agree when on average they are more alike than half way
-        from the members of one symbol, which are 1, to those of the nearest other, 0.
+        Movements of a proposal, at least. On average they are more similar than half way from the members of one
+        symbol, which are 1, to those of the nearest other, 0.
 
     Returns
     -------
-    Placement
+    Assignment
+
+    Raises
+    ------
+    SpecificationError
+        Parameters out of range.
+    TrajectoryError
+        Symbols without labels, or movements of another number of dimensions.
     """
     check_count("min_members", min_members, 2)
-    known = symbols if isinstance(symbols, Recognizer) else Recognizer().fit(symbols)
-    demos = Demonstrations.of(movements)
-    check_error_rate(error_rate)
-    described = known.describe(demos)
-    near, scores = score(known.comparison_, known.references_, described, nearest, known.classifier_.scores)
-    p = known.calibration().p_values(near, error_rate)
-    labels = known_labels(known.classes_, scores, p, error_rate)
+    known = known_classes(symbols)
+    described = describe(known.comparison.checked(movements), known.comparison)
+    return assign_described(described, known, error_rate, min_members)
+
+
+def assign_described(
+    described: Described, known: KnownClasses, error_rate: float = 0.05, min_members: int = 3
+) -> Assignment:
+    """As `assign`, of movements that are described in the representations of what is known."""
+    labels, p_values = open_set_labels(known, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
-    proposals = _among_unknown(known, described, unknown, min_members)
-    return Placement(labels, p.max(axis=1), proposals)
+    found = _among_unknown(known, described.take(unknown), min_members)
+    return Assignment(labels, p_values.max(axis=1), _at(unknown, found, len(described)))
 
 
-def _among_unknown(known: Recognizer, everything: Described, unknown: NDArray[np.intp], min_members: int) -> Proposals:
-    """Kinds among the unknown; where they are many, among a spread sample, which the others join by their nearest."""
-    n = len(unknown)
+def _among_unknown(known: KnownClasses, unknown: Described, min_members: int) -> Proposals:
+    """Clusters among the unknown; where they are many, of a subsample, extended by their nearest neighbors."""
+    n, similarity = len(unknown), known.comparison.similarity
     if n < min_members:
-        none = np.full(n, -1, dtype=np.intp)
-        return _at(unknown, describe_clusters(np.eye(n), none, np.empty(0), known.widths_), len(everything))
-    described = everything.take(unknown)
-    limit, similarity = largest_clustered(everything.n_dims), known.comparison_.similarity
+        return describe_clusters(np.eye(n), np.full(n, -1, dtype=np.intp), np.empty(0), similarity.widths)
+    limit, height = largest_clustered(unknown.n_dims), 1.0 - agreement(known.comparison, known.references)
     if n <= limit:
-        return _at(unknown, _that_agree(known, described, min_members)[1], len(everything))
-    sample, _ = spread_sample(described, limit)
-    K, found = _that_agree(known, described.take(sample), min_members)
-    return _at(unknown, assign(described, sample, K, found, similarity), len(everything))
+        return _clustered(known.comparison, unknown, height, min_members)[1]
+    sample, _ = subsample(unknown, limit)
+    K, found = _clustered(known.comparison, unknown.take(sample), height, min_members)
+    return extend(unknown, sample, K, found, similarity)
 
 
-def _that_agree(known: Recognizer, described: Described, min_members: int) -> tuple[Array, Proposals]:
-    """Similarities, and clusters by average linkage up to where movements of one symbol agree."""
-    K = compare(known.comparison_.similarity, described, described)
+def _clustered(
+    comparison: Comparison, described: Described, height: float, min_members: int
+) -> tuple[Array, Proposals]:
+    """Similarities, and clusters by average linkage whose mean distance does not exceed `height`."""
+    K = compare(comparison.similarity, described, described)
     np.fill_diagonal(K, 1.0)
-    order, height = own_order(K), 1.0 - agreement(known)
+    order = own_order(K)
 
     def cut(distances: Array) -> Clusters:
         return cut_at(average_linkage(distances), height)
@@ -120,20 +128,22 @@ def _that_agree(known: Recognizer, described: Described, min_members: int) -> tu
     found = without_small(cut(distances), min_members)
     clusters = np.empty(len(described), dtype=np.intp)
     clusters[order] = found
-    return K, describe_clusters(K, clusters, stabilities(distances, found, cut, _REPEATS), known.widths_)
+    stable = stabilities(distances, found, cut, _REPEATS)
+    return K, describe_clusters(K, clusters, stable, comparison.similarity.widths)
 
 
-def agreement(known: Recognizer) -> float:
-    """Mean similarity from which on movements are of one kind, as the symbols of a recognizer have it.
+def agreement(comparison: Comparison, references: References) -> float:
+    """Mean similarity from which on movements are one symbol, measured on known symbols.
 
-    Half way from the typical mean similarity within a symbol to that with the nearest other symbol; where each symbol
-    was shown once, that at 0.6 of the distance to the nearest other, as the recognizer's calibration takes.
+    Half way from the typical mean similarity within a symbol to that with the nearest other symbol. Where each symbol
+    was shown once, the similarity at 0.6 of the typical distance to the nearest other symbol, as
+    `kineme.recognition.conformal.Calibration` takes it.
     """
-    stored = known.references_.described
-    some = evenly_spaced(len(stored), 500)
-    K = compare(known.comparison_.similarity, stored.take(some), stored.take(some))
-    own, member = known.references_.labels[some], np.unique(known.references_.labels[some], return_inverse=True)[1]
+    some = evenly_spaced(len(references), 500)
+    described, labels = references.described.take(some), references.labels[some]
+    K = compare(comparison.similarity, described, described)
     np.fill_diagonal(K, 0.0)
+    member = np.unique(labels, return_inverse=True)[1]
     H = (member[:, None] == np.arange(member.max() + 1)).astype(float)
     sums, counts = H.T @ K @ H, H.sum(axis=0)
     means = sums / np.maximum(np.outer(counts, counts) - np.diag(counts), 1.0)
@@ -142,14 +152,14 @@ def agreement(known: Recognizer) -> float:
     several = counts > 1
     if several.any():
         return 0.5 * (float(np.median(np.diag(means)[several])) + apart)
-    nearest = np.where(own[:, None] == own, 0.0, K).max(axis=1)
+    nearest = np.where(labels[:, None] == labels, 0.0, K).max(axis=1)
     reach = REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
     return float(np.exp(-0.5 * np.median(reach) ** 2))
 
 
-def _at(places: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
-    """The same proposals, of movements at these places among n."""
+def _at(indices: NDArray[np.intp], proposals: Proposals, n: int) -> Proposals:
+    """The same proposals, of movements with these indices among n."""
     clusters = np.full(n, -1, dtype=np.intp)
-    clusters[places] = proposals.clusters
-    moved = (replace(one, members=places[one.members], medoid=int(places[one.medoid])) for one in proposals.proposals)
+    clusters[indices] = proposals.clusters
+    moved = (replace(one, members=indices[one.members], medoid=int(indices[one.medoid])) for one in proposals.proposals)
     return Proposals(tuple(moved), clusters, proposals.widths)

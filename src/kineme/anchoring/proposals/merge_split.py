@@ -1,4 +1,4 @@
-"""Symbols that could be one, and symbols that are two."""
+"""Symbols that could be merged, and symbols that could be split."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.clustering.resampling import Clusters, stabilities
-from kineme.anchoring.clustering.tree import average_linkage, cuts
+from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cuts
+from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.propose import own_order
 from kineme.comparison.describe import Described, describe
 from kineme.comparison.sampling import evenly_spaced
@@ -32,7 +32,7 @@ class Merge(NamedTuple):
 
 
 class Split(NamedTuple):
-    """A symbol whose members are of two kinds; members are places among the movements given."""
+    """A symbol whose members form two clusters, given by the indices of the movements."""
 
     symbol: Any
     parts: tuple[NDArray[np.intp], NDArray[np.intp]]
@@ -52,7 +52,7 @@ def suggest_merges(
 
     The overlap of a and b is ``mean K(a, b) / sqrt(mean K(a, a') mean K(b, b'))`` over different members: the cosine
     of their mean elements in the kernel's space (Gretton et al., "A kernel two-sample test", JMLR 13, 2012, section
-    2.2), free of bias. It is about 1 where both are drawn from one kind and 0 where no member is near the other's; on
+    2.2), free of bias. It is about 1 where both are drawn from one class and 0 where no member is near the other's; on
     handwriting, halves of one shape have 0.7 to 1.4, and the two most similar shapes 0.25.
 
     Parameters
@@ -62,14 +62,15 @@ def suggest_merges(
         The symbol of each.
     least : float, default 0.5
         Overlap from which on a pair is named.
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose representations and invariances to take.
     widths : array_like of shape (R,), optional
         Of the kernels, by default `gap_widths` of these movements.
 
     Notes
     -----
-    A symbol with one member is as cohesive as the others typically are. Of large symbols, evenly spaced members speak.
+    A symbol with one member is as cohesive as the others typically are. Of a large symbol, evenly spaced
+    members are compared.
     """
     check_number("least", least, above=0.0)
     described, member, names = _labeled(movements, labels, like)
@@ -98,16 +99,16 @@ def suggest_splits(
     like: Compares | None = None,
     widths: ArrayLike | None = None,
 ) -> tuple[Split, ...]:
-    """Symbols whose members fall into two kinds that come again, the most clearly apart first.
+    """Symbols whose members form two stable clusters, the most clearly apart first.
 
     Average linkage in two; both parts must have a stability of 0.75 (Hennig 2007) and `min_members` members, and
     their overlap (see `suggest_merges`) must be at most `most`. On handwriting, two shapes under one name have less
-    than 0.02, and the two most different ways of drawing one shape 0.4. Parts can be looked at again.
+    than 0.02, and the two most different ways of drawing one shape 0.4. Parts can be split again.
 
     Parameters
     ----------
     movements, labels, like, widths
-        As for `suggest_merges`. Without `widths` there must be another symbol that shows how far apart kinds are;
+        As for `suggest_merges`. Without `widths` there must be another symbol that shows how far apart symbols are;
         the only symbol is never split.
     most : float, default 0.25
         Overlap up to which a symbol is named.
@@ -122,14 +123,14 @@ def suggest_splits(
     sigma = averaged(described, widths).widths
     found = []
     for k, name in enumerate(names):
-        places = np.flatnonzero(member == k)
-        if len(places) >= 2 * min_members and len(places) > 3:
-            found.append(_in_two(name, described.take(places), places, sigma))
+        indices = np.flatnonzero(member == k)
+        if len(indices) >= 2 * min_members and len(indices) > 3:
+            found.append(_in_two(name, described.take(indices), indices, sigma))
     kept = (s for s in found if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members)
     return tuple(sorted(kept, key=lambda one: one.overlap))
 
 
-def _in_two(name: Any, described: Described, places: NDArray[np.intp], widths: Array) -> Split:
+def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: Array) -> Split:
     some = evenly_spaced(len(described), _LARGEST // 5)
     K = similarities(described.take(some), widths=widths)
     order = own_order(K)
@@ -149,7 +150,7 @@ def _in_two(name: Any, described: Described, places: NDArray[np.intp], widths: A
     whole = parts[nearest]
     whole[some] = parts
     overlap = between / float(np.sqrt(max(within, np.finfo(float).tiny)))
-    return Split(name, (places[whole == 0], places[whole == 1]), overlap, stability)
+    return Split(name, (indices[whole == 0], indices[whole == 1]), overlap, stability)
 
 
 def _mean_within(K: Array) -> float:

@@ -1,4 +1,4 @@
-"""What anchoring proposes: kinds of movement, for a person to name."""
+"""What anchoring proposes: clusters of movements, for a person to name."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from kineme.validation import Array
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Movements that look like one kind.
+    """A cluster of movements that could be one symbol.
 
     Attributes
     ----------
     members : ndarray of shape (m,)
-        Their places among the movements given, rising.
+        Indices of the movements, ascending.
     medoid : int
-        The member most similar to the others, its place among the movements given.
+        Index of the member most similar to the others.
     cohesion : float
         Mean similarity of two members, from 0 to 1.
     stability : float
-        How well the kind comes again when a fifth of the movements is left out: mean Jaccard coefficient, from 0 to 1;
-        0.75 and more is a valid cluster to Hennig (2007).
+        How well the cluster comes again when a fifth of the movements is left out: mean Jaccard coefficient, from 0 to
+        1; 0.75 and more is a valid cluster to Hennig (2007).
     nearest : int or None
         Index of the proposal most similar to this one.
     nearness : float
@@ -68,7 +68,7 @@ class Proposals:
 
     @property
     def left_over(self) -> NDArray[np.intp]:
-        """Places of the movements in no proposal, rising."""
+        """Indices of the movements in no proposal, ascending."""
         return np.flatnonzero(self.clusters < 0)
 
     def __len__(self) -> int:

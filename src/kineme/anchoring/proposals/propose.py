@@ -1,4 +1,4 @@
-"""From movements without labels to proposals of kinds."""
+"""From movements without labels to proposals of symbols."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.anchoring.clustering.clustering import METHODS
-from kineme.anchoring.clustering.count import count_kinds
-from kineme.anchoring.clustering.resampling import Clusters, stabilities
+from kineme.anchoring.clustering.clustering import METHODS, Clusters
+from kineme.anchoring.clustering.number_of_clusters import count_clusters
+from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
-from kineme.anchoring.proposals.subsample import assign, largest_clustered, spread_sample
+from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
 from kineme.comparison.describe import describe
 from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
 from kineme.comparison.specification import Compares
@@ -30,7 +30,7 @@ def propose(
     like: Compares | None = None,
     max_clustered: int | None = None,
 ) -> Proposals:
-    """Gather movements without labels into kinds.
+    """Cluster movements without labels.
 
     Distances are ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
 
@@ -41,15 +41,16 @@ def propose(
     method : {"agglomerative", "hdbscan"}, default "agglomerative"
         Average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN), which find their number themselves.
     n_clusters : int, optional
-        Number of clusters of the tree, those too small to be proposed included; by default `count_kinds`, at
-        least two: whether all movements are of one kind cannot be told from their own distances.
+        Number of clusters of the tree, those too small to be proposed included; by default
+        `count_clusters`, at least two: whether all movements are one cluster cannot be told from their own distances.
     min_members : int, default 3
-        Movements that make a kind; fewer are left over.
-    like : Recognizer, optional
+        Movements of a proposal, at least; smaller clusters are left over.
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose representations, invariances and mean to take; it need not be fitted.
     max_clustered : int, optional
-        More movements than this are clustered by a spread sample of so many, and the others join their nearest sampled
-        movement if it is within the radius of its kind, else they are left over. By default 5000, in space 800.
+        More movements than this are clustered by a subsample of so many; each of the others is added to the cluster of
+        its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
+        default 5000, in space 800.
 
     Returns
     -------
@@ -70,10 +71,10 @@ def propose(
         similarity = averaged(described)
         K = similarities(described, widths=similarity.widths)
         return _propose(K, similarity, method, n_clusters, min_members)
-    sample, similarity = spread_sample(described, limit)
+    sample, similarity = subsample(described, limit)
     K = similarities(described.take(sample), widths=similarity.widths)
     found = _propose(K, similarity, method, n_clusters, min_members)
-    return assign(described, sample, K, found, similarity)
+    return extend(described, sample, K, found, similarity)
 
 
 def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
@@ -93,7 +94,7 @@ def _propose(
     distances = 1.0 - K[np.ix_(order, order)]
     clusters, share = np.empty(len(K), dtype=np.intp), n_clusters or 0
     if method == "agglomerative" and n_clusters is None:
-        share = count_kinds(distances, _REPEATS)
+        share = count_clusters(distances, _REPEATS)
 
     def again(some: Array) -> Clusters:
         return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
@@ -104,5 +105,5 @@ def _propose(
 
 
 def own_order(K: Array) -> NDArray[np.intp]:
-    """An order of the movements by their similarities: the result must not depend on the order in which they came."""
+    """An order of the movements by their similarities, so that the result does not depend on that of the input."""
     return np.argsort(K.sum(axis=1), kind="stable")

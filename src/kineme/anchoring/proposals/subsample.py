@@ -1,4 +1,4 @@
-"""More movements than can be compared with each other: a spread sample, and the others by their nearest."""
+"""More movements than can be compared with each other: a subsample is clustered, and the others follow it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kineme.comparison.describe import Described
 from kineme.comparison.similarity import AveragedSimilarity, averaged, compare
 from kineme.validation import Array
 
-_WITHIN = 0.95  # of the sampled members of all kinds are within the common radius of their nearest mate
+_WITHIN = 0.95  # of the sampled members of all clusters are within the common radius of their nearest neighbor
 _TILE = 20_000  # movements at a time
 
 
@@ -21,16 +21,16 @@ def largest_clustered(n_dims: int) -> int:
     return 800 if n_dims == 3 else 5000
 
 
-def spread_sample(described: Described, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:
-    """Places of `size` movements, rising, that leave no kind out; and the similarity at their widths.
+def subsample(described: Described, size: int, seed: int = 0) -> tuple[NDArray[np.intp], AveragedSimilarity]:
+    """Ascending indices of `size` movements of all clusters, rare ones too; and the similarity at their widths.
 
     Half are drawn evenly. The others are drawn with probability proportional to ``1 - K`` to the nearest of these, the
     squared distance in the kernel's space up to a factor: one round of k-means|| (Bahmani et al., "Scalable
-    k-means++", PVLDB 5, 2012). A kind too rare for the first half is far from it, so the second half finds it.
+    k-means++", PVLDB 5, 2012). A cluster too rare for the first half is far from it, so the second half finds it.
     """
     random = np.random.default_rng(seed)
     first = random.choice(len(described), size - size // 2, replace=False)
-    far = 1.0 - nearest(averaged(described.take(first)), described, described.take(first))[1]
+    far = 1.0 - nearest_neighbors(averaged(described.take(first)), described, described.take(first))[1]
     far[first] = 0.0
     candidates = np.flatnonzero(far > 0)
     second = candidates  # usually more than are wanted
@@ -40,23 +40,25 @@ def spread_sample(described: Described, size: int, seed: int = 0) -> tuple[NDArr
     return sample, averaged(described.take(sample))
 
 
-def nearest(similarity: AveragedSimilarity, described: Described, stored: Described) -> tuple[NDArray[np.intp], Array]:
-    """The most similar stored movement of each, and how similar it is."""
+def nearest_neighbors(
+    similarity: AveragedSimilarity, described: Described, others: Described
+) -> tuple[NDArray[np.intp], Array]:
+    """Index of the most similar of the others for each movement, and the similarity, (n,) each."""
     which, how = np.empty(len(described), dtype=np.intp), np.empty(len(described))
     for start in range(0, len(described), _TILE):
         rows = slice(start, start + _TILE)
-        K = compare(similarity, described.take(rows), stored)
+        K = compare(similarity, described.take(rows), others)
         which[rows] = K.argmax(axis=1)
         how[rows] = K.max(axis=1)
     return which, how
 
 
-def assign(
+def extend(
     described: Described, sample: NDArray[np.intp], K: Array, found: Proposals, similarity: AveragedSimilarity
 ) -> Proposals:
-    """The proposals of a sample, joined by the movements that are within the radius of their nearest one's kind."""
-    radius = np.append(radii(K, found), -np.inf)  # nothing joins what was left over
-    which, how = nearest(similarity, described, described.take(sample))
+    """The proposals of a sample, with the movements within the radius of their nearest neighbor's cluster added."""
+    radius = np.append(radii(K, found), -np.inf)  # nothing is added to what was left over
+    which, how = nearest_neighbors(similarity, described, described.take(sample))
     clusters = found.clusters[which]
     clusters[1.0 - how > radius[clusters]] = -1
     clusters[sample] = found.clusters
@@ -76,16 +78,17 @@ def assign(
 
 
 def radii(K: Array, found: Proposals) -> Array:
-    """How far ``1 - K`` a movement of each kind may be from its nearest member, shape (c,).
+    """How far ``1 - K`` a movement of each cluster may be from its nearest member, shape (c,).
 
-    As far as any member is from its nearest mate, so that another of the same kind is beyond it once in m + 1 times;
-    but at least as far as 95 % of the members of all kinds, since the largest of a few is little known.
+    As far as any member is from its nearest neighbor in the cluster, so that another movement of the same class is
+    beyond it once in m + 1 times; but at least as far as 95 % of the members of all clusters, since the largest of few
+    distances says little.
     """
     same = (found.clusters[:, None] == found.clusters) & (found.clusters[:, None] >= 0)
     np.fill_diagonal(same, False)
-    mate = 1.0 - np.where(same, K, -np.inf).max(axis=1)
+    away = 1.0 - np.where(same, K, -np.inf).max(axis=1)
     member = found.clusters >= 0
     if not member.any():
         return np.empty(0)
-    common = float(np.quantile(mate[member], _WITHIN))
-    return np.array([max(common, float(mate[one.members].max())) for one in found.proposals])
+    common = float(np.quantile(away[member], _WITHIN))
+    return np.array([max(common, float(away[one.members].max())) for one in found.proposals])

@@ -25,9 +25,9 @@ def over(draws: Draws, kind: str, key: str) -> list[float]:
     return [one[kind][key] for one in draws if kind in one]
 
 
-def columns_of(draws: Draws, kind: str, reading: str, rest: str = "") -> dict[str, list[float]]:
+def columns_of(draws: Draws, kind: str, reading: str, suffix: str = "") -> dict[str, list[float]]:
     """Column -> the accuracies of a reading, one per draw."""
-    return {head: over(draws, kind, key + rest) for head, key in zip(COLUMNS, READINGS[reading], strict=True)}
+    return {head: over(draws, kind, key + suffix) for head, key in zip(COLUMNS, READINGS[reading], strict=True)}
 
 
 def by_column(cells: Mapping[tuple[str, str], float]) -> dict[str, float]:

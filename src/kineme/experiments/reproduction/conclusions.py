@@ -51,11 +51,11 @@ def read_counts(accuracies: Sequence[float], counted: int, drawn: int) -> str:
     """Whether the paper's accuracies are shares of the number of movements it states, or of the number in our draws."""
     both = {n: multiples(accuracies, n) for n in (drawn, counted)}
     neither = [f"{value:.3f}" for value in accuracies if all(value not in some for some in both.values())]
-    said = (
+    sentence = (
         f"The paper counts {counted} movements. Of its {len(accuracies)} accuracies in Tables 2 and 4, "
         f"{len(both[drawn])} are multiples of 1/{drawn} and {len(both[counted])} are multiples of 1/{counted}"
     )
-    return f"{said}; {listed(neither)} of neither." if neither else f"{said}."
+    return f"{sentence}; {listed(neither)} of neither." if neither else f"{sentence}."
 
 
 def read_placement(what: str, printed: Mapping[str, float], ours: ByColumn) -> str:
@@ -66,10 +66,14 @@ def read_placement(what: str, printed: Mapping[str, float], ours: ByColumn) -> s
         for column, value in printed.items()
         if column not in within
     ]
-    said = f"{what}: our draws contain the paper's number in "
+    sentence = f"{what}: our draws contain the paper's number in "
     if not others:
-        return f"{said}every column."
-    return f"{said}{listed(within)}, but not in {listed(others)}." if within else f"{said}no column: {listed(others)}."
+        return f"{sentence}every column."
+    return (
+        f"{sentence}{listed(within)}, but not in {listed(others)}."
+        if within
+        else f"{sentence}no column: {listed(others)}."
+    )
 
 
 def read_nearer(printed: Mapping[str, float], readings: Mapping[str, ByColumn]) -> str:
@@ -115,8 +119,8 @@ def read_widths(what: str, printed: Mapping[str, float], ours: Mapping[str, floa
         if not alike(value, ours[column])
     ]
     found = f"{_NUMBERS[len(printed) - len(others)]} of {_NUMBERS[len(printed)]} columns"
-    said = f"{what}: the paper's RBF width is within a factor of {_ALIKE:g} of the median distance in {found}"
-    return f"{said}; not in {listed(others)}." if others else f"{said}."
+    sentence = f"{what}: the paper's RBF width is within a factor of {_ALIKE:g} of the median distance in {found}"
+    return f"{sentence}; not in {listed(others)}." if others else f"{sentence}."
 
 
 def read_conventions(accuracies: Sequence[Printed]) -> str:
@@ -129,9 +133,9 @@ def read_conventions(accuracies: Sequence[Printed]) -> str:
         chosen = found or [feature for feature in off if off[feature] - min(off.values()) <= _DIGITS]
         shown = " or ".join(f"{feature}: {spread(conventions[feature])}" for feature in chosen)
         (within if found else others).append(f"{name}, {value:.3f} [{shown}]")
-    said = [f"Within the draws of a convention: {listed(within)}."] if within else []
-    said += [f"Of none, with the nearest: {listed(others)}."] if others else []
-    return " ".join(said)
+    sentences = [f"Within the draws of a convention: {listed(within)}."] if within else []
+    sentences += [f"Of none, with the nearest: {listed(others)}."] if others else []
+    return " ".join(sentences)
 
 
 def read_perfect(what: str, accuracies: ByColumn) -> str:
@@ -144,12 +148,12 @@ def read_penalty(
     accuracies: Mapping[str, Mapping[float, Sequence[float]]], at_bound: Mapping[str, Sequence[float]], n_classes: int
 ) -> str:
     """The kernels that lose accuracy at the smallest penalty, and whether multipliers at their bound explain it."""
-    said = []
+    sentences = []
     for kernel, by_penalty in accuracies.items():
         smallest, largest = min(by_penalty), max(by_penalty)
         low, high, share = fmean(by_penalty[smallest]), fmean(by_penalty[largest]), fmean(at_bound[kernel])
         if high - low < _LOST:
-            said.append(f"{kernel} does not fall: {low:.3f} at C = {smallest:g}.")
+            sentences.append(f"{kernel} does not fall: {low:.3f} at C = {smallest:g}.")
             continue
         text = (
             f"{kernel} falls from {high:.3f} at C = {largest:g} to {low:.3f} at C = {smallest:g}, where chance is "
@@ -160,8 +164,8 @@ def read_penalty(
                 f": there {share:.0%} of the multipliers of the class that lost a movement to the test are at their "
                 "bound C, and the other classes, which keep all their movements, outvote it"
             )
-        said.append(f"{text}.")
-    return " ".join(said)
+        sentences.append(f"{text}.")
+    return " ".join(sentences)
 
 
 def read_left_out(names: Sequence[str]) -> str:

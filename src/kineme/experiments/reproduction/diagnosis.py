@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.experiments.reproduction import paper
-from kineme.experiments.reproduction.choices import PENALTIES, PENALTY
 from kineme.experiments.reproduction.columns import COLUMNS, KERNELS, PRINTED, Draws, over
 from kineme.experiments.reproduction.conclusions import (
     Printed,
@@ -46,10 +45,10 @@ def diagnosis(draws: Draws) -> Table:
     )
 
 
-def _conventions(draws: Draws, kind: str, column: tuple[str, str], rest: str = "") -> dict[str, list[float]]:
+def _conventions(draws: Draws, kind: str, column: tuple[str, str], suffix: str = "") -> dict[str, list[float]]:
     """Feature -> accuracies, of all conventions that a column of the paper can mean."""
     return {
-        row.formula: over(draws, kind, row.key + rest)
+        row.formula: over(draws, kind, row.key + suffix)
         for row in REPRESENTATIONS.values()
         if (row.formulation, row.quantity) == column
     }
@@ -61,15 +60,15 @@ def read_diagnosis(draws: Draws) -> str:
         Printed(head, paper.NEAREST_NEIGHBOR[cell], _conventions(draws, "nearest", cell))
         for head, cell in zip(COLUMNS, paper.CELLS, strict=True)
     ]
-    said = [read_conventions(accuracies)]
+    sentences = [read_conventions(accuracies)]
     for column, whole, divided in (("weights", "bio-w", "bio-w-over-s"), ("f(t)", "bio-f", "bio-f-over-s")):
         without, with_s = (over(draws, "nearest", key) for key in (whole, divided))
-        said.append(read_order(f"Bio-inspired {column}", ("not divided by s", "divided by s"), without, with_s))
+        sentences.append(read_order(f"Bio-inspired {column}", ("not divided by s", "divided by s"), without, with_s))
     by_feature = {
         f"{row.formula} ({row.formulation})": over(draws, "nearest", row.key) for row in REPRESENTATIONS.values()
     }
-    said.append(read_perfect("Features that recognize every letter of every draw", by_feature))
-    return " ".join(said)
+    sentences.append(read_perfect("Features that recognize every letter of every draw", by_feature))
+    return " ".join(sentences)
 
 
 def svm_diagnosis(draws: Draws) -> Table:
@@ -107,15 +106,15 @@ def penalty(draws: Draws) -> Table:
     """The SVM for several penalties."""
     accuracies = {
         kernel: {
-            **{C: over(draws, "penalty", f"original-sa/{name}/{C:g}") for C in PENALTIES[:-1]},
-            PENALTY: over(draws, "svm", f"original-sa/{name}/median"),
+            **{C: over(draws, "penalty", f"original-sa/{name}/{C:g}") for C in paper.PENALTIES[:-1]},
+            paper.PENALTY: over(draws, "svm", f"original-sa/{name}/median"),
         }
         for name, kernel in KERNELS.items()
     }
     at_bound = {kernel: over(draws, "at_bound", f"original-sa/{name}") for name, kernel in KERNELS.items()}
     return Table(
         "Diagnosis. Why an SVM can land at 1/9: the penalty C, shape-attractor, original, median widths",
-        ("", *(f"C = {C:g}" for C in PENALTIES)),
+        ("", *(f"C = {C:g}" for C in paper.PENALTIES)),
         [(kernel, *map(spread, by_penalty.values())) for kernel, by_penalty in accuracies.items()],
-        f"{read_penalty(accuracies, at_bound, len(paper.COUNTS))} The tables above use C = {PENALTY:g}.",
+        f"{read_penalty(accuracies, at_bound, len(paper.COUNTS))} The tables above use C = {paper.PENALTY:g}.",
     )

@@ -14,7 +14,6 @@ from scipy.spatial.distance import pdist
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DegenerateMovementWarning
 from kineme.experiments.reproduction import paper
-from kineme.experiments.reproduction.choices import PENALTIES
 from kineme.experiments.reproduction.protocol import draw, nearest_neighbor_accuracy, share_at_bound, svm_accuracy
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.experiments.reproduction.split_widths import fit_by_split
@@ -86,8 +85,8 @@ def _run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
             gram = np.stack([one(X) for one in fitted])
             accuracy[f"{key}/{name}/median"] = svm_accuracy(gram, y)
             if diagnosis and key == "original-sa":
-                by_penalty |= {f"{key}/{name}/{C:g}": svm_accuracy(gram, y, C) for C in PENALTIES[:-1]}
-                at_bound[f"{key}/{name}"] = share_at_bound(gram, y, PENALTIES[0])
+                by_penalty |= {f"{key}/{name}/{C:g}": svm_accuracy(gram, y, C) for C in paper.PENALTIES[:-1]}
+                at_bound[f"{key}/{name}"] = share_at_bound(gram, y, paper.PENALTIES[0])
     for row in REPRESENTATIONS.values():
         if not (diagnosis or row.key in READINGS["closest in distances"]):
             continue

@@ -15,7 +15,7 @@ from sklearn.model_selection import LeaveOneOut
 from sklearn.neighbors import NearestNeighbors
 from sklearn.svm import SVC
 
-from kineme.experiments.reproduction.choices import PENALTY
+from kineme.experiments.reproduction import paper
 
 
 def draw(labels: NDArray[Any], per_class: int, seed: int, index: int) -> NDArray[np.intp]:
@@ -31,7 +31,7 @@ def nearest_neighbor_accuracy(rows: NDArray[Any], labels: NDArray[Any], metric: 
     return float(np.mean(labels[nearest] == labels))
 
 
-def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENALTY) -> float:
+def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = paper.PENALTY) -> float:
     """Leave-one-out accuracy of an SVM.
 
     Parameters
@@ -44,7 +44,7 @@ def svm_accuracy(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENA
     return float(np.mean(right))
 
 
-def share_at_bound(gram: NDArray[Any], labels: NDArray[Any], penalty: float = PENALTY) -> float:
+def share_at_bound(gram: NDArray[Any], labels: NDArray[Any], penalty: float = paper.PENALTY) -> float:
     """Share of the multipliers at their bound C, in the class that the test movement was taken from.
 
     Parameters as of `svm_accuracy`.

@@ -31,20 +31,20 @@ def medians_without_each(values: Array, n: int) -> list[float]:
     values : ndarray of shape (n (n - 1) / 2, p)
         Values of the pairs ``np.triu_indices(n, 1)``.
     """
-    place = np.full(values.size, -1)  # rank of each positive value among all of them
+    rank = np.full(values.size, -1)  # rank of each positive value among all of them
     order = np.argsort(values, axis=None, kind="stable")
     order = order[np.count_nonzero(values <= 0) :]
-    place[order] = np.arange(len(order))
-    by_pair = place.reshape(values.shape)
+    rank[order] = np.arange(len(order))
+    by_pair = rank.reshape(values.shape)
     ascending = values.reshape(-1)[order]
     first, second = np.triu_indices(n, 1)
     medians = []
     for row in range(n):
-        gone = np.sort(by_pair[(first == row) | (second == row)], axis=None)
-        gone = gone[gone >= 0]
-        left = len(ascending) - len(gone)
-        middle = np.array([(left - 1) // 2, left // 2])
+        removed = np.sort(by_pair[(first == row) | (second == row)], axis=None)
+        removed = removed[removed >= 0]
+        n_remaining = len(ascending) - len(removed)
+        middle = np.array([(n_remaining - 1) // 2, n_remaining // 2])
         # The k-th of the remaining values has a rank that is higher by the number of removed values before it.
-        middle += np.searchsorted(gone - np.arange(len(gone)), middle, side="right")
+        middle += np.searchsorted(removed - np.arange(len(removed)), middle, side="right")
         medians.append(float(ascending[middle].mean()))
     return medians

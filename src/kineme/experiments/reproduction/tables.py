@@ -8,7 +8,6 @@ import numpy as np
 
 from kineme.datasets.lasa import LASA_26
 from kineme.experiments.reproduction import paper
-from kineme.experiments.reproduction.choices import PENALTY
 from kineme.experiments.reproduction.columns import (
     CLOSEST,
     COLUMNS,
@@ -79,16 +78,16 @@ def _nearest(draws: Draws, title: str, with_paper: bool) -> Table:
 def read_nearest(draws: Draws, with_paper: bool) -> str:
     """Conclusions from the accuracies of 1-NN: the paper's among ours, the feature that is ahead, omitted movements."""
     by_reading = {reading: columns_of(draws, "nearest", reading) for reading in READINGS}
-    said = []
+    sentences = []
     if with_paper:
         printed = by_column(paper.NEAREST_NEIGHBOR)
-        said += [read_placement(reading.capitalize(), printed, columns) for reading, columns in by_reading.items()]
-        said.append(read_nearer(printed, by_reading))
+        sentences += [read_placement(reading.capitalize(), printed, columns) for reading, columns in by_reading.items()]
+        sentences.append(read_nearer(printed, by_reading))
     for formulation in ("original", "bio-inspired"):
         pair = (by_reading[DEFAULT][f"{quantity}, {formulation}"] for quantity in ("f(t)", "weights"))
-        said.append(read_order(f"{DEFAULT.capitalize()}, {formulation}", ("f(t)", "weights"), *pair))
-    said.append(read_left_out(draws[0]["left_out"]))
-    return " ".join(filter(None, said))
+        sentences.append(read_order(f"{DEFAULT.capitalize()}, {formulation}", ("f(t)", "weights"), *pair))
+    sentences.append(read_left_out(draws[0]["left_out"]))
+    return " ".join(filter(None, sentences))
 
 
 def _parameters(draws: Draws) -> Table:
@@ -130,16 +129,16 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
             rows.append((f"{kernel}: {reading}, {words}", *cells))
     n = sum("svm" in one for one in draws)
     reading = read_svm(draws, with_paper)
-    return Table(f"{title} ({n} draws: mean, range; C = {PENALTY:g})", ("", *COLUMNS), rows, reading)
+    return Table(f"{title} ({n} draws: mean, range; C = {paper.PENALTY:g})", ("", *COLUMNS), rows, reading)
 
 
 def read_svm(draws: Draws, with_paper: bool) -> str:
     """Conclusions from the accuracies of the SVM: the paper's among ours, and the kernel that is ahead."""
     rbf, tre = (columns_of(draws, "svm", CLOSEST, f"/{name}/paper") for name in KERNELS)
-    said = []
+    sentences = []
     if with_paper:
-        said += [
+        sentences += [
             read_placement(f"{kernel} with the paper's widths", by_column(PRINTED[name]), columns)
             for (name, kernel), columns in zip(KERNELS.items(), (rbf, tre), strict=True)
         ]
-    return " ".join([*said, read_ahead("With the paper's widths", ("TrE", "RBF"), tre, rbf)])
+    return " ".join([*sentences, read_ahead("With the paper's widths", ("TrE", "RBF"), tre, rbf)])

@@ -12,15 +12,15 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.fit import fit_to_references
 from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored import StoredReferences
-from kineme.library.recognition.members import Members
-from kineme.library.storage import read
+from kineme.library.recognition.members import Members, described_references
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
 from kineme.recognition.conformal import Calibration
-from kineme.recognition.recognizer import Recognizer
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.validation import Array
 
@@ -31,36 +31,35 @@ _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryErro
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
 
 
-def sample_recognizer(store: Store, members: Members) -> Recognizer:
-    """A recognizer fitted to a sample of the members: it has widths and weights, but no calibration yet."""
-    chosen = evenly_spaced(len(members.ids), _SAMPLE)
-    demos = read.movements(store, members.ids[chosen])
-    recognizer = store.specification.recognizer().set_params(classifier="nearest")
-    return recognizer.fit(demos, members.labels[chosen])
+def sample_comparison(store: Store, members: Members) -> Comparison:
+    """A comparison with widths and weights that are fitted to a sample of the members."""
+    chosen, how = evenly_spaced(len(members.ids), _SAMPLE), store.specification
+    references = described_references(store, members.ids[chosen], members.labels[chosen])
+    return fit_to_references(how.comparison, references, how.weights)[0]
 
 
-def calibrate(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
+def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """The calibration on all members, taken from the cache if that is of the same ones."""
     path, key = store.folder / FILE, _key(store, members)
     if path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
-            return _unpacked(path.read_bytes(), key, len(members.names))
+            return _deserialized(path.read_bytes(), key, len(members.names))
     made = calibrate_sample(similarity, stored)
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: it is computed again next time
-            write_atomically(path, _packed(made, key))
+            write_atomically(path, _serialized(made, key))
     return made
 
 
 def _key(store: Store, members: Members) -> str:
-    """Key of the cache: changes with the library, its specification, and the members of symbols."""
+    """Cache validity key: changes with the library, its specification, and the members of symbols."""
     text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
     return digest.hexdigest()
 
 
-def _packed(calibration: Calibration, key: str) -> bytes:
+def _serialized(calibration: Calibration, key: str) -> bytes:
     pooled = {id(one): one for one in calibration.pooled}  # classes of one size share an array
     numbers = {name: k for k, name in enumerate(pooled)}
     arrays: dict[str, Any] = {f"pooled {k}": one for k, one in enumerate(pooled.values())}
@@ -76,7 +75,7 @@ def _seal(data: bytes, key: str) -> bytes:
     return hashlib.sha256(key.encode() + data).digest()
 
 
-def _unpacked(data: bytes, key: str, n: int) -> Calibration:
+def _deserialized(data: bytes, key: str, n: int) -> Calibration:
     """The calibration of n classes; a ValueError or KeyError if invalid, since anybody can compute the checksum."""
     data, seal = data[32:], data[:32]
     if seal != _seal(data, key):

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described, describe_rows
+from kineme.comparison.references import References
+from kineme.comparison.stored import OnDemand
 from kineme.errors import SpecificationError
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
@@ -60,3 +65,15 @@ def members_of(store: Store) -> Members:
     owner = place[which]
     order = np.lexsort((pairs[:, 0], owner))
     return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
+
+
+def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:
+    """Movements in the representations of the library, or in those of a comparison, from their stored features."""
+    rows, how = read.features(store, np.asarray(ids, dtype=np.int64)), store.specification.comparison
+    every = describe_rows(rows, store.n_dims or 0, how)
+    return every if comparison is None else every.select(map(how.representations.index, comparison.representations))
+
+
+def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> References:
+    """Movements with sorted labels, from their stored features; their samples are read when asked for."""
+    return References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)

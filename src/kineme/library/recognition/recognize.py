@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.stored import StoredReferences
-from kineme.library.recognition.calibration_cache import calibrate, sample_recognizer
-from kineme.library.recognition.code_cache import Index, open_index, refreshed
-from kineme.library.recognition.members import Members, members_of
+from kineme.library.recognition.calibration_cache import calibrated, sample_comparison
+from kineme.library.recognition.members import Members, described_references, members_of
+from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
-from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.answer import Answer, Neighbor, is_one
-from kineme.recognition.recognizer import Recognizer
+from kineme.recognition.known_classes import KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared. Measured on two cores: fitting 1000 takes 1.5 s of processor time and an
@@ -32,23 +31,17 @@ class LibraryRecognizer:
     store: Store
     exhaustive: int = EXHAUSTIVE
     _version: int | None = None
-    _index: Index | None = None
+    _reduced: ReducedMovements | None = None
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: Recognizer | TwoStageSearch | None = None
+    _model: KnownClasses | TwoStageSearch | None = None
 
     def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
-        model = self.model()
-        demos = Demonstrations.of([X] if is_one(X) else X)
-        if isinstance(model, TwoStageSearch):
-            found = model.recognize(demos, error_rate)
-        else:
-            found = model.recognize(demos, error_rate)
-        found = self._named(found)
+        found = self._named(self.model().recognize([X] if is_one(X) else X, error_rate))
         return found[0] if is_one(X) else found
 
-    def model(self) -> Recognizer | TwoStageSearch:
-        """The recognizer of the library as it is now: a `Recognizer`, or a two-stage one."""
+    def model(self) -> KnownClasses | TwoStageSearch:
+        """What recognizes the symbols as they are now: by all of their movements, or in two stages."""
         version = self.store.version
         if self._model is None or version != self._version:
             members = members_of(self.store)
@@ -56,15 +49,14 @@ class LibraryRecognizer:
             self._version = version
         return self._model
 
-    def _small(self, members: Members) -> Recognizer:
-        self._ids = members.ids  # `fit` orders by label, and keeps the order within
-        demos = read.movements(self.store, members.ids)
-        return self.store.specification.recognizer().fit(demos, members.labels)
+    def _small(self, members: Members) -> KnownClasses:
+        self._ids = members.ids
+        return known_members(self.store, members)
 
     def _large(self, members: Members) -> TwoStageSearch:
-        self._index = open_index(self.store) if self._index is None else refreshed(self.store, self._index)
-        self._ids = self._index.ids
-        return two_stages(self.store, self._index, members)
+        self._reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
+        self._ids = self._reduced.ids
+        return two_stages(self.store, self._reduced, members)
 
     def _named(self, found: list[Answer]) -> list[Answer]:
         """The answers with ids and names of movements instead of rows."""
@@ -78,23 +70,31 @@ class LibraryRecognizer:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
 
 
-def two_stages(store: Store, index: Index, members: Members) -> TwoStageSearch:
+def known_members(store: Store, members: Members) -> KnownClasses:
+    """What recognizes the symbols of a small library: all members, by their stored features."""
+    how = store.specification
+    references = described_references(store, members.ids, members.labels)
+    references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
+    return fit_known_classes(how.comparison, references, how.weights, how.classifier)
+
+
+def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
-    comparison = sample_recognizer(store, members).comparison_
+    comparison = sample_comparison(store, members)
     kept = [store.specification.representations.index(one) for one in comparison.representations]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
     def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
-        blocks = np.split(read.features(store, index.ids[rows]), ends[:-1], axis=1)
+        blocks = np.split(read.features(store, reduced.ids[rows]), ends[:-1], axis=1)
         return tuple(blocks[r] for r in kept)
 
     stored = StoredReferences(
-        tuple(index.bases[r] for r in kept),
-        tuple(tuple(block[r] for r in kept) for block in index.blocks),
-        index.rows(members.ids),
+        tuple(reduced.bases[r] for r in kept),
+        tuple(tuple(block[r] for r in kept) for block in reduced.blocks),
+        reduced.rows(members.ids),
         members.first,
         features,
-        lambda rows: read.movements(store, index.ids[rows]),
+        lambda rows: read.movements(store, reduced.ids[rows]),
     )
-    calibration = calibrate(store, members, comparison.similarity, stored)
+    calibration = calibrated(store, members, comparison.similarity, stored)
     return TwoStageSearch(comparison, calibration, members.names, stored)

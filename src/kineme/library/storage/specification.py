@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
-from kineme.comparison.specification import ComparisonSpecification
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.specification import Compares, ComparisonSpecification
 from kineme.errors import DataError, KinemeError, SpecificationError
 from kineme.library.storage.rows import parsed
-from kineme.movements.preparation.smooth import Smooth
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.persistence import specification_from_dict, specification_to_dict
 from kineme.validation import check_choice, check_number
@@ -23,101 +23,42 @@ if TYPE_CHECKING:
 _MOST = 100_000  # dimensions
 
 
+class Recognizes(Compares, Protocol):
+    """A `kineme.Recognizer`, fitted or not, as far as a library keeps it."""
+
+    classifier: str
+    weights: str | Sequence[float]
+
+
 @dataclass(frozen=True)
 class Specification:
-    """How the movements of a library are described and compared, and how primitives are learned.
+    """How the movements of a library are compared and recognized, and how they move again.
 
-    The fields are the parameters of `kineme.Recognizer` that features and comparisons depend on, and `dmp`.
+    Attributes
+    ----------
+    comparison : ComparisonSpecification
+        What features are, and how they are compared.
+    classifier : str
+        As of `kineme.Recognizer`.
+    weights : str or tuple of R float
+        Of the representations, as of `kineme.Recognizer`.
+    dmp : DMP
+        Of the primitives.
+
+    Raises
+    ------
+    SpecificationError
+        A classifier or weights that no recognizer could be made with.
     """
 
-    representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
-    max_angle: float | None = None
-    scale: str = "path"
-    translation: bool = True
-    cutoff: float | None = 10.0
-    mean: str = "arithmetic"
+    comparison: ComparisonSpecification = field(default_factory=ComparisonSpecification)
     classifier: str = "auto"
     weights: str | tuple[float, ...] = "auto"
     dmp: DMP = field(default_factory=DMP)
 
-    @classmethod
-    def of(cls, recognizer: Recognizer | None, dmp: DMP | None) -> Specification:
-        """From a recognizer, fitted or not, and a DMP; None for the defaults.
-
-        Raises
-        ------
-        SpecificationError
-            A parameter of the recognizer that no movement could be recognized with.
-        """
-        names = {one.name for one in fields(cls)} - {"dmp"}
-        chosen: dict[str, Any] = {} if recognizer is None else {name: getattr(recognizer, name) for name in names}
-        given = chosen.get("representations")
-        chosen["representations"] = DEFAULT_REPRESENTATIONS if given is None else check_representations(given)
-        if not isinstance(weights := chosen.get("weights", "auto"), str):
-            chosen["weights"] = tuple(map(float, weights))
-        made = cls(**chosen, dmp=dmp or DMP())
-        made.check()
-        return made
-
-    @property
-    def normalization(self) -> Normalization:
-        """The normalization of position and size."""
-        return Normalization(self.translation, self.scale)
-
-    @property
-    def comparison(self) -> ComparisonSpecification:
-        """How movements are described and compared."""
-        return ComparisonSpecification(self.representations, self.normalization, self.cutoff, self.max_angle, self.mean)
-
-    def widths(self, n_dims: int) -> tuple[int, ...]:
-        """Row length of each representation."""
-        return tuple(n_dims * one.n_points for one in self.representations)
-
-    def recognizer(self) -> Recognizer:
-        """An unfitted recognizer with this specification."""
-        from kineme.recognition.recognizer import Recognizer
-
-        return Recognizer(**{field.name: getattr(self, field.name) for field in fields(self) if field.name != "dmp"})
-
-    def to_json(self) -> dict[str, str]:
-        """Two documents: ``recognizer`` and ``dmp``."""
-        seen = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "dmp"}
-        seen["representations"] = [asdict(one) for one in self.representations]
-        return {"recognizer": json.dumps(seen), "dmp": json.dumps(specification_to_dict(self.dmp))}
-
-    @classmethod
-    def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
-        """The specification from `to_json` in the library at `path`; every parameter is checked like user input."""
-        try:
-            seen, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
-            seen["representations"] = tuple(Representation(**one) for one in seen["representations"])
-            if isinstance(weights := seen.get("weights"), list):
-                seen["weights"] = tuple(map(float, weights))
-            made = cls(**seen, dmp=specification_from_dict(DMP, dmp))
-            made.check()
-        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-            reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
-            raise DataError(
-                f"expected {path} to say how its movements are seen, got a specification that does not fit ({reason}); "
-                "take the file from a backup or an export that you trust"
-            ) from error
-        return made
-
-    def check(self) -> None:
-        """Refuse invalid parameters of a recognizer; representations and the DMP check themselves."""
-        check_representations(self.representations)
-        _ = self.normalization  # checks translation and scale
-        if self.max_angle is not None:
-            check_number("max_angle", self.max_angle, least=0.0)
-        if self.cutoff is not None:
-            Smooth(self.cutoff)  # checks its own parameter
-        self._check_choices()
-
-    def _check_choices(self) -> None:
-        from kineme.comparison.averages import LOG_MEANS
+    def __post_init__(self) -> None:
         from kineme.recognition.classifiers import CLASSIFIERS
 
-        check_choice("mean", self.mean, list(LOG_MEANS))
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
         if isinstance(self.weights, str):
             check_choice("weights", self.weights, ["auto", "equal"])
@@ -126,6 +67,90 @@ class Specification:
         else:
             for weight in self.weights:
                 check_number("weights", weight, least=0.0)
+
+    @classmethod
+    def of(cls, recognizer: Recognizes | None, dmp: DMP | None, default: Specification | None = None) -> Specification:
+        """From a recognizer and a DMP; None for those of the default.
+
+        Raises
+        ------
+        SpecificationError
+            A parameter of the recognizer that no movement could be recognized with.
+        """
+        default = cls() if default is None else default
+        dmp = default.dmp if dmp is None else dmp
+        if recognizer is None:
+            return cls(default.comparison, default.classifier, default.weights, dmp)
+        weights = recognizer.weights
+        plain = weights if isinstance(weights, str) else tuple(map(float, weights))
+        return cls(recognizer.specification, recognizer.classifier, plain, dmp)
+
+    @property
+    def representations(self) -> tuple[Representation, ...]:
+        """The representations whose features are stored."""
+        return self.comparison.representations
+
+    def widths(self, n_dims: int) -> tuple[int, ...]:
+        """Numbers per movement in the rows of each representation."""
+        return tuple(n_dims * one.n_points for one in self.representations)
+
+    def recognizer(self) -> Recognizer:
+        """A recognizer, not fitted, that compares and recognizes movements in this way."""
+        from kineme.recognition.recognizer import Recognizer
+
+        return Recognizer(**self._parameters())
+
+    def _parameters(self) -> dict[str, Any]:
+        """The parameters of that recognizer."""
+        how = self.comparison
+        return {
+            "representations": how.representations,
+            "max_angle": how.max_angle,
+            "scale": how.normalization.scale,
+            "translation": how.normalization.translation,
+            "cutoff": how.cutoff,
+            "mean": how.mean,
+            "classifier": self.classifier,
+            "weights": self.weights,
+        }
+
+    def to_json(self) -> dict[str, str]:
+        """Two documents: ``recognizer`` and ``dmp``."""
+        parameters = self._parameters() | {"representations": [asdict(one) for one in self.representations]}
+        return {"recognizer": json.dumps(parameters), "dmp": json.dumps(specification_to_dict(self.dmp))}
+
+    @classmethod
+    def from_json(cls, meta: dict[str, str], path: Path) -> Specification:
+        """What `to_json` wrote into the library at `path`; every parameter is checked as if a user had typed it."""
+        try:
+            parameters, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
+            parameters["representations"] = tuple(Representation(**one) for one in parameters["representations"])
+            made = cls._from_parameters(specification_from_dict(DMP, dmp), **parameters)
+        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+            reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
+            raise DataError(
+                f"expected {path} to say how its movements are described, got a specification that does not fit "
+                f"({reason}); take the file from a backup or an export that you trust"
+            ) from error
+        return made
+
+    @classmethod
+    def _from_parameters(  # noqa: PLR0913 - those of a recognizer
+        cls,
+        dmp: DMP,
+        *,
+        representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS,
+        max_angle: float | None = None,
+        scale: str = "path",
+        translation: bool = True,
+        cutoff: float | None = 10.0,
+        mean: str = "arithmetic",
+        classifier: str = "auto",
+        weights: str | Sequence[float] = "auto",
+    ) -> Specification:
+        """As `_parameters` gives them; earlier versions wrote some of them."""
+        how = ComparisonSpecification(representations, Normalization(translation, scale), cutoff, max_angle, mean)
+        return cls(how, classifier, weights if isinstance(weights, str) else tuple(map(float, weights)), dmp)
 
 
 def as_n_dims(text: str, path: Path) -> int:

@@ -14,11 +14,11 @@ from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
+from kineme.library.recognition.members import described
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
-from kineme.library.symbols.described_members import described
 from kineme.primitives.discrete.primitives import Primitives
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
@@ -29,7 +29,7 @@ def prototype_of(store: Store, one: Symbol) -> int:
     if one.prototype is not None:
         return int(one.prototype)
     members = _some_members(one)
-    return int(members[medoid_of(described(store, members), store.specification.recognizer())])
+    return int(members[medoid_of(described(store, members), store.specification.comparison)])
 
 
 def primitive_of(store: Store, who: str) -> Primitives:
@@ -50,7 +50,7 @@ def ground_symbol(
         by=by,
         units=units,
         medoid=int(np.searchsorted(members, typical)),
-        like=store.specification.recognizer(),
+        like=store.specification.comparison,
     )
     grounding["prototype"]["medoid"] = typical  # its id, for queries to the library
     return grounding
@@ -65,12 +65,12 @@ def space_of(store: Store) -> ConceptualSpace:
             "proposals"
         )
     prototypes = described(store, [prototype_of(store, one) for one in shown])
-    return conceptual_space([one.name for one in shown], prototypes, store.specification.recognizer())
+    return conceptual_space([one.name for one in shown], prototypes, store.specification.comparison)
 
 
 def morph_symbols(store: Store, a: str, b: str, shares: ArrayLike) -> Primitives:
     """Movements between two symbols; see `ActionLibrary.morph`."""
-    return morph(primitive_of(store, a), primitive_of(store, b), shares, store.specification.recognizer())
+    return morph(primitive_of(store, a), primitive_of(store, b), shares, store.specification.comparison)
 
 
 def _some_members(one: Symbol) -> Ids:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.anchoring.proposals.assign import place
+from kineme.anchoring.proposals.assign import assign_described
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import SpecificationError
+from kineme.library.recognition.members import described
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
-from kineme.library.storage.symbols import exists, symbols
-from kineme.library.symbols.described_members import described
-from kineme.library.symbols.recognized import recognizer_of_symbols
+from kineme.library.storage.symbols import exists
+from kineme.library.symbols.recognized import Recognized, known_symbols
+from kineme.movements.trajectories.demonstrations import Demonstrations
 
 _SAME = 0.8  # share of members in a rejected proposal from which on a proposal counts as the same
 
@@ -50,6 +53,12 @@ class LibraryProposals:
         """Movements in no proposal."""
         return self.ids[self.found.left_over]
 
+    def movements(self, library: Any) -> Demonstrations:
+        """Deprecated: ``library.movements(ids=proposals.ids)``."""
+        warn("LibraryProposals.movements is now library.movements(ids=proposals.ids)", DeprecationWarning, stacklevel=2)
+        found: Demonstrations = library.movements(ids=self.ids)
+        return found
+
     def __repr__(self) -> str:
         clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"
         return f"LibraryProposals({clusters} among {len(self.ids)} movements, {len(self.left_over)} left over)"
@@ -61,29 +70,41 @@ def propose(
     method: str | None = None,
     n_clusters: int | None = None,
     min_members: int = 3,
-    leave: ArrayLike = (),
+    found: Recognized | None = None,
 ) -> LibraryProposals:
-    """Propose symbols for the movements without one but those to `leave`, or for `ids`; see `ActionLibrary.propose`."""
+    """Propose symbols for movements; see `ActionLibrary.propose`.
+
+    Parameters
+    ----------
+    store : Store
+    ids : array_like of int, optional
+        By default the movements without a symbol that are not in `found`.
+    method, n_clusters, min_members
+        As for `kineme.anchoring.propose`.
+    found : Recognized, optional
+        Movements to leave out, and what is known of the symbols.
+    """
+    found = Recognized() if found is None else found
     chosen = (
-        np.setdiff1d(read.unlabeled_ids(store), np.asarray(leave, dtype=np.int64))
+        np.setdiff1d(read.unlabeled_ids(store), found.all_ids())
         if ids is None
         else np.unique(np.asarray(ids, dtype=np.int64))
     )
     if len(chosen) < 3:
         return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
     chosen = read.as_ids(store, chosen)
-    if ids is None and method is None and n_clusters is None and symbols(store):
-        known = recognizer_of_symbols(store)
-        found = place(read.movements(store, chosen), known, min_members=min_members).proposals
+    by_symbols = ids is None and method is None and n_clusters is None
+    known = found.known or known_symbols(store) if by_symbols else None
+    if known is not None:
+        members = described(store, chosen, known.comparison)
+        proposals = assign_described(members, known, min_members=min_members).proposals
     else:
-        found = propose_clusters(
-            described(store, chosen),
-            method or "agglomerative",
-            n_clusters,
-            min_members=min_members,
-            like=store.specification.recognizer(),
-        )
-    return LibraryProposals(chosen, _without(found, _rejected_before(store, chosen)) if ids is None else found)
+        members, like = described(store, chosen), store.specification.comparison
+        how = method or "agglomerative"
+        proposals = propose_clusters(members, how, n_clusters, min_members=min_members, like=like)
+    if ids is None:
+        proposals = _without(proposals, _rejected_before(store, chosen))
+    return LibraryProposals(chosen, proposals)
 
 
 def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> None:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kineme.anchoring.proposals.merge_split import Merge, Split, suggest_merges, suggest_splits
+from kineme.library.recognition.members import described
 from kineme.library.storage.store import Store
-from kineme.library.symbols.described_members import described, evenly_many_members
+from kineme.library.symbols.some_members import evenly_many_members
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ def review(store: Store) -> Review:
     ids, labels = evenly_many_members(store)
     if len(np.unique(labels)) < 2:
         return Review((), ())
-    members, like = described(store, ids), store.specification.recognizer()
+    members, like = described(store, ids), store.specification.comparison
     splits = suggest_splits(members, labels, like=like)
     return Review(
         suggest_merges(members, labels, like=like),

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kineme.movements.preparation.preprocess import check_steps
-from kineme.primitives.discrete.basis import GaussianBasis
+from kineme.primitives.discrete.basis import ExponentialPhase, GaussianBasis
 from kineme.primitives.discrete.fits import FITS, REGRESSIONS
 from kineme.primitives.discrete.formulations import FORMULATIONS, Formulation
-from kineme.primitives.discrete.phase import ExponentialPhase
 from kineme.primitives.spring_damper import SpringDamper
 from kineme.validation import check_choice, check_count
 

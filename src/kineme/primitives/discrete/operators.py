@@ -8,9 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.movements.preparation.spline import spline_matrix
-from kineme.primitives.discrete.differentiation import differentiation_matrices
 from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.discrete.fits import forcing_target, local_regression, ridge_regression, trajectory_regression
+from kineme.primitives.discrete.fits import (
+    differentiation_matrices,
+    forcing_target,
+    local_regression,
+    ridge_regression,
+    trajectory_regression,
+)
 from kineme.primitives.discrete.response import Response, spring_damper_response
 from kineme.validation import Array
 

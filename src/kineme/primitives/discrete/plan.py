@@ -25,7 +25,7 @@ def plan_of(
     duration: float | None = None,
     velocity: ArrayLike | None = None,
 ) -> Plan:
-    """The plan of one primitive, with the wishes of `Primitives.rollout` checked for one movement."""
+    """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
     check_one(len(primitive))
     if duration is not None:
         check_number("duration", duration, above=0.0)

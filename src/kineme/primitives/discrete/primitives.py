@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError
 from kineme.primitives.batch import Batch
 from kineme.primitives.control import Controller, ObstacleAvoidance, Options
-from kineme.primitives.discrete.amplitudes import safe_amplitudes
 from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.operators import forcing_matrix
 from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
@@ -158,7 +158,7 @@ class Primitives(Batch):
         n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
         return replace(movement, n_samples=n_samples, end=end)
 
-    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+    def controller(  # noqa: PLR0913 - an option per parameter
         self,
         dt: float,
         *,
@@ -193,7 +193,7 @@ class Primitives(Batch):
         Raises
         ------
         SpecificationError
-            More than one primitive; a wish or an option out of its range.
+            More than one primitive; an option out of its range.
         DegenerateMovementError
             The original formulation asked to move a closed or flat demonstration to another goal.
 

@@ -134,17 +134,17 @@ def rollout(
 ) -> Rollout:
     """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
     d = primitives.n_dims
-    wishes = {
+    options = {
         "start": per_movement(start, "start", d),
         "goal": per_movement(goal, "goal", d),
         "velocity": per_movement(velocity, "velocity", d),
         "duration": per_movement(duration, "duration", None),
     }
-    n = broadcast_length(len(primitives), wishes)
+    n = broadcast_length(len(primitives), options)
 
     def fill(name: str, default: Array) -> Array:
-        wish = wishes[name]
-        value = default if wish is None else wish
+        option = options[name]
+        value = default if option is None else option
         return np.broadcast_to(value, (n, *value.shape[1:]))
 
     durations = fill("duration", primitives.durations)
@@ -152,7 +152,7 @@ def rollout(
     starts, goals = fill("start", primitives.starts), fill("goal", primitives.goals)
     # The demonstrated velocity scales with the tempo; a given velocity does not.
     tempo = primitives.durations / durations
-    velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if wishes["velocity"] is None else 1.0)
+    velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
     return Rollout(
         primitives, _ratio(primitives, goals - starts), starts, goals, velocities, durations, primitives.dmp.n_points
     )
@@ -168,14 +168,14 @@ def check_durations(name: str, durations: Array) -> None:
     raise SpecificationError(f"expected {name} above 0 seconds{between}, got {durations[i]:g} for movement {i}")
 
 
-def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
+def per_movement(option: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
     """An option as (1, d) or (n, d), durations as (1,) or (n,); a number suits a movement of one dimension."""
-    if wish is None:
+    if option is None:
         return None
     try:
-        value = as_numbers(wish, name)
+        value = as_numbers(option, name)
     except TrajectoryError as error:
-        raise TrajectoryError(f"expected numbers for {name}, got {wish!r}") from error
+        raise TrajectoryError(f"expected numbers for {name}, got {option!r}") from error
     if n_dims == 1 and value.ndim == 0:
         value = value[None]
     if n_dims is None:
@@ -186,7 +186,7 @@ def per_movement(wish: ArrayLike | None, name: str, n_dims: int | None) -> Array
         fits = value.ndim == 2 and value.shape[1] == n_dims
     if not fits:
         shape = "a number or (n,)" if n_dims is None else f"({n_dims},) or (n, {n_dims})"
-        raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(wish)}")
+        raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(option)}")
     if (bad := ~np.isfinite(value)).any():
         raise TrajectoryError(f"expected finite numbers for {name}, got {_first(value, bad)}")
     if (bad := np.abs(value) > LARGEST).any():
@@ -202,9 +202,9 @@ def _first(value: Array, bad: NDArray[np.bool_]) -> str:
     return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
 
 
-def broadcast_length(n_primitives: int, wishes: dict[str, Array | None]) -> int:
+def broadcast_length(n_primitives: int, options: dict[str, Array | None]) -> int:
     """Number of movements from the lengths of all options, which must be 1 or equal."""
-    lengths = {"primitives": n_primitives} | {name: len(value) for name, value in wishes.items() if value is not None}
+    lengths = {"primitives": n_primitives} | {name: len(value) for name, value in options.items() if value is not None}
     n = max(lengths.values())
     if any(length not in (1, n) for length in lengths.values()):
         listed = ", ".join(f"{length} {name}" for name, length in lengths.items())

@@ -20,7 +20,7 @@ _LONGEST = 10.0  # durations after which a movement around obstacles is given up
 
 
 @dataclass(frozen=True, eq=False)
-class Wishes:
+class MovementOptions:
     """What the new movement should be; None leaves it as demonstrated.
 
     Attributes
@@ -49,7 +49,7 @@ def primitives_from(path: Path, dmp: DMP) -> Primitives:
     return Primitives.load(path) if path.suffix.lower() == SAVED else dmp.learn(read_recording(path))
 
 
-def generate(primitive: Primitives, wishes: Wishes) -> Columns:
+def generate(primitive: Primitives, options: MovementOptions) -> Columns:
     """The new movement as columns times (T,), positions, velocities, accelerations (T, d).
 
     Parameters
@@ -60,11 +60,11 @@ def generate(primitive: Primitives, wishes: Wishes) -> Columns:
     Raises
     ------
     SpecificationError
-        A wish that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
+        An option that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
         into memory, and numbers that are not finite: a robot gets no movement that was not checked.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
-        made = (_undisturbed if wishes.obstacles is None else _around_obstacles)(primitive, wishes)
+        made = (_undisturbed if options.obstacles is None else _around_obstacles)(primitive, options)
     for name, column in made.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
@@ -74,8 +74,8 @@ def generate(primitive: Primitives, wishes: Wishes) -> Columns:
     return made
 
 
-def _undisturbed(primitive: Primitives, wishes: Wishes) -> Columns:
-    made = primitive.rollout(wishes.start, wishes.goal, wishes.duration, rate=wishes.rate, settle=wishes.settle)
+def _undisturbed(primitive: Primitives, options: MovementOptions) -> Columns:
+    made = primitive.rollout(options.start, options.goal, options.duration, rate=options.rate, settle=options.settle)
     return {
         "times": made.times[0],
         "positions": made.positions[0],
@@ -84,24 +84,24 @@ def _undisturbed(primitive: Primitives, wishes: Wishes) -> Columns:
     }
 
 
-def _around_obstacles(primitive: Primitives, wishes: Wishes) -> Columns:
-    obstacles = np.asarray(wishes.obstacles)
+def _around_obstacles(primitive: Primitives, options: MovementOptions) -> Columns:
+    obstacles = np.asarray(options.obstacles)
     if obstacles.ndim != 2 or obstacles.shape[1] != primitive.n_dims or primitive.n_dims < 2:
         raise SpecificationError(
             f"expected obstacles in the {primitive.n_dims} dimensions of the movement, two or more, got shape "
             f"{obstacles.shape}"
         )
-    duration = float(primitive.durations[0]) if wishes.duration is None else wishes.duration
-    steps = primitive.rollout(duration=duration, rate=wishes.rate).n_samples - 1
+    duration = float(primitive.durations[0]) if options.duration is None else options.duration
+    steps = primitive.rollout(duration=duration, rate=options.rate).n_samples - 1
     control = primitive.controller(
-        duration / steps, start=wishes.start, goal=wishes.goal, duration=duration, settle=wishes.settle
+        duration / steps, start=options.start, goal=options.goal, duration=duration, settle=options.settle
     )
     states = [control.state]
-    while not _arrived(states[-1], wishes) and len(states) <= _LONGEST * steps:
+    while not _arrived(states[-1], options) and len(states) <= _LONGEST * steps:
         states.append(control.step(obstacles=obstacles))
-    if wishes.settle is not None and not states[-1].status & Status.SETTLED:
+    if options.settle is not None and not states[-1].status & Status.SETTLED:
         raise SpecificationError(
-            f"expected the movement to come within {wishes.settle:g} of its goal in {_LONGEST:g} durations, the "
+            f"expected the movement to come within {options.settle:g} of its goal in {_LONGEST:g} durations, the "
             "obstacles keep it away; move them or the goal"
         )
     return {
@@ -112,6 +112,6 @@ def _around_obstacles(primitive: Primitives, wishes: Wishes) -> Columns:
     }
 
 
-def _arrived(state: State, wishes: Wishes) -> bool:
+def _arrived(state: State, options: MovementOptions) -> bool:
     over = state.progress >= 1.0 - 1e-9
-    return over if wishes.settle is None else over and bool(state.status & Status.SETTLED)
+    return over if options.settle is None else over and bool(state.status & Status.SETTLED)

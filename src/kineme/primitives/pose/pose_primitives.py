@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.files.container import write_container
+from kineme.primitives.batch import Batch
 from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
-from kineme.primitives.persistence import Arrays, check_array, load_as, pack, unpack
+from kineme.primitives.persistence import Arrays
 from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout
 from kineme.primitives.pose.quaternions import conjugate, normalized, product
@@ -24,11 +23,9 @@ from kineme.primitives.pose.rates import rotation_vector_rate
 from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
-_KIND = "pose primitives"  # in the file
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PosePrimitives:
+class PosePrimitives(Batch):
     """n primitives of orientations or poses; made by `PoseDMP.learn`.
 
     Attributes
@@ -40,6 +37,10 @@ class PosePrimitives:
         The demonstrated goal orientations, where the rotation vector is 0.
     """
 
+    ROWS = Primitives.ROWS | {"references": "n4"}
+    SPECIFICATION = DMP
+    KIND = "pose primitives"
+
     tangent: Primitives
     references: Array
 
@@ -48,46 +49,32 @@ class PosePrimitives:
         view.setflags(write=False)
         object.__setattr__(self, "references", view)
 
-    def __len__(self) -> int:
-        return len(self.tangent)
-
     def __repr__(self) -> str:
-        what = "orientations" if self.n_columns == 4 else "poses"
-        return f"PosePrimitives({len(self)} movements of {what}, {self.tangent.dmp})"
+        columns = "orientations" if self.n_columns == 4 else "poses"
+        return f"PosePrimitives({len(self)} movements of {columns}, {self.tangent.dmp})"
 
-    def __getitem__(self, index: Any) -> PosePrimitives:
-        """The chosen primitives as a batch; an integer gives a batch of one."""
-        chosen = np.atleast_1d(np.arange(len(self))[index])
-        return PosePrimitives(self.tangent[chosen], self.references[chosen])
+    def _row(self, name: str) -> NDArray[Any]:
+        return np.asarray(getattr(self if name == "references" else self.tangent, name))
 
     @classmethod
-    def join(cls, batches: Iterable[PosePrimitives]) -> PosePrimitives:
-        """Several batches as one, in the order given; errors as in `Primitives.join`."""
-        batches = list(batches)
-        wrong = [type(batch).__name__ for batch in batches if not isinstance(batch, cls)]
-        if wrong:
-            raise TrajectoryError(f"expected batches of PosePrimitives, got {wrong[0]}")
-        tangent = Primitives.join([batch.tangent for batch in batches])
-        return cls(tangent, np.concatenate([batch.references for batch in batches]))
-
-    def save(self, path: str | Path) -> Path:
-        """Write to one file of plain data; see `Primitives.save`."""
-        header, arrays = pack(self.tangent)
-        return write_container(Path(path), _KIND, header, {**arrays, "references": self.references})
+    def _of_rows(
+        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None
+    ) -> PosePrimitives:
+        rows = {name: arrays[name] for name in Primitives.ROWS}
+        return cls(Primitives(dmp, **rows, labels=labels, names=names), arrays["references"])
 
     @classmethod
-    def load(cls, path: str | Path) -> PosePrimitives:
-        """Read a file of `save`; see `Primitives.load`."""
-        return load_as(_KIND, path, cls._unpacked)
+    def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
+        loaded = super()._from_file(header, arrays)
+        if loaded.n_dims not in {3, 6}:
+            raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {loaded.n_dims}")
+        normalized(loaded.references)  # refuses what is no rotation; the numbers stay as they were saved
+        return loaded
 
-    @classmethod
-    def _unpacked(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
-        tangent, references = unpack(Primitives, header, arrays), arrays["references"]
-        if tangent.n_dims not in {3, 6}:
-            raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {tangent.n_dims}")
-        check_array("references", references, (len(tangent), 4))
-        normalized(references)  # refuses what is no rotation; the numbers stay as they were saved
-        return cls(tangent, references)
+    @property
+    def dmp(self) -> DMP:
+        """The specification of the DMP in the tangent space."""
+        return self.tangent.dmp
 
     @property
     def labels(self) -> NDArray[Any] | None:
@@ -119,7 +106,7 @@ class PosePrimitives:
         """Demonstrated goals, shape (n, 4) or (n, 7)."""
         return self._poses(self.tangent.goals)
 
-    def rollout(  # noqa: PLR0913 - a wish per parameter
+    def rollout(  # noqa: PLR0913 - an option per parameter
         self,
         start: ArrayLike | None = None,
         goal: ArrayLike | None = None,
@@ -165,7 +152,7 @@ class PosePrimitives:
         )
         return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
 
-    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+    def controller(  # noqa: PLR0913 - an option per parameter
         self,
         dt: float,
         *,
@@ -218,7 +205,7 @@ class PosePrimitives:
     def in_tangent(
         self, start: ArrayLike | None, goal: ArrayLike | None, velocity: ArrayLike | None
     ) -> tuple[Array, Array, Array, Array | None]:
-        """Start, goal, reference orientations and initial velocity of the movements that these wishes make."""
+        """Start, goal, reference orientations and initial velocity of the movements that these options make."""
         starts, goals, references = self._endpoints(start, goal)
         return starts, goals, references, self._tangent_velocity(velocity, starts)
 
@@ -239,15 +226,15 @@ class PosePrimitives:
         return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
 
     def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
-        wish = per_movement(velocity, "velocity", self.tangent.n_dims)
-        if wish is None:
+        option = per_movement(velocity, "velocity", self.tangent.n_dims)
+        if option is None:
             return None
-        n = broadcast_length(len(starts), {"velocity": wish})
-        rates = rotation_vector_rate(starts[:, -3:], wish[:, -3:])
-        return np.concatenate((np.broadcast_to(wish[:, :-3], (n, wish.shape[1] - 3)), rates), axis=1)
+        n = broadcast_length(len(starts), {"velocity": option})
+        rates = rotation_vector_rate(starts[:, -3:], option[:, -3:])
+        return np.concatenate((np.broadcast_to(option[:, :-3], (n, option.shape[1] - 3)), rates), axis=1)
 
-    def _as_poses(self, wish: ArrayLike | None, name: str) -> Array | None:
-        poses = per_movement(wish, name, self.n_columns)
+    def _as_poses(self, option: ArrayLike | None, name: str) -> Array | None:
+        poses = per_movement(option, name, self.n_columns)
         if poses is None:
             return None
         try:

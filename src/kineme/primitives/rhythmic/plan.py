@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
-def plan_of(primitive: RhythmicPrimitives, wishes: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
-    """The plan of one limit cycle and its amplitude, with the wishes of `rollout` checked for one movement.
+def plan_of(primitive: RhythmicPrimitives, options: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
+    """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
 
     A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.
     """
     check_one(len(primitive))
     d, dmp = primitive.n_dims, primitive.dmp
-    vectors = {name: one_vector(name, wishes[name], d) for name in ("baseline", "start", "velocity")}
-    movement = rollout(primitive, wishes | vectors, 1.0, None, n_samples=2)
+    vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
+    movement = rollout(primitive, options | vectors, 1.0, None, n_samples=2)
     check_one(len(movement))
     origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
     gain, ones = float(movement.ratio[0]), np.ones(d)

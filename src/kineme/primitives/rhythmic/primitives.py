@@ -128,11 +128,11 @@ class RhythmicPrimitives(Batch):
         SpecificationError
             A period or n_periods of 0 or less, a rate too low to show a period.
         """
-        wishes = {"period": period, "amplitude": amplitude, "phase": phase}
-        wishes |= {"baseline": baseline, "start": start, "velocity": velocity}
-        return rollout(self, wishes, n_periods, rate, n_samples)
+        options = {"period": period, "amplitude": amplitude, "phase": phase}
+        options |= {"baseline": baseline, "start": start, "velocity": velocity}
+        return rollout(self, options, n_periods, rate, n_samples)
 
-    def controller(  # noqa: PLR0913 - a wish or an option per parameter
+    def controller(  # noqa: PLR0913 - an option per parameter
         self,
         dt: float,
         *,
@@ -169,9 +169,9 @@ class RhythmicPrimitives(Batch):
         Raises
         ------
         SpecificationError
-            More than one primitive; a wish or an option out of its range.
+            More than one primitive; an option out of its range.
         """
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
-        wishes: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
-        plan, gain = plan_of(self, wishes | {"baseline": baseline, "start": start, "velocity": velocity})
+        changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
+        plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity})
         return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)

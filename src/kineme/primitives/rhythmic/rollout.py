@@ -122,7 +122,7 @@ def cycle(primitives: RhythmicPrimitives, ratio: Array, phases: Array, turn: Arr
 
 def rollout(
     primitives: RhythmicPrimitives,
-    wishes: dict[str, ArrayLike | None],
+    options: dict[str, ArrayLike | None],
     n_periods: float,
     rate: float | None,
     n_samples: int | None,
@@ -130,13 +130,14 @@ def rollout(
     """Check the options and broadcast them over the primitives; see `RhythmicPrimitives.rollout`."""
     vectors = ("baseline", "start", "velocity")
     given = {
-        name: per_movement(wish, name, primitives.n_dims if name in vectors else None) for name, wish in wishes.items()
+        name: per_movement(option, name, primitives.n_dims if name in vectors else None)
+        for name, option in options.items()
     }
     n = broadcast_length(len(primitives), given)
 
     def fill(name: str, default: Array) -> Array:
-        wish = given[name]
-        value = default if wish is None else wish
+        option = given[name]
+        value = default if option is None else option
         return np.broadcast_to(value, (n, *value.shape[1:]))
 
     check_number("n_periods", n_periods, above=0.0)

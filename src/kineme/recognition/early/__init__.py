@@ -1,1 +1,1 @@
-"""Recognizing a movement of which only the beginning has been seen."""
+"""Early recognition: movements of which only the beginning is given."""

@@ -1,4 +1,4 @@
-"""When to decide, and when to change one's mind: hysteresis."""
+"""The decision for a label during a stream, with hysteresis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kineme.validation import check_number
 
 @dataclass
 class Decision:
-    """A label is decided once it has been sure for a while, and then gives way only to one that is sure for longer.
+    """Decide for a label after it has been confident for a while; change it only for one that is so for longer.
 
     Parameters
     ----------

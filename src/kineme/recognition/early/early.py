@@ -1,4 +1,4 @@
-"""Many movements of which only the beginning has been seen."""
+"""Recognize many movements by their beginnings."""
 
 from __future__ import annotations
 

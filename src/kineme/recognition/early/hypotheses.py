@@ -1,4 +1,4 @@
-"""Which stored movement, and how much of it: hypotheses about a movement that is not over yet."""
+"""Hypotheses about a movement that is not over yet: which stored movement, and how much of it."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class Early:
     n_progress : int, default 40
         Beginnings stored of each movement. On a coarse grid a corner that has just been passed falls between two.
     size_spread : float, default 0.7
-        Standard deviation of the logarithm of the ratio of sizes of two movements of one kind: 0.7 makes a factor of 4
+        Standard deviation of the logarithm of the ratio of sizes of two movements of one class: 0.7 makes a factor of 4
         either way two standard deviations. Take 0.1 where the application knows the size, math.inf where anything
         goes: then a short beginning of anything is a small copy of something straight.
     duration_spread : float, default 0.35
         The same for durations: a factor of 2 either way is two standard deviations.
     timing_spread : float, default 0.05
         Root mean square difference of the times at which the same share of the path is reached, as a share of the time
-        so far. Its influence grows only as a logarithm, so that a hesitation cannot shout down the path.
+        so far. Its influence grows only as a logarithm, so that a hesitation cannot outweigh the path.
     max_angle : float, optional
         Largest rotation [rad]; by default the recognizer's.
     """
@@ -64,7 +64,7 @@ class Early:
 
 
 def as_early(early: Any) -> Early:
-    """What a user passed, or the defaults for None."""
+    """The user's options, or the defaults for None."""
     if early is not None and not isinstance(early, Early):
         raise SpecificationError(
             f"expected early to be kineme.recognition.early.hypotheses.Early(...) or None, got {early!r}"

@@ -1,4 +1,4 @@
-"""What a live recognizer says after each sample."""
+"""The state of a live recognizer after each sample."""
 
 from __future__ import annotations
 

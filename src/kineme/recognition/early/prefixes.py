@@ -1,4 +1,4 @@
-"""The beginnings of movements, described so that place and size need not be known."""
+"""Beginnings of movements, described independently of position and size."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from kineme.recognition.early.prefixes import beginnings, smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.validation import MIN_SAMPLES, Array
 
-CAPACITY = 4096  # samples kept as they come
+CAPACITY = 4096  # samples that are kept one by one
 _WHOLE = np.ones(1)
 
 
@@ -53,7 +53,7 @@ class Live:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Go through a stored movement once: what is loaded on first use would stall the stream for 0.3 s."""
+        """Recognize a stored movement once: loading code on first use would delay the stream by 0.3 s."""
         load_compiled()
         known = self._references.demonstrations[np.zeros(1, dtype=np.intp)]
         self.update(known.times, known.positions)
@@ -145,7 +145,7 @@ class Live:
         )
 
     def _smooth(self, kept: Array) -> Array:
-        """What has been seen so far, at even times and smoothed as the stored movements were: (1, d, T)."""
+        """The samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
         times = np.linspace(kept[0, 0], kept[-1, 0], N_POINTS)
         even = np.stack([np.interp(times, kept[:, 0], column - column[0]) for column in kept[:, 1:].T])
         cutoff = self._comparison.cutoff

@@ -1,13 +1,14 @@
-"""How many kinds there are: the best fit among the numbers of clusters that come again."""
+"""How many clusters there are: the best fit among the numbers of clusters that come again."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.anchoring.clustering.resampling import subsets
-from kineme.anchoring.clustering.silhouettes import mean_silhouettes
-from kineme.anchoring.clustering.tree import average_linkage, cuts
+from kineme.anchoring.clustering.clustering import average_linkage, cuts
+from kineme.anchoring.clustering.stability import subsets
 from kineme.validation import Array
 
 _SLACK = 0.05  # of the adjusted Rand index: a number of clusters this close to the most stable is as stable
@@ -16,7 +17,7 @@ _AT_ONCE = 60  # numbers of clusters tried at a time
 Whole = NDArray[np.intp]
 
 
-def count_kinds(distances: Array, repeats: int = 20, seed: int = 0) -> int:
+def count_clusters(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     """The number of clusters c of an average-linkage tree.
 
     The stability of c is the mean adjusted Rand index between the c clusters of all movements and those of random
@@ -25,7 +26,7 @@ def count_kinds(distances: Array, repeats: int = 20, seed: int = 0) -> int:
     within 0.05 of the largest, the one with the largest mean silhouette (Rousseeuw 1987) is taken. On bounded distances
     the silhouette is about the share of movements that are clearly nearer to their own cluster.
 
-    Every c from 2 to n / 2 is tried, since a kind is more than one movement; among many movements a geometric series
+    Every c from 2 to n / 2 is tried, since a cluster is more than one movement; among many movements a geometric series
     of c first, then those around the best.
 
     References
@@ -56,8 +57,47 @@ def _best(distances: Array, tree: Array, counts: Whole, repeats: int, seed: int)
     return int(fine_first[int(np.argmax(fits))])
 
 
+def mean_silhouettes(distances: Array, cuts: Sequence[NDArray[np.intp]]) -> Array:
+    """Mean silhouette of each clustering; each must be coarser than the one before it.
+
+    With a the mean distance of a movement to its own cluster and b that to the nearest other, ``(b - a) / max(a, b)``,
+    and 0 for a movement alone. The sums of distances to a cluster's parts add up to those to the cluster, so the n^2
+    distances are read once for all clusterings.
+
+    Source: P. J. Rousseeuw, "Silhouettes: a graphical aid to the interpretation and validation of cluster analysis",
+    Journal of Computational and Applied Mathematics 20, 1987.
+    """
+    sums = _sums_by(distances, cuts[0])
+    before, means = cuts[0], []
+    for cut in cuts:
+        into = np.zeros(sums.shape[1], dtype=np.intp)
+        into[before] = cut
+        sums, before = _sums_by(sums, into), cut
+        means.append(_mean_silhouette(sums, cut))
+    return np.array(means)
+
+
+def _sums_by(columns: Array, into: NDArray[np.intp]) -> Array:
+    """Columns (n, m) added up by where each goes, shape (n, c)."""
+    order = np.argsort(into, kind="stable")
+    starts = np.flatnonzero(np.diff(into[order], prepend=-1))
+    return np.asarray(np.add.reduceat(columns[:, order], starts, axis=1))
+
+
+def _mean_silhouette(sums: Array, cut: NDArray[np.intp]) -> float:
+    counts, rows = np.bincount(cut), np.arange(len(cut))
+    own = counts[cut]
+    a = sums[rows, cut] / np.maximum(own - 1, 1)
+    others = sums / counts
+    others[rows, cut] = np.inf
+    b = others.min(axis=1)
+    larger = np.maximum(a, b)
+    silhouette = np.where((own > 1) & (larger > 0), (b - a) / np.where(larger > 0, larger, 1.0), 0.0)
+    return float(silhouette.mean())
+
+
 def _agreement(distances: Array, whole: list[Whole], counts: list[int], chosen: Whole) -> Array:
-    """Adjusted Rand index of each number of clusters between the whole, seen at the chosen movements, and those."""
+    """Adjusted Rand index of each number of clusters between all movements and a chosen subset, (c,)."""
     tree = average_linkage(distances[np.ix_(chosen, chosen)])
     again = cuts(tree, [min(count, len(chosen)) for count in counts])
     return np.array([adjusted_rand(a[chosen], b) for a, b in zip(whole, again, strict=True)])

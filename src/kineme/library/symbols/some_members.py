@@ -1,27 +1,19 @@
-"""Movements of symbols in the form that anchoring compares, from the stored features."""
+"""Members of all symbols, as many as are compared with each other."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from kineme.comparison.describe import Described, describe_rows
 from kineme.comparison.sampling import evenly_spaced
-from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import symbols
 from kineme.movements.trajectories.labels import label_array
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
-
-
-def described(store: Store, ids: ArrayLike) -> Described:
-    """Movements in the representations of the library, from their stored features."""
-    rows = read.features(store, np.asarray(ids, dtype=np.int64))
-    return describe_rows(rows, store.n_dims or 0, store.specification.comparison)
 
 
 def evenly_many_members(store: Store) -> tuple[Ids, NDArray[Any]]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from kineme.comparison.bounds import N_REDUCED, ReducedFeatures, fit_bases, reduce_features
 from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage import read
+from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.output.atomic import whole_file
 from kineme.validation import Array
@@ -29,62 +30,61 @@ FILE = "codes.cache"
 
 _FORMAT = 1
 _HEADER = 4096  # bytes; the arrays begin on a new page
-_SAMPLE = 2000  # movements that the codes are fitted to
-_ROWS = 8192  # movements coded at a time
+_SAMPLE = 2000  # movements that the reduced features are fitted to
+_ROWS = 8192  # movements reduced at a time
 _GROWN = 0.1  # share of new movements from which on the file is written again
 _FEW = 2000  # fewer new ones are never written
 
-Ids = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
-class Index:
-    """Codes of the movements `ids` (ascending), in one block or two: from the file, and of later movements."""
+class ReducedMovements:
+    """Reduced features of movements, ids ascending, in one block or two: from the file, and of later movements."""
 
     ids: Ids
     bases: tuple[Array, ...]
     blocks: tuple[tuple[ReducedFeatures, ...], ...]
 
     def rows(self, ids: Ids) -> NDArray[np.intp]:
-        """Rows of the codes of these movements."""
+        """Rows of the reduced features of these movements."""
         return np.searchsorted(self.ids, ids)
 
 
-def open_index(store: Store) -> Index:
-    """Codes of all movements that the library ever had: from the cache, and computed for those not in it."""
+def open_cache(store: Store) -> ReducedMovements:
+    """Reduced features of all movements that the library ever had: from the cache, and computed for those not in it."""
     path = store.folder / FILE
-    index = _load(store, path)
-    known = int(index.ids[-1]) if index is not None else -1
+    reduced = _load(store, path)
+    known = int(reduced.ids[-1]) if reduced is not None else -1
     later = _ids_after(store, known)
-    if index is not None and len(later) <= max(_FEW, _GROWN * len(index.ids)):
-        return index if not len(later) else grown(store, index, later)
+    if reduced is not None and len(later) <= max(_FEW, _GROWN * len(reduced.ids)):
+        return reduced if not len(later) else extended(store, reduced, later)
     everything = _ids_after(store, -1)
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: kept in memory only
             _write(store, path, everything)
-            if (index := _load(store, path)) is not None:
-                return index
+            if (reduced := _load(store, path)) is not None:
+                return reduced
     buffer = np.zeros(_HEADER + _layout(store, len(everything))[1], dtype=np.uint8)
     _fill(store, buffer, everything)
-    return _view(store, buffer, len(everything))
+    return _arrays_in(store, buffer, len(everything))
 
 
-def grown(store: Store, index: Index, later: Ids) -> Index:
-    """The index with the codes of later movements appended."""
-    new = reduce_features(index.bases, _features(store, later), store.n_dims or 0)
-    if len(index.blocks) > 1:
-        pairs = zip(index.blocks[1], new, strict=True)
+def extended(store: Store, reduced: ReducedMovements, later: Ids) -> ReducedMovements:
+    """The same with the reduced features of later movements appended."""
+    new = reduce_features(reduced.bases, _features(store, later), store.n_dims or 0)
+    if len(reduced.blocks) > 1:
+        pairs = zip(reduced.blocks[1], new, strict=True)
         new = tuple(ReducedFeatures(*map(np.concatenate, zip(*pair, strict=True))) for pair in pairs)
-    return Index(np.concatenate((index.ids, later)), index.bases, (index.blocks[0], new))
+    return ReducedMovements(np.concatenate((reduced.ids, later)), reduced.bases, (reduced.blocks[0], new))
 
 
-def refreshed(store: Store, index: Index) -> Index:
-    """The index brought up to date with the library."""
-    later = _ids_after(store, int(index.ids[-1]))
-    if len(later) > max(_FEW, _GROWN * len(index.blocks[0][0].values)):
-        return open_index(store)
-    return grown(store, index, later) if len(later) else index
+def updated(store: Store, reduced: ReducedMovements) -> ReducedMovements:
+    """The same brought up to date with the library."""
+    later = _ids_after(store, int(reduced.ids[-1]))
+    if len(later) > max(_FEW, _GROWN * len(reduced.blocks[0][0].values)):
+        return open_cache(store)
+    return extended(store, reduced, later) if len(later) else reduced
 
 
 def _ids_after(store: Store, key: int) -> Ids:
@@ -113,30 +113,30 @@ def _size(kind: type[Any], shape: tuple[int, ...]) -> int:
     return -(-int(np.prod(shape)) * np.dtype(kind).itemsize // 64) * 64
 
 
-def _view(store: Store, buffer: Bytes, n: int) -> Index:
+def _arrays_in(store: Store, buffer: Bytes, n: int) -> ReducedMovements:
     """The arrays in a buffer."""
-    arrays, place = [], _HEADER
+    arrays, offset = [], _HEADER
     for kind, shape in _layout(store, n)[0]:
         count = int(np.prod(shape))
-        arrays.append(np.frombuffer(buffer, kind, count, place).reshape(shape))
-        place += _size(kind, shape)
+        arrays.append(np.frombuffer(buffer, kind, count, offset).reshape(shape))
+        offset += _size(kind, shape)
     ids, *rest = arrays
     block = tuple(ReducedFeatures(*rest[r + 1 : r + 4]) for r in range(0, len(rest), 4))
-    return Index(ids, tuple(rest[::4]), (block,))
+    return ReducedMovements(ids, tuple(rest[::4]), (block,))
 
 
 def _fill(store: Store, buffer: Bytes, ids: Ids) -> None:
-    """Write the codes of all movements into a buffer."""
-    index = _view(store, buffer, len(ids))
-    index.ids[:] = ids
+    """Write the reduced features of all movements into a buffer."""
+    reduced = _arrays_in(store, buffer, len(ids))
+    reduced.ids[:] = ids
     sample = ids[evenly_spaced(len(ids), _SAMPLE)]
-    for to, basis in zip(index.bases, fit_bases(_features(store, sample), store.n_dims or 0), strict=True):
+    for to, basis in zip(reduced.bases, fit_bases(_features(store, sample), store.n_dims or 0), strict=True):
         to[:] = basis
     for start in range(0, len(ids), _ROWS):
         rows = slice(start, start + _ROWS)
-        codes = reduce_features(index.bases, _features(store, ids[rows]), store.n_dims or 0)
-        for block, code in zip(index.blocks[0], codes, strict=True):
-            for into, values in zip(block, code, strict=True):
+        some = reduce_features(reduced.bases, _features(store, ids[rows]), store.n_dims or 0)
+        for block, one in zip(reduced.blocks[0], some, strict=True):
+            for into, values in zip(block, one, strict=True):
                 into[rows] = values
 
 
@@ -147,46 +147,53 @@ def _write(store: Store, path: Path, ids: Ids) -> None:
             os.posix_fallocate(file.fileno(), 0, size) if hasattr(os, "posix_fallocate") else file.truncate(size)
         buffer: Any = np.memmap(beside, np.uint8, "r+")
         _fill(store, buffer, ids)
-        header = {**_tie(store, store.version), "n": len(ids), "crc": zlib.crc32(buffer[_HEADER:])}
+        header = {**_validity_key(store, store.version), "n": len(ids), "crc": zlib.crc32(buffer[_HEADER:])}
         text = json.dumps(header).encode()
         buffer[: len(text)] = np.frombuffer(text, np.uint8)
         buffer.flush()
         del buffer
 
 
-def _tie(store: Store, version: int) -> dict[str, Any]:
-    """Key of the cache: the library, its specification, and its history, since a copy may have changed."""
+def _validity_key(store: Store, version: int) -> dict[str, Any]:
+    """Cache validity key: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
         found = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
-    seen = zlib.crc32(json.dumps(store.specification.to_json()).encode())
+    described = zlib.crc32(json.dumps(store.specification.to_json()).encode())
     at = found[0] if found else None
-    return {"format": _FORMAT, "library": store.id, "seen": seen, "dims": store.n_dims, "version": version, "at": at}
+    return {
+        "format": _FORMAT,
+        "library": store.id,
+        "seen": described,
+        "dims": store.n_dims,
+        "version": version,
+        "at": at,
+    }
 
 
-def _load(store: Store, path: Path) -> Index | None:
-    """The index in a file; None if there is no valid one."""
-    if not path.is_file():  # a pipe would keep us waiting
+def _load(store: Store, path: Path) -> ReducedMovements | None:
+    """The reduced features in a file; None if there is no valid one."""
+    if not path.is_file():  # not a pipe, which would block
         return None
     try:
         buffer: Any = np.memmap(path, np.uint8, "r")
         header = json.loads(bytes(buffer[:_HEADER]).rstrip(b"\0"))
-        tie = _tie(store, int(header["version"]))
+        key = _validity_key(store, int(header["version"]))
         n = int(header["n"])
-        fits = all(header[key] == value for key, value in tie.items()) and tie["at"] is not None
+        fits = all(header[name] == value for name, value in key.items()) and key["at"] is not None
         whole = len(buffer) == _HEADER + _layout(store, n)[1] and zlib.crc32(buffer[_HEADER:]) == header["crc"]
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError, sqlite3.Error):
         return None
     if not (fits and whole and n > 0):
         return None
-    index = _view(store, buffer, n)
-    return index if _makes_sense(index) else None
+    reduced = _arrays_in(store, buffer, n)
+    return reduced if _is_plausible(reduced) else None
 
 
-def _makes_sense(index: Index) -> bool:
-    """Whether the values are possible codes: anybody can write a file with the right checksum."""
+def _is_plausible(reduced: ReducedMovements) -> bool:
+    """Whether the values are possible reduced features: anybody can write a file with the right checksum."""
     return (
-        bool((index.ids == np.arange(1, len(index.ids) + 1)).all())
-        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in index.bases)
-        and all(bool(np.isfinite(part).all()) for code in index.blocks[0] for part in code)
-        and all(bool((code.squares >= 0).all() and (code.residual_norms >= 0).all()) for code in index.blocks[0])
+        bool((reduced.ids == np.arange(1, len(reduced.ids) + 1)).all())
+        and all(bool(np.isfinite(P).all()) and np.allclose(P.T @ P, np.eye(P.shape[1])) for P in reduced.bases)
+        and all(bool(np.isfinite(part).all()) for one in reduced.blocks[0] for part in one)
+        and all(bool((one.squares >= 0).all() and (one.residual_norms >= 0).all()) for one in reduced.blocks[0])
     )

@@ -13,10 +13,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.anchoring.clustering.clustering import Clusters
 from kineme.validation import Array
 
 _SHARE = 0.8  # of the movements in each subset
-Clusters = NDArray[np.intp]
 
 
 def subsets(n: int, repeats: int, seed: int) -> Iterator[NDArray[np.intp]]:

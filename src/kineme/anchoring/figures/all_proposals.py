@@ -1,4 +1,4 @@
-"""All proposals on one sheet, numbered, for a person to name."""
+"""All proposals in one figure, numbered, for a person to name."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Compares | None =
     movements : movements
         Those that the proposals were made from.
     proposals : Proposals
-    like : Recognizer, optional
+    like : Recognizer, Comparison or ComparisonSpecification, optional
         Whose invariances to take out.
 
     Raises
@@ -66,7 +66,7 @@ def draw_proposals(movements: Any, proposals: Proposals, like: Compares | None =
 
 
 def _side_by_side(axes: Any, paths: Array) -> None:
-    """Movements that have nothing in common, each in a place of its own."""
+    """Movements that have nothing in common, side by side."""
     n = len(paths)
     columns = int(np.ceil(np.sqrt(n)))
     for k, path in enumerate(paths):

@@ -1,0 +1,113 @@
+"""What is known of the classes, as records: the comparison, the references, a classifier and its calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.compared import nearest, score
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import Described
+from kineme.comparison.fit import fit_comparison, fit_to_references
+from kineme.comparison.references import References
+from kineme.comparison.specification import ComparisonSpecification
+from kineme.comparison.weights import CANDIDATES
+from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.recognition.answer import Answer, answers, known_labels
+from kineme.recognition.classifiers import Classifier, fit_classifier
+from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
+from kineme.validation import Array
+
+
+class FittedRecognizer(Protocol):
+    """A fitted `kineme.Recognizer`, as far as it is asked here."""
+
+    comparison_: Comparison
+    references_: References
+    classifier_: Classifier
+
+    def calibration(self) -> Calibration:
+        """Of the p-values."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class KnownClasses:
+    """What recognizes movements as one of C classes, or as unknown.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    references : References
+        The labeled movements.
+    classifier : Classifier
+    calibration : Calibration
+        Of the p-values.
+    """
+
+    comparison: Comparison
+    references: References
+    classifier: Classifier
+    calibration: Calibration
+
+    def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> list[Answer]:
+        """An answer for each movement, see `kineme.Recognizer.recognize`."""
+        check_error_rate(error_rate)
+        demos = self.comparison.checked(movements)
+        return answers(self.comparison, self.references, self.classifier, self.calibration, demos, error_rate)
+
+
+def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
+    """The records of a fitted recognizer, or those fitted to labeled movements with the defaults of `Recognizer`.
+
+    Raises
+    ------
+    sklearn.exceptions.NotFittedError
+        A recognizer that is not fitted.
+    TrajectoryError
+        Movements without labels.
+    """
+    if hasattr(known, "calibration"):
+        fitted = cast(FittedRecognizer, known)
+        calibration = fitted.calibration()  # first: it refuses a recognizer that is not fitted
+        return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
+    demos = Demonstrations.of(known)
+    labels = check_labels(demos, None)
+    return _known(*fit_comparison(ComparisonSpecification(), demos, labels, candidates=CANDIDATES), "auto")
+
+
+def fit_known_classes(
+    specification: ComparisonSpecification,
+    references: References,
+    weights: str | Sequence[float] = "auto",
+    classifier: str = "auto",
+) -> KnownClasses:
+    """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`."""
+    return _known(*fit_to_references(specification, references, weights), classifier)
+
+
+def _known(comparison: Comparison, references: References, classifier: str) -> KnownClasses:
+    calibration = calibrate(comparison.similarity, references)
+    return KnownClasses(comparison, references, fit_classifier(classifier, comparison, references), calibration)
+
+
+def open_set_labels(
+    known: KnownClasses, described: Described, error_rate: float = 0.05
+) -> tuple[NDArray[np.object_], Array]:
+    """The class of each described movement and its p-values.
+
+    Returns
+    -------
+    labels : ndarray of n labels or None
+        The best class with a p-value above `error_rate`; None, unknown, if there is none.
+    p_values : ndarray of shape (n, C)
+    """
+    check_error_rate(error_rate)
+    similarities, scores = score(known.comparison, known.references, described, nearest, known.classifier.scores)
+    p_values = known.calibration.p_values(similarities, error_rate)
+    return known_labels(known.references.classes, scores, p_values, error_rate), p_values
