@@ -1,6 +1,6 @@
 /* How many terms min(c, |x - y|) in float64 a core adds per second when nothing but the instructions counts.
 
-   gcc -O2 bench/limit_of_truncated_sums.c -o /tmp/limit && /tmp/limit     (a processor with AVX-512)
+   gcc -O2 bench/limit_of_truncated_sums.c -o limit && ./limit     (a processor with AVX-512)
 
    Four independent sums, all on registers; the best of many runs, by processor time. See README.md. */
 #include <stdio.h>
