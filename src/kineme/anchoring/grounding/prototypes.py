@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
 from kineme.comparison.describe import describe
@@ -67,7 +68,7 @@ def prototype(primitives: Primitives, medoid: int | None = None, like: Compares 
     return Prototype(medoid, average(moved(primitives, maps)), maps)
 
 
-def medoid_of(movements: object, like: Compares | None = None) -> int:
+def medoid_of(movements: Any, like: Compares | None = None) -> int:
     """The movement with the largest mean similarity to the others; the first of one or two."""
     described = describe(movements, like)
     if len(described) < 3:
