@@ -16,6 +16,7 @@ from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class Comparison:
         angle = self.procrustes.max_angle
         return ComparisonSpecification(self.representations, self.normalization, self.cutoff, angle, self.mean)
 
-    def checked(self, movements: Any) -> Demonstrations:
+    def checked(self, movements: MovementsLike) -> Demonstrations:
         """The movements as `Demonstrations`.
 
         Raises

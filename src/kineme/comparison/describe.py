@@ -15,6 +15,7 @@ from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
@@ -62,7 +63,7 @@ class Described:
         return Described(tuple(self.blocks[r] for r in representations), self.procrustes, self.mean)
 
 
-def describe(movements: Any, like: Compares | None = None) -> Described:
+def describe(movements: Described | MovementsLike, like: Compares | None = None) -> Described:
     """Describe movements.
 
     Parameters
@@ -120,7 +121,7 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     return Described(blocks, procrustes, like.specification.mean)
 
 
-def feature_rows(movements: Any, specification: ComparisonSpecification) -> tuple[Array, ...]:
+def feature_rows(movements: MovementsLike, specification: ComparisonSpecification) -> tuple[Array, ...]:
     """Smooth movements and describe them: rows (n, d * S) per representation, in double precision."""
     demos = Demonstrations.of(movements)
     rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.representations)

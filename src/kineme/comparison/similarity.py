@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +13,7 @@ from kineme.comparison.specification import Compares
 from kineme.comparison.widths import gap_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array
 
 _TILE_PAIRS = 500_000  # at a time: each representation's kernel is held beside the average
@@ -71,7 +71,9 @@ class AveragedSimilarity:
         return replace(self, widths=factor * self.widths)
 
 
-def similarities(movements: Any, like: Compares | None = None, widths: ArrayLike | None = None) -> Array:
+def similarities(
+    movements: Described | MovementsLike, like: Compares | None = None, widths: ArrayLike | None = None
+) -> Array:
     """The averaged kernel ``K(a, b)`` between all movements, shape (n, n), from 0 to 1 and 1 on the diagonal.
 
     Parameters

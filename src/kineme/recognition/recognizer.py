@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self, overload
 from warnings import warn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -21,6 +21,7 @@ from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representa
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import CANDIDATES
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
@@ -117,7 +118,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self.mean,
         )
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: ArrayLike | None = None) -> Self:
         """Describe and store the demonstrations.
 
         Parameters
@@ -175,17 +176,17 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """Number of dimensions of the movements."""
         return self._fitted[0].n_dims
 
-    def describe(self, X: Any) -> Described:
+    def describe(self, X: MovementsLike) -> Described:
         """Movements described as the stored ones are, ready to be compared with them."""
         comparison, _ = self._fitted
         return describe(comparison.checked(X), comparison)
 
-    def log_similarity(self, X: Any) -> Array:
+    def log_similarity(self, X: MovementsLike) -> Array:
         """Logarithms of the averaged kernel to the stored demonstrations, shape (n, m)."""
         comparison, references = self._fitted
         return comparison.similarity.log_average(self.describe(X), references.described)
 
-    def decision_function(self, X: Any) -> Array:
+    def decision_function(self, X: MovementsLike) -> Array:
         """Score of each class, shape (n, C): larger is more like it. Scales depend on the classifier.
 
         Of two classes, shape (n,): the score of ``classes_[1]`` minus that of ``classes_[0]``.
@@ -193,11 +194,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         scores = self._scores(X)
         return scores[:, 1] - scores[:, 0] if scores.shape[1] == 2 else scores
 
-    def predict(self, X: Any) -> NDArray[Any]:
+    def predict(self, X: MovementsLike) -> NDArray[Any]:
         """The class with the largest score of each movement, shape (n,)."""
         return np.asarray(self.classes_[self._scores(X).argmax(axis=1)])
 
-    def predict_proba(self, X: Any) -> Array:
+    def predict_proba(self, X: MovementsLike) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.
 
         A softmax of the scores, not a calibrated probability; `recognize` gives p-values and states whether they are
@@ -207,15 +208,15 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
-    def score(self, X: Any, y: Any = None, sample_weight: Any = None) -> float:
-        """Share of movements whose class is right; labels `y` are by default those of the demonstrations."""
+    def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:
+        """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
         demos = Demonstrations.of(X)
         return float(super().score(demos, check_labels(demos, y), sample_weight))
 
     @overload
     def recognize(self, X: Trajectory | NDArray[Any], error_rate: float = 0.05) -> Answer: ...
     @overload
-    def recognize(self, X: Demonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
+    def recognize(self, X: HasDemonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
     def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: label or unknown, confidence, and nearest demonstrations.
 
@@ -238,7 +239,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         found = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
         return found[0] if is_one(X) else found
 
-    def p_values(self, X: Any, error_rate: float = 0.05) -> Array:
+    def p_values(self, X: MovementsLike, error_rate: float = 0.05) -> Array:
         """Conformal p-value of each movement for each class, shape (n, C), fine enough to tell `error_rate`.
 
         With one demonstration of each class they are a guess: ``calibration().calibrated(error_rate)`` tells for which
@@ -247,7 +248,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_error_rate(error_rate)
         return self.calibration().p_values(self._score(X, nearest)[0], error_rate)
 
-    def predict_known(self, X: Any, error_rate: float = 0.05) -> NDArray[Any]:
+    def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Labels as from `predict`, among the classes whose p-value is above `error_rate`.
 
         None, for unknown, if no class has a p-value above it.
@@ -257,8 +258,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         p_values = self.calibration().p_values(similarities, error_rate)
         return known_labels(self.classes_, scores, p_values, error_rate)
 
-    def novelty(self, X: Any) -> Array:
-        """Smallest nonconformity to any class, shape (n,): larger for movements less like any known class."""
+    def novelty(self, X: MovementsLike) -> Array:
+        """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
         return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
 
     def calibration(self) -> Calibration:
@@ -268,7 +269,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self._calibration = calibrate(comparison.similarity, references)
         return self._calibration
 
-    def spot(self, recording: Any, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
+    def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
 
         The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all
@@ -296,7 +297,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         comparison, references = self._fitted
         return spot(comparison, references, self.calibration(), recording, error_rate, max_pieces)
 
-    def predict_partial(self, X: Any, early: Early | None = None) -> NDArray[Any]:
+    def predict_partial(self, X: MovementsLike, early: Early | None = None) -> NDArray[Any]:
         """The most likely class of each movement of which only the beginning is given, shape (n,).
 
         Each beginning is compared with the beginnings of every stored movement at many values of progress; see `Early`.
@@ -326,7 +327,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         beginnings = self._beginnings(early)
         return Live(comparison, references, beginnings, Decision(confidence, patience), self.recognize)
 
-    def look_at(self, X: Any) -> Described:
+    def look_at(self, X: MovementsLike) -> Described:
         """Deprecated name of `describe`."""
         warn("Recognizer.look_at is now Recognizer.describe", DeprecationWarning, stacklevel=2)
         return self.describe(X)
@@ -347,14 +348,14 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_is_fitted(self, "comparison_")
         return self.comparison_, self.references_
 
-    def _scores(self, X: Any) -> Array:
+    def _scores(self, X: MovementsLike) -> Array:
         """Score of each class by the classifier, shape (n, C)."""
         return self._score(X, self._classifier_scores)[0]
 
     def _classifier_scores(self, compared: Compared) -> Array:
         return self.classifier_.scores(compared)
 
-    def _score(self, X: Any, *scores: Score) -> tuple[Array, ...]:
+    def _score(self, X: MovementsLike, *scores: Score) -> tuple[Array, ...]:
         """Scores (n, C) by each function; every movement is described once."""
         comparison, references = self._fitted
         return score(comparison, references, comparison.checked(X), *scores)

@@ -19,6 +19,7 @@ from kineme.movements.segmentation.segment import as_recording, moving
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.movements.segmentation.speed_minima import SpeedMinima
 from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.validation import Array, check_count
@@ -31,9 +32,15 @@ _PER_MOVEMENT = 0.5  # cost in typical durations: positive scores from half way 
 
 
 class Spotted(NamedTuple):
-    """One stretch of motion: start and end [s], label (None: no known movement), and confidence.
+    """One stretch of motion: from when to when, what it is (None: unknown), and how sure.
 
-    `confidence` is 1 minus the largest p-value of the other classes, or, for None, of all classes.
+    Attributes
+    ----------
+    start, end : float
+        Time stamps [s].
+    label : label or None
+    confidence : float
+        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
     """
 
     start: float
@@ -46,7 +53,7 @@ def spot(
     comparison: Comparison,
     references: References,
     calibration: Calibration,
-    recording: Any,
+    recording: MovementsLike,
     error_rate: float,
     max_pieces: int,
 ) -> list[Spotted]:

@@ -20,6 +20,7 @@ from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import describe as name_of
 
 Progress = Callable[[int, int], object]
@@ -57,7 +58,7 @@ class LearnReport:
 
 def learn(
     store: Store,
-    movements: Any,
+    movements: MovementsLike,
     labels: Sequence[Any] | None = None,
     source: Source | Sequence[Source | None] | None = None,
     places: Sequence[Any] | None = None,
@@ -196,10 +197,10 @@ def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> li
 
 def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
     """Refuse two movements at one position of a source: the second would count as a copy of the first."""
-    seen: dict[tuple[int, str], int] = {}
+    first_at: dict[tuple[int, str], int] = {}
     for i, (place, source) in enumerate(zip(places, sources, strict=True)):
-        if source is not None and place is not None and seen.setdefault((id(source), str(place)), i) != i:
+        if source is not None and place is not None and first_at.setdefault((id(source), str(place)), i) != i:
             raise TrajectoryError(
                 f"expected a place of its own in {source.path!r} for each movement, got {place!r} for movements "
-                f"{seen[id(source), str(place)]} and {i}; name them apart"
+                f"{first_at[id(source), str(place)]} and {i}; name them apart"
             )

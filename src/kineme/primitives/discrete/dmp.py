@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kineme.movements.preparation.preprocess import check_steps
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.basis import ExponentialPhase, GaussianBasis
 from kineme.primitives.discrete.fits import FITS, REGRESSIONS
 from kineme.primitives.discrete.formulations import FORMULATIONS, Formulation
@@ -105,7 +106,7 @@ class DMP(SpringDamper):
         """The formulation's row in the table."""
         return FORMULATIONS[self.formulation]
 
-    def learn(self, movements: Any) -> Primitives:
+    def learn(self, movements: MovementsLike) -> Primitives:
         """Learn one primitive per movement, all in one matrix product.
 
         Parameters

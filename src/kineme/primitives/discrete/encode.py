@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import even_rows, extents_of, relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.operators import encoder
 from kineme.primitives.discrete.primitives import Primitives
@@ -19,7 +18,7 @@ from kineme.validation import Array, describe
 _TILE_SAMPLES = 200_000  # in one tile: larger ones do not fit the cache, with smaller ones threads wait for each other
 
 
-def encode(dmp: DMP, movements: Any) -> Primitives:
+def encode(dmp: DMP, movements: MovementsLike) -> Primitives:
     """Learn one primitive per movement; see `DMP.learn`."""
     demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
     n, n_dims = len(demos), demos.n_dims

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.encode import check_movement
 from kineme.primitives.rhythmic.cycle import fold
 from kineme.primitives.rhythmic.harmonics import as_real, waves
@@ -27,7 +28,7 @@ _LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
 _ALMOST = 1 - 1e-6
 
 
-def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
+def encode(dmp: RhythmicDMP, movements: MovementsLike) -> RhythmicPrimitives:
     """Learn one limit cycle per movement; see `RhythmicDMP.learn`."""
     demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
     n, n_dims, H = len(demos), demos.n_dims, dmp.n_harmonics

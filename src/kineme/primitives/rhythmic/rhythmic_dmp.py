@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kineme.movements.preparation.preprocess import check_steps
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import MOST_POINTS
 from kineme.primitives.discrete.fits import FITS
 from kineme.primitives.rhythmic.basis import VonMisesBasis
@@ -116,7 +117,7 @@ class RhythmicDMP(SpringDamper):
         """Number of harmonics of the folded cycle: twice as many as the basis functions can represent."""
         return min(self.n_basis, (self.n_points - 1) // 2)
 
-    def learn(self, movements: Any) -> RhythmicPrimitives:
+    def learn(self, movements: MovementsLike) -> RhythmicPrimitives:
         """Learn one limit cycle per movement.
 
         Parameters

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.prefixes import beginnings, smooth_paths
 from kineme.validation import MIN_SAMPLES, Array
@@ -21,7 +22,7 @@ _TILE = 2_000_000  # hypotheses compared at a time
 _N_SAMPLES = 200  # of a whole movement, of which `cut` takes the first
 
 
-def partial_shares(comparison: Comparison, stored: Hypotheses, X: Any) -> Array:
+def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike) -> Array:
     """Share of each class, and, last, of an unknown movement, in the evidence of each beginning: (n, C + 1)."""
     demos = comparison.checked(X)
     step = max(1, _TILE // len(stored.stored.lengths))
@@ -37,7 +38,7 @@ def _shares(stored: Hypotheses, demos: Demonstrations, cutoff: float | None) -> 
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
 
-def cut(movements: Any, fraction: float) -> Demonstrations:
+def cut(movements: MovementsLike, fraction: float) -> Demonstrations:
     """The beginnings of movements until a share of their path's length, at even times."""
     demos = Demonstrations.of(movements)
     if not 0 < fraction <= 1:
@@ -55,13 +56,16 @@ def cut(movements: Any, fraction: float) -> Demonstrations:
 class PredictsPartial(Protocol):
     """A recognizer, or whatever else names movements by their beginnings."""
 
-    def predict_partial(self, X: Any) -> NDArray[Any]:
+    def predict_partial(self, X: MovementsLike) -> NDArray[Any]:
         """The most likely class of each beginning, shape (n,)."""
         ...
 
 
 def earliness(
-    recognizer: PredictsPartial, X: Any, y: Any = None, fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0)
+    recognizer: PredictsPartial,
+    X: MovementsLike,
+    y: ArrayLike | None = None,
+    fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0),
 ) -> Array:
     """Share of movements recognized after each fraction of their path, shape (len(fractions),)."""
     demos = Demonstrations.of(X)
