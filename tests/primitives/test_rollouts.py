@@ -101,7 +101,13 @@ def test_it_goes_in_wherever_movements_are_expected(kind, rollout):
     assert rollout.trajectories is rollout.demonstrations
     assert np.asarray(rollout).shape == rollout.positions.shape
     again = {"discrete": kineme.DMP(), "rhythmic": kineme.RhythmicDMP(aperiodic="accept"), "poses": PoseDMP()}[kind]
-    assert len(again.learn(rollout.demonstrations)) == len(again.learn(list(rollout))) == 3
+    assert len(again.learn(rollout)) == len(again.learn(list(rollout))) == 3
+
+
+def test_a_recognizer_takes_it():
+    primitives = discrete()
+    recognizer = kineme.Recognizer().fit(primitives.rollout())
+    assert recognizer.predict(primitives.rollout(duration=2.0)).tolist() == ["a", "b", "a"]
 
 
 def test_it_has_a_picture(kind, rollout):

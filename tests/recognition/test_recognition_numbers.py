@@ -201,3 +201,32 @@ def test_beyond_four_thousand_demonstrations_memory_stays_linear():
     assert choose(np.full(400, 11)) == "nearest"
     assert choose(np.array([8, 8])) == "svm"
     assert choose(np.array([8, 7])) == "nearest"
+
+
+def test_the_svm_lets_no_movement_between_two_classes_decide_alone():
+    """Where a movement of one class is a copy of another's, multipliers end at 1000."""
+    demos = draw_shapes([8, 8], seed=2, spread=0.6)
+    arrays = [one.positions for one in demos]
+    recognizer = Recognizer(classifier="svm").fit([*arrays, arrays[0]], [*demos.labels, demos.labels[-1]])
+    multipliers = np.abs(recognizer.classifier_.model.dual_coef_)
+    assert multipliers.max() == pytest.approx(1000.0)
+
+
+def test_copies_under_two_names_say_nothing_of_how_far_classes_are_apart():
+    """Rounding alone tells a copy that was moved and sized from the original: nearer than a thousandth is the same."""
+    shapes = [one.positions for one in draw_shapes([1] * 12, seed=3)]
+    plain = Recognizer().fit(shapes, range(12))
+    copied = Recognizer().fit([*shapes, *(1e3 * x / 7.0 + 5.0 for x in shapes[:8])], range(20))
+    assert (copied.widths_ > 0.5 * plain.widths_).all()
+
+
+def test_a_movement_that_explains_a_beginning_does_so_at_one_in_twenty_values_of_progress():
+    """Two of forty perfect ones are evidence 1; unknown is as far as an impostor, and three typical differences off."""
+    recognizer = Recognizer().fit(draw_shapes([1, 1]))
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    evidence = np.full((1, 80), -np.inf)
+    evidence[0, :2] = 0.0
+    known, other, unknown = stored.log_classes(evidence)[0]
+    assert known == pytest.approx(0.0)
+    assert other == -np.inf
+    assert unknown == pytest.approx(-0.5 / 0.35**2 - 1.5)

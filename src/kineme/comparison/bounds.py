@@ -82,7 +82,7 @@ def reduce_features(
 def log_bounds(
     similarity: AveragedSimilarity, asked: tuple[ReducedFeatures, ...], stored: tuple[ReducedFeatures, ...]
 ) -> Single:
-    """Numbers (n, m) that the logarithms of the averaged kernel do not exceed.
+    """Upper bounds (n, m) of the logarithms of the averaged kernel.
 
     With ``x = P y + e``, and R a rotation within the limit, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
     ``d^2 >= |x_a|^2 + |x_b|^2 - 2 (max_R <y_a, R y_b> + |e_a| |e_b|)``, and an A-average grows with each kernel.
@@ -114,7 +114,7 @@ def log_bounds(
 
 
 def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
-    """Largest inner products (m, n) of reduced features after rotation; in space, numbers that are not below them."""
+    """Largest inner products (m, n) of reduced features after rotation; in space, upper bounds of them."""
     d, n = procrustes.n_dims, len(A)
     if procrustes.max_angle == 0 or d == 1:
         return np.asarray(B @ A.T)

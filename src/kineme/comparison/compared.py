@@ -38,7 +38,7 @@ class Compared:
     def __len__(self) -> int:
         return len(self.described)
 
-    def knowing(self, squares: Array) -> Compared:
+    def with_squares(self, squares: Array) -> Compared:
         """The same with `squares` that were computed before."""
         known = replace(self)
         vars(known)["squares"] = squares

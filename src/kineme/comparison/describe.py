@@ -63,7 +63,7 @@ class Described:
         return Described(tuple(self.blocks[r] for r in representations), self.procrustes, self.mean)
 
 
-def describe(movements: MovementsLike | Described, like: Compares | None = None) -> Described:
+def describe(movements: Described | MovementsLike, like: Compares | None = None) -> Described:
     """Describe movements.
 
     Parameters

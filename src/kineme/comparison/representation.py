@@ -21,6 +21,9 @@ QUANTITIES = ("positions", "forcing")
 class Representation:
     """One way to describe an evenly sampled, smooth path by a row of numbers.
 
+    A recognizer compares movements in several representations and averages the similarities: what misleads one of them,
+    such as uneven timing or a deformed path, leaves another one unimpaired.
+
     Parameters
     ----------
     quantity : {"positions", "forcing"}
@@ -61,8 +64,8 @@ class Representation:
     def along(self, paths: Array) -> Array:
         """Paths (n, d, T) at even values of the phase, (n, d, n_points)."""
         if self.arc_share == 0:
-            every, rest = divmod(paths.shape[2] - 1, self.n_points - 1)
-            return paths[:, :, ::every] if rest == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
+            every, remainder = divmod(paths.shape[2] - 1, self.n_points - 1)
+            return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
     def describe(self, paths: Array, translation: bool = True) -> Array:
@@ -96,7 +99,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
     if not given or not all(isinstance(one, Representation) for one in given):
         raise SpecificationError(
             "expected representations to be a tuple of kineme.comparison.representation.Representation, one or more, "
-            f"or None for the usual ones, got {representations!r}"
+            f"or None for the default ones, got {representations!r}"
         )
     return given
 

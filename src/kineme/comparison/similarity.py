@@ -72,7 +72,7 @@ class AveragedSimilarity:
 
 
 def similarities(
-    movements: MovementsLike | Described, like: Compares | None = None, widths: ArrayLike | None = None
+    movements: Described | MovementsLike, like: Compares | None = None, widths: ArrayLike | None = None
 ) -> Array:
     """The averaged kernel ``K(a, b)`` between all movements, shape (n, n), from 0 to 1 and 1 on the diagonal.
 

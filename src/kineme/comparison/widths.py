@@ -89,7 +89,9 @@ def gap_widths(described: Described) -> Array:
     """
     n = len(described)
     if n < 3:
-        raise SpecificationError(f"expected at least 3 movements to tell kinds apart without labels, got {n}; add some")
+        raise SpecificationError(
+            f"expected at least 3 movements to tell classes apart without labels, got {n}; add some"
+        )
     chosen = evenly_spaced(n, _ROWS)
     widths = []
     for r, block in enumerate(described.blocks):

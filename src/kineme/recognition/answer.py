@@ -53,13 +53,15 @@ class Answer:
     label : label or None
         The best-ranked class whose p-value is above the error rate; None if there is none: unknown.
     confidence : float
-        1 minus the largest p-value of the other classes, or, if unknown, of all classes
-        (Vovk et al. 2005, section 3.4).
+        1 minus the largest p-value of what was not answered: of the other classes, or, if unknown, of all (Vovk et al.
+        2005, section 3.4). At 0.95 no other answer has a p-value above 0.05; it is low where another class fits the
+        movement too.
     p_values : mapping from label to float
-        Share of members of the class that would be at least as far from it; see `Calibration`.
+        Share of the members of the class that would be as far from their nearest demonstration, or farther; see
+        `Calibration`.
     calibrated : bool
-        Whether enough demonstrations were left out and scored, for every class compared with, that the error rate is
-        kept. If not, as with one demonstration of each class, p-values and confidence are a guess.
+        Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`. If not,
+        as with one demonstration of each class, p-values and confidence are a guess.
     ranked : tuple of labels
         Best first, in the order of the classifier.
     nearest : tuple of Neighbor
@@ -126,7 +128,7 @@ def answers_to(
     error_rate: float,
 ) -> list[Answer]:
     """An answer for each movement of a tile that was compared; `paths` (n, d, T) are where they were recorded."""
-    verdicts = judge(compared, classifier, calibration, error_rate)
+    verdicts = verdicts_of(compared, classifier, calibration, error_rate)
     return with_transforms(verdicts, compared.comparison, compared.references.demonstrations, demos, paths)
 
 
@@ -142,7 +144,9 @@ class Verdict(NamedTuple):
     responsibilities: Mapping[str, float]
 
 
-def judge(compared: Compared, classifier: Classifier, calibration: Calibration, error_rate: float) -> list[Verdict]:
+def verdicts_of(
+    compared: Compared, classifier: Classifier, calibration: Calibration, error_rate: float
+) -> list[Verdict]:
     """What each movement is, from how it compares."""
     scores = classifier.scores(compared)
     p = calibration.p_values(compared.nearest, error_rate)

@@ -64,11 +64,20 @@ class Calibration:
     known; s_c is then set so that the law reaches 0.05 at six tenths of the median distance from a demonstration to
     the nearest other class: where a movement is half way to an impostor in two of three representations and
     nowhere near in the third.
+
+    Attributes
+    ----------
+    scales : ndarray of shape (C,)
+        The s_c.
+    own : tuple of C ndarrays
+        Of each class, the scores of its demonstrations.
+    pooled : tuple of C ndarrays
+        For each class, the scores of all demonstrations, each scored against as many as the class has.
     """
 
-    scales: Array  # (C,)
-    own: tuple[Array, ...]  # per class, scores of its demonstrations
-    pooled: tuple[Array, ...]  # per class, scores of all, seeing as many demonstrations as the class has
+    scales: Array
+    own: tuple[Array, ...]
+    pooled: tuple[Array, ...]
 
     def scores(self, nearest: Array) -> Array:
         """Nonconformity (n, C) of movements whose log similarity to each class's nearest demonstration is given."""
@@ -136,15 +145,15 @@ def typical_scale(impostors: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ClassDistances:
-    """Distances (k, n) of k calibrating demonstrations, at `places`, to the n demonstrations of their class."""
+    """Distances (k, n) of k calibrating demonstrations, at `indices`, to the n demonstrations of their class."""
 
     distances: Array
-    places: NDArray[np.intp]
+    indices: NDArray[np.intp]
 
     def nearest(self, size: int) -> tuple[Array, Array, NDArray[np.intp]]:
         """Distance to the nearest and second nearest of the next `size` others, in a circle, and which is nearest."""
         k, n = self.distances.shape
-        later = (np.arange(n) - self.places[:, None]) % n
+        later = (np.arange(n) - self.indices[:, None]) % n
         within = np.where(later <= size, self.distances, np.inf)
         order = np.sort(within, axis=1)
         return order[:, 0], order[:, 1] if n > 1 else np.full(k, np.inf), within.argmin(axis=1)
@@ -152,13 +161,13 @@ class ClassDistances:
     def left_out(self, size: int) -> Array:
         """Distances (k, k) to the nearest, row i as if demonstration i did not exist; NaN where there is none."""
         first, second, which = self.nearest(size)
-        without = np.where(which[None, :] == self.places[:, None], second, first)
+        without = np.where(which[None, :] == self.indices[:, None], second, first)
         np.fill_diagonal(without, np.inf)
         return np.where(np.isfinite(without), without, np.nan)
 
 
 def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> tuple[Array, Array]:
-    """Scales of all classes and scores of all demonstrations, each seeing `size` others of its class at most."""
+    """Scales of all classes and scores of all demonstrations, each against at most `size` others of its class."""
     several = [block for block in blocks if len(block.distances) > 1]
     if not several:
         return np.full(len(blocks), typical), np.empty(0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self, overload
 from warnings import warn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -21,7 +21,7 @@ from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representa
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import CANDIDATES
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
@@ -118,7 +118,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self.mean,
         )
 
-    def fit(self, X: MovementsLike, y: Any = None) -> Self:
+    def fit(self, X: MovementsLike, y: ArrayLike | None = None) -> Self:
         """Describe and store the demonstrations.
 
         Parameters
@@ -208,16 +208,16 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         shares = np.exp(scores - scores.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
-    def score(self, X: MovementsLike, y: Any = None, sample_weight: Any = None) -> float:
-        """Share of movements whose class is right; labels `y` are by default those of the demonstrations."""
+    def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:
+        """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
         demos = Demonstrations.of(X)
         return float(super().score(demos, check_labels(demos, y), sample_weight))
 
     @overload
     def recognize(self, X: Trajectory | NDArray[Any], error_rate: float = 0.05) -> Answer: ...
     @overload
-    def recognize(self, X: Demonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
-    def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
+    def recognize(self, X: HasDemonstrations | Sequence[Any], error_rate: float = 0.05) -> list[Answer]: ...
+    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: label or unknown, confidence, and nearest demonstrations.
 
         Parameters
@@ -235,7 +235,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """
         check_error_rate(error_rate)
         comparison, references = self._fitted
-        demos = comparison.checked(X)
+        demos = comparison.checked([X] if is_one(X) else X)
         found = answers(comparison, references, self.classifier_, self.calibration(), demos, error_rate)
         return found[0] if is_one(X) else found
 
@@ -259,7 +259,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return known_labels(self.classes_, scores, p_values, error_rate)
 
     def novelty(self, X: MovementsLike) -> Array:
-        """Smallest nonconformity to any class, shape (n,): larger for movements less like any known class."""
+        """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
         return np.asarray(self.calibration().scores(self._score(X, nearest)[0]).min(axis=1))
 
     def calibration(self) -> Calibration:
@@ -269,7 +269,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self._calibration = calibrate(comparison.similarity, references)
         return self._calibration
 
-    def spot(self, recording: MovementsLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
+    def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
 
         The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all

@@ -64,11 +64,11 @@ def _measured(
             _proposed(similarity, stored, int(c), rows[:most]) for c, rows in zip(chosen, shuffled, strict=True)
         ]
         described = stored.described(similarity, np.concatenate([*shuffled, *(rows.ravel() for rows in proposed)]))
-        place, later = 0, sum(map(len, shuffled))
+        begin, later = 0, sum(map(len, shuffled))
         for c, rows, more in zip(chosen, shuffled, proposed, strict=True):
-            own = described.take(slice(place, place + len(rows)))
+            own = described.take(slice(begin, begin + len(rows)))
             others = described.take(slice(later, later + more.size))
-            place, later = place + len(rows), later + more.size
+            begin, later = begin + len(rows), later + more.size
             k = min(most, len(rows))
             asked = own.take(slice(0, k))
             away = distances(similarity.log_average(asked, own))
@@ -76,9 +76,9 @@ def _measured(
             nearest = away[:, k:].min(axis=1, initial=np.inf)
             if more.size:
                 nearest = np.minimum(nearest, _to_own(similarity, asked, others))
-            places = np.arange(k)
+            indices = np.arange(k)
             whole = np.column_stack((away[:, :k], nearest)) if len(rows) > k else away
-            yield int(c), ClassDistances(away, places), ClassDistances(whole, places)
+            yield int(c), ClassDistances(away, indices), ClassDistances(whole, indices)
 
 
 def _to_own(similarity: AveragedSimilarity, asked: Described, others: Described) -> Array:

@@ -32,9 +32,15 @@ _PER_MOVEMENT = 0.5  # cost in typical durations: positive scores from half way 
 
 
 class Spotted(NamedTuple):
-    """One stretch of motion: start and end [s], label (None: no known movement), and confidence.
+    """One stretch of motion: from when to when, what it is (None: unknown), and how sure.
 
-    `confidence` is 1 minus the largest p-value of the other classes, or, for None, of all classes.
+    Attributes
+    ----------
+    start, end : float
+        Time stamps [s].
+    label : label or None
+    confidence : float
+        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
     """
 
     start: float

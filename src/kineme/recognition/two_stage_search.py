@@ -16,7 +16,7 @@ from kineme.comparison.describe import Described, describe_tile, recorded_paths
 from kineme.comparison.references import References
 from kineme.comparison.stored import HeldReferences, OnDemand, Rows, StoredReferences
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.answer import Answer, Verdict, judge, with_transforms
+from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate, distances
 from kineme.validation import Array
@@ -77,10 +77,10 @@ class TwoStageSearch:
         held.described(self.stored.members[np.unique(np.concatenate([self._promising(one) for one in bounds]))])
         found = []
         for i in range(len(described)):
-            places, _, compared = self.compare(described.take(slice(i, i + 1)), bounds[i], held)
-            owners = np.searchsorted(self.stored.first, places, side="right") - 1
-            verdict = judge(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
-            rows = self.stored.members[places]
+            chosen, _, compared = self.compare(described.take(slice(i, i + 1)), bounds[i], held)
+            owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
+            verdict = verdicts_of(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
+            rows = self.stored.members[chosen]
             near = tuple(replace(other, index=int(rows[other.index])) for other in verdict.nearest)
             found.append(verdict._replace(nearest=near))
         return found
@@ -102,14 +102,14 @@ class TwoStageSearch:
         class found so far or, in a class not compared with yet, than the nearest of all.
         """
         held = held or HeldReferences(self.stored, self.comparison.similarity)
-        places = self._promising(bounds)
-        squares, logs = self._exact(one, held.described(self.stored.members[places]))
+        chosen = self._promising(bounds)
+        squares, logs = self._exact(one, held.described(self.stored.members[chosen]))
         near = np.full(len(self.classes), logs.max())
-        owners = np.searchsorted(self.stored.first, places, side="right") - 1
+        owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         begins = np.flatnonzero(np.diff(owners, prepend=-1))
         near[owners[begins]] = np.maximum.reduceat(logs, begins)
         doubtful = bounds > np.repeat(near, self.stored.counts)
-        doubtful[places] = False
+        doubtful[chosen] = False
         more = np.flatnonzero(doubtful)
         decisive = int(np.count_nonzero(bounds[more] > logs.max()))
         n_more = min(decisive, _MOST) + _OF_CLASSES
@@ -117,11 +117,11 @@ class TwoStageSearch:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])
         if len(more):
             others, other_logs = self._exact(one, held.described(self.stored.members[more]))
-            places = np.concatenate((places, more))
-            order = np.argsort(places, kind="stable")
+            chosen = np.concatenate((chosen, more))
+            order = np.argsort(chosen, kind="stable")
             squares = np.concatenate((squares, others), axis=2)[:, :, order]
-            places, logs = places[order], np.concatenate((logs, other_logs))[order]
-        return places, logs, self._compared(one, held, places).knowing(squares)
+            chosen, logs = chosen[order], np.concatenate((logs, other_logs))[order]
+        return chosen, logs, self._compared(one, held, chosen).with_squares(squares)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
@@ -142,10 +142,10 @@ class TwoStageSearch:
         squares = self.comparison.similarity.squared_distances(one, others)
         return squares, LOG_MEANS[self.comparison.mean](self.comparison.similarity.logs_at(squares))[0]
 
-    def _compared(self, one: Described, held: HeldReferences, places: Rows) -> Compared:
+    def _compared(self, one: Described, held: HeldReferences, chosen: Rows) -> Compared:
         """One movement and the members that it is compared with."""
-        rows = self.stored.members[places]
-        owners = np.searchsorted(self.stored.first, places, side="right") - 1
+        rows = self.stored.members[chosen]
+        owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         demonstrations = OnDemand(rows, self.stored.movements)
         references = References.of(demonstrations, held.described(rows), self.classes[owners])
         return Compared(self.comparison, references, one)

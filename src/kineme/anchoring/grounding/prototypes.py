@@ -68,7 +68,7 @@ def prototype(primitives: Primitives, medoid: int | None = None, like: Compares 
     return Prototype(medoid, average(moved(primitives, maps)), maps)
 
 
-def medoid_of(movements: MovementsLike | Described, like: Compares | None = None) -> int:
+def medoid_of(movements: Described | MovementsLike, like: Compares | None = None) -> int:
     """The movement with the largest mean similarity to the others; the first of one or two."""
     described = describe(movements, like)
     if len(described) < 3:

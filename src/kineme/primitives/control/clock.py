@@ -39,35 +39,35 @@ class Clock:
 
     The phase is normalized time u; that of a rhythm counts from `begin` and stays below 1, so that it is as exact after
     a million periods as in the first.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    u : float
+        The phase, of a rhythm within its period.
+    progress : float
+        The phase since the start.
     """
 
-    __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns")
+    __slots__ = ("_begin", "_periodic", "_phase", "_seconds", "_turns", "progress", "time", "u")
 
     def __init__(self, begin: float, periodic: bool) -> None:
         self._seconds, self._phase = RunningSum(), RunningSum(begin)
         self._begin, self._periodic, self._turns = begin, periodic, 0
+        self.time, self.u, self.progress = 0.0, begin, 0.0
 
     def add_time(self, dt: float) -> None:
         """Let dt [s] pass."""
         self._seconds.add(dt)
+        self.time = self._seconds.value
 
     def add_phase(self, du: float) -> None:
         """Let the phase go on by du."""
         self._phase.add(du)
-        if self._periodic and self._phase.value >= 1.0:
-            self._turns += self._phase.take_whole()
-
-    @property
-    def time(self) -> float:
-        """Seconds since the start."""
-        return self._seconds.value
-
-    @property
-    def u(self) -> float:
-        """The phase, of a rhythm within its period."""
-        return self._phase.value
-
-    @property
-    def progress(self) -> float:
-        """The phase since the start."""
-        return self._turns + self._phase.value - self._begin if self._periodic else self._phase.value
+        self.u = self.progress = self._phase.value
+        if self._periodic:
+            if self.u >= 1.0:
+                self._turns += self._phase.take_whole()
+                self.u = self._phase.value
+            self.progress = self._turns + self.u - self._begin

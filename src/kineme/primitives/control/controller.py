@@ -66,7 +66,8 @@ class Controller:
             )
         check_number("dt", dt, above=0.0)
         self.dt, self.options = float(dt), options
-        self._plan, self._n_dims, self._tau, self._origin = plan, plan.n_dims, plan.duration, plan.origin
+        self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
+        self._set_tau(plan.duration)
         if not self._fits(self.dt):
             most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
             raise SpecificationError(f"expected dt of at most {most} {self._tau:g} s, got {dt!r} s")
@@ -82,7 +83,7 @@ class Controller:
         plan = self._plan
         self._goal = MovingGoal(plan, plan.goal, self.options.goal_filter)
         self._clock = Clock(plan.begin, plan.periodic)
-        self._tau = plan.duration
+        self._set_tau(plan.duration)
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events = _NOTHING
@@ -178,9 +179,9 @@ class Controller:
     def _fits(self, dt: float) -> bool:
         return _SHORTEST * self._tau <= dt <= self._longest
 
-    @property
-    def _longest(self) -> float:
-        return self._tau * self._plan.longest_step
+    def _set_tau(self, tau: float) -> None:
+        """The duration of u = 1, and with it the longest step."""
+        self._tau, self._longest = tau, tau * self._plan.longest_step
 
     def _measure(self, position: Any, velocity: Any) -> None:
         """Go on from what was measured, or let its distance slow the phase."""

@@ -71,5 +71,7 @@ class MovingGoal(FilteredValue):
 
     def follow(self, dt: float) -> tuple[Array, Array]:
         """Go on by dt; returns the mean of the goal in force meanwhile and the ratio that belongs to it."""
+        if self.lag is None:
+            return self.target, self._ratio
         mean = self.mean(dt)
-        return mean, self._ratio if mean is self.target else self._plan.ratio(mean)
+        return mean, self._plan.ratio(mean)

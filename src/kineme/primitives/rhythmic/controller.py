@@ -113,7 +113,7 @@ class RhythmicController(Controller):
         motion[1] *= period / self._tau  # the velocity in time stays
         self._motion = motion
         self._rate *= self._tau / period
-        self._tau = period
+        self._set_tau(period)
 
     def _follow(self, dt: float) -> tuple[Array, Array]:
         goal, ratio = super()._follow(dt)

@@ -47,7 +47,7 @@ class BoundedPath:
         self._count, self.per_row = even // 2, 2 * self.per_row
 
     def kept(self) -> Array:
-        """Times and positions (k, 1 + d); a view, valid until the next sample."""
+        """Times and positions (k, 1 + d); they share memory, and are valid until the next sample."""
         if self.last is None or self.per_row == 1:
             return self._rows[: self._count]
         if self._count and self._rows[self._count - 1, 0] >= self.last[0]:

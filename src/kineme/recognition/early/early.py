@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.errors import SpecificationError
@@ -62,7 +62,10 @@ class PredictsPartial(Protocol):
 
 
 def earliness(
-    recognizer: PredictsPartial, X: MovementsLike, y: Any = None, fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0)
+    recognizer: PredictsPartial,
+    X: MovementsLike,
+    y: ArrayLike | None = None,
+    fractions: Sequence[float] = (0.3, 0.5, 0.7, 1.0),
 ) -> Array:
     """Share of movements recognized after each fraction of their path, shape (len(fractions),)."""
     demos = Demonstrations.of(X)

@@ -45,7 +45,7 @@ class Guess(NamedTuple):
 
 
 class LiveState(NamedTuple):
-    """A movement in progress. Where there is nothing to say yet, numbers are NaN and arrays empty or None.
+    """A movement in progress. Where there is nothing to say yet, floats are NaN, tuples empty and arrays None.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ _WHOLE = np.ones(1)
 class Live:
     """Follow one movement, sample by sample; `Recognizer.stream` makes it.
 
-    Each update compares all that has been seen with the beginnings of every stored movement, at a cost that does not
+    Each update compares the movement so far with the beginnings of every stored movement, at a cost that does not
     depend on how long the stream has been running. Nothing that arrives raises; what cannot be used is skipped,
     counted and flagged. Up to 4096 samples are kept as they came, more as averages, so memory is bounded.
     """
@@ -55,8 +55,8 @@ class Live:
     def _rehearse(self) -> None:
         """Recognize a stored movement once: loading code on first use would delay the stream by 0.3 s."""
         load_compiled()
-        known = self._references.demonstrations[np.zeros(1, dtype=np.intp)]
-        self.update(known.times, known.positions)
+        example = self._references.demonstrations[np.zeros(1, dtype=np.intp)]
+        self.update(example.times, example.positions)
         self.reset()
 
     def reset(self) -> None:
