@@ -199,7 +199,7 @@ def _report_text(data: dict[str, Any]) -> str:
 
     rows = [
         (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""), f"{one['duration']:.3g}",
-         _place(one["start"], one), _place(one["goal"], one))
+         _point(one["start"], one), _point(one["goal"], one))
         for one in data["members"]
     ]  # fmt: skip
     head = f"{printable(data['name'])}  {data['id']}"
@@ -208,7 +208,7 @@ def _report_text(data: dict[str, Any]) -> str:
     return to_text(Table(head, ("movement", "name", "file", "duration [s]", "start", "goal"), rows))
 
 
-def _place(point: list[float], member: dict[str, Any]) -> str:
+def _point(point: list[float], member: dict[str, Any]) -> str:
     """A point as text; values within single precision of zero are zero."""
     least = 1e-6 * max(map(abs, [*member["start"], *member["goal"]]))
     return ", ".join(f"{x if abs(x) > least else 0:.4g}" for x in point)

@@ -20,15 +20,15 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
     """
     files: list[Path] = []
     problems: list[Problem] = []
-    seen: set[tuple[int, int]] = set()
+    visited: set[tuple[int, int]] = set()
     folders, links = deque([folder]), deque[Path]()
     while folders or links:
         here = folders.popleft() if folders else links.popleft()
         try:
             known = here.stat()
-            if (known.st_dev, known.st_ino) in seen:
+            if (known.st_dev, known.st_ino) in visited:
                 continue
-            seen.add((known.st_dev, known.st_ino))
+            visited.add((known.st_dev, known.st_ino))
             entries = sorted((one for one in os.scandir(here) if not one.name.startswith(".")), key=lambda e: e.name)
         except OSError as error:
             problems.append(Problem(as_text(here.relative_to(folder)), None, f"the folder cannot be listed, {error}"))

@@ -19,7 +19,7 @@ class Table(NamedTuple):
     reading: str = ""
 
 
-def spread(values: Sequence[float]) -> str:
+def mean_and_range(values: Sequence[float]) -> str:
     """Mean and range over draws, as ``0.954 (0.89-1.00)``."""
     return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
 

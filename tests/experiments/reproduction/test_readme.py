@@ -11,7 +11,7 @@ import pytest
 from kineme.experiments.reproduction import paper
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.experiments.reproduction.tables import make_tables
-from kineme.output.table import spread
+from kineme.output.table import mean_and_range
 
 README = " ".join((Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8").split())
 
@@ -78,7 +78,7 @@ def test_readme_says_what_the_truncated_kernel_reaches(default_draws):
     printed = paper.SVM_TRE["bio-inspired", "f(t)"]
     assert min(reached) <= printed <= max(reached)
     assert f"Its {printed} on bio-inspired f(t) lies within the draws of one reading" in README
-    assert f"f(t) as the whole shape-attractor term of Eq. (4): {spread(reached)}" in README
+    assert f"f(t) as the whole shape-attractor term of Eq. (4): {mean_and_range(reached)}" in README
 
 
 def test_readme_says_how_low_the_truncated_kernel_comes_on_weights(default_draws):

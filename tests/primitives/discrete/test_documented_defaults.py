@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -11,6 +13,7 @@ from kineme import DMP, DegenerateMovementError, DegenerateMovementWarning, DMPF
 from kineme.cli import main
 from kineme.library.storage.specification import Specification
 from kineme.orientation import PoseDMP
+from kineme.primitives.persistence import specification_from_dict, specification_to_dict
 
 
 def test_the_path_is_fitted_with_forty_functions():
@@ -27,6 +30,13 @@ def test_the_command_line_takes_the_same(tmp_path):
     arguments = ["generate", files["x.csv"], "--save", files["x.kineme"], "-o", files["y.csv"]]
     assert CliRunner().invoke(main, arguments).exit_code == 0
     assert kineme.Primitives.load(tmp_path / "x.kineme").dmp == DMP()
+
+
+def test_what_is_saved_names_every_field():
+    """A file opens with the specification that it was learned with, whatever the defaults are by then."""
+    saved = specification_to_dict(DMP(fit="forcing", n_basis=80))
+    assert list(saved) == [field.name for field in fields(DMP)]
+    assert specification_from_dict(DMP, saved) == DMP(fit="forcing", n_basis=80)
 
 
 def test_the_numbers_of_the_paper_are_the_defaults():

@@ -11,7 +11,7 @@ from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.results import Results
 from kineme.movements.trajectories.demonstrations import require_labels
 from kineme.output.page import page, picture
-from kineme.output.table import Table, spread, to_html
+from kineme.output.table import Table, mean_and_range, to_html
 from kineme.output.text import in_markup
 
 _MEASURES = {"accuracy": "accuracy", "auroc": "AUROC", "rejected": "unknown rejected"}
@@ -51,7 +51,7 @@ def _columns(protocol: str, results: Results) -> list[tuple[Any, str]]:
 def _cell(values: list[float] | None, n_columns: int) -> str:
     if not values:
         return "-"
-    return spread(values) if n_columns <= 6 else f"{sum(values) / len(values):.3f}"
+    return mean_and_range(values) if n_columns <= 6 else f"{sum(values) / len(values):.3f}"
 
 
 def rivals_ahead(protocol: str, results: Results) -> str:

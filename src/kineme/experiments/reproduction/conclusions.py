@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean
 from typing import NamedTuple
 
-from kineme.output.table import spread
+from kineme.output.table import mean_and_range
 
 #: Column -> the accuracy of each draw.
 ByColumn = Mapping[str, Sequence[float]]
@@ -131,7 +131,7 @@ def read_conventions(accuracies: Sequence[Printed]) -> str:
         found = [feature for feature, values in conventions.items() if inside(value, values)]
         off = {feature: abs(fmean(values) - value) for feature, values in conventions.items()}
         chosen = found or [feature for feature in off if off[feature] - min(off.values()) <= _DIGITS]
-        shown = " or ".join(f"{feature}: {spread(conventions[feature])}" for feature in chosen)
+        shown = " or ".join(f"{feature}: {mean_and_range(conventions[feature])}" for feature in chosen)
         (within if found else others).append(f"{name}, {value:.3f} [{shown}]")
     sentences = [f"Within the draws of a convention: {listed(within)}."] if within else []
     sentences += [f"Of none, with the nearest: {listed(others)}."] if others else []

@@ -14,7 +14,7 @@ from kineme.experiments.reproduction.conclusions import (
     read_perfect,
 )
 from kineme.experiments.reproduction.representations import REPRESENTATIONS
-from kineme.output.table import Table, spread
+from kineme.output.table import Table, mean_and_range
 
 _PAPER_SAYS = (
     'The paper says "f(t)" for what Eqs. (1) and (4) call f and for the shape-attractor, and prints neither gating nor '
@@ -29,7 +29,7 @@ def diagnosis(draws: Draws) -> Table:
             row.formula,
             row.formulation,
             row.quantity,
-            spread(over(draws, "nearest", row.key)),
+            mean_and_range(over(draws, "nearest", row.key)),
             f"{paper.NEAREST_NEIGHBOR[row.formulation, row.quantity]:.3f}",
             f"{np.median(over(draws, 'distance', row.key)):.2g}",
             f"{paper.KERNELS[row.formulation, row.quantity].rbf.sigma:.2g}",
@@ -82,7 +82,7 @@ def svm_diagnosis(draws: Draws) -> Table:
                 text
                 for name in KERNELS
                 for text in (
-                    spread(over(draws, "svm", f"{row.key}/{name}/paper")),
+                    mean_and_range(over(draws, "svm", f"{row.key}/{name}/paper")),
                     f"{PRINTED[name][row.formulation, row.quantity]:.3f}",
                 )
             ),
@@ -115,6 +115,6 @@ def penalty(draws: Draws) -> Table:
     return Table(
         "Diagnosis. Why an SVM can land at 1/9: the penalty C, shape-attractor, original, median widths",
         ("", *(f"C = {C:g}" for C in paper.PENALTIES)),
-        [(kernel, *map(spread, by_penalty.values())) for kernel, by_penalty in accuracies.items()],
+        [(kernel, *map(mean_and_range, by_penalty.values())) for kernel, by_penalty in accuracies.items()],
         f"{read_penalty(accuracies, at_bound, len(paper.COUNTS))} The tables above use C = {paper.PENALTY:g}.",
     )

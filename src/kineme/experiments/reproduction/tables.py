@@ -30,7 +30,7 @@ from kineme.experiments.reproduction.conclusions import (
 )
 from kineme.experiments.reproduction.diagnosis import diagnosis, penalty, svm_diagnosis
 from kineme.experiments.reproduction.representations import READINGS
-from kineme.output.table import Table, spread
+from kineme.output.table import Table, mean_and_range
 
 
 def make_tables(draws: dict[str, Draws]) -> tuple[list[Table], list[Table]]:
@@ -69,8 +69,8 @@ def _counts() -> Table:
 def _nearest(draws: Draws, title: str, with_paper: bool) -> Table:
     rows = [("paper", *(f"{paper.NEAREST_NEIGHBOR[cell]:.3f}" for cell in paper.CELLS))] if with_paper else []
     by_reading = {reading: columns_of(draws, "nearest", reading) for reading in READINGS}
-    rows += [(reading, *map(spread, columns.values())) for reading, columns in by_reading.items()]
-    correlation = [spread(over(draws, "correlation", key)) for key in ("original-w", "bio-w")]
+    rows += [(reading, *map(mean_and_range, columns.values())) for reading, columns in by_reading.items()]
+    correlation = [mean_and_range(over(draws, "correlation", key)) for key in ("original-w", "bio-w")]
     rows.append(("correlation of w (Ijspeert 2003)", *correlation, "-", "-"))
     return Table(f"{title} ({len(draws)} draws: mean, range)", ("", *COLUMNS), rows, read_nearest(draws, with_paper))
 
@@ -125,7 +125,7 @@ def _svm(draws: Draws, title: str, with_paper: bool) -> Table:
             (CLOSEST, "median", "median widths"),
             (DEFAULT, "median", "median widths"),
         ):
-            cells = map(spread, columns_of(draws, "svm", reading, f"/{name}/{widths}").values())
+            cells = map(mean_and_range, columns_of(draws, "svm", reading, f"/{name}/{widths}").values())
             rows.append((f"{kernel}: {reading}, {words}", *cells))
     n = sum("svm" in one for one in draws)
     reading = read_svm(draws, with_paper)

@@ -197,10 +197,10 @@ def _as_places(places: Sequence[Any] | None, sources: list[Source | None]) -> li
 
 def _check_apart(places: Sequence[Any], sources: list[Source | None]) -> None:
     """Refuse two movements at one position of a source: the second would count as a copy of the first."""
-    seen: dict[tuple[int, str], int] = {}
+    first_at: dict[tuple[int, str], int] = {}
     for i, (place, source) in enumerate(zip(places, sources, strict=True)):
-        if source is not None and place is not None and seen.setdefault((id(source), str(place)), i) != i:
+        if source is not None and place is not None and first_at.setdefault((id(source), str(place)), i) != i:
             raise TrajectoryError(
                 f"expected a place of its own in {source.path!r} for each movement, got {place!r} for movements "
-                f"{seen[id(source), str(place)]} and {i}; name them apart"
+                f"{first_at[id(source), str(place)]} and {i}; name them apart"
             )

@@ -63,7 +63,7 @@ class Watched(sqlite3.Connection):
     _path: Path
 
     def __init__(self, *database: Any, **options: Any) -> None:
-        self._looks = 0  # checks during the current statement
+        self._checks = 0  # checks during the current statement
         self._too_much: Callable[[], bool] = bool
         super().__init__(*database, **options)
 
@@ -74,12 +74,12 @@ class Watched(sqlite3.Connection):
 
     def execute(self, *statement: Any) -> sqlite3.Cursor:
         """As `sqlite3.Connection.execute`."""
-        self._looks = 0
+        self._checks = 0
         return super().execute(*statement)
 
     def _is_endless(self) -> bool:
-        self._looks += 1
-        more = _STEPS * self._looks - _WORK
+        self._checks += 1
+        more = _STEPS * self._checks - _WORK
         return self._too_much() or (more > 0 and more > _WORK_PER_BYTE * size_of(self._path))
 
     @contextmanager

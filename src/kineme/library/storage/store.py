@@ -54,11 +54,11 @@ class Store:
         self.path = path
         self.read_only = read_only or as_of is not None
         self.wait = wait
-        self._turn = RLock()
+        self._write_turn = RLock()
         # Threads share the reading connection, one at a time: Python's statement cache may give one statement to two
         # threads with the same query, and each would get rows of the other. Closing waits for its turn too, since
         # SQLite would free memory of a running statement.
-        self._look = RLock()
+        self._read_turn = RLock()
         self._n_reading = 0  # nesting depth of the thread that reads
         self._writer: sqlite3.Connection | None = None
         self._waking, self._asleep, self._closed = Lock(), False, False
@@ -168,7 +168,7 @@ class Store:
         with fork_safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             fork_safety.refuse_if_lost(self.path)
-            with self._look:
+            with self._read_turn:
                 if not self._n_reading:
                     self._check_open()
                     self._wake()
@@ -195,7 +195,7 @@ class Store:
         with fork_safety.awake(), in_plain_words(self.path, self.wait):
             # Before the lock: in a forked child, a thread that does not exist may hold it.
             fork_safety.refuse_if_lost(self.path)
-            with self._turn:
+            with self._write_turn:
                 self._check_open()
                 self._wake()
                 self.check_writable()
@@ -247,9 +247,9 @@ class Store:
             return
         with fork_safety.awake():
             self._closed = True  # no new reads or writes begin
-            with self._look:
+            with self._read_turn:
                 self._reader.close()
-            with self._turn:  # not nested: a thread that reads may want to write
+            with self._write_turn:  # not nested: a thread that reads may want to write
                 if self._writer is not None:
                     self._writer.close()
 

@@ -102,11 +102,11 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
         firsts = np.flatnonzero(np.diff(codes, prepend=-1))
         return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
     columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
-    seen: dict[Any, int] = {}
+    number_of: dict[Any, int] = {}
     keys = zip(labels, *columns, strict=True) if label is not None else zip(*columns, strict=True)
-    codes = np.fromiter((seen.setdefault(key, len(seen)) for key in keys), np.intp, n_rows)
-    names: list[str | None] = [key[0] or None if label is not None else None for key in seen]
-    return codes, _places(list(seen), label is not None), names
+    codes = np.fromiter((number_of.setdefault(key, len(number_of)) for key in keys), np.intp, n_rows)
+    names: list[str | None] = [key[0] or None if label is not None else None for key in number_of]
+    return codes, _places(list(number_of), label is not None), names
 
 
 def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:

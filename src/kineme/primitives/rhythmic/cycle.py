@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kineme.primitives.rhythmic.harmonics import Complex, fit_harmonics
 from kineme.validation import Array
 
-_SEEN = 0.45  # harmonics per sample of a period; one half would be the Nyquist limit
+_RESOLVED = 0.45  # harmonics per sample of a period; one half would be the Nyquist limit
 
 
 class Cycles(NamedTuple):
@@ -41,7 +41,7 @@ def fold(rows: Array, cycles: Array, lengths: NDArray[np.intp], most: int, dimen
     dimension : int or None
         Dimension whose first harmonic defines the phase; None for the one with the largest.
     """
-    n_harmonics = np.clip(_SEEN * (lengths - 1) / cycles, 1, most).astype(np.intp)
+    n_harmonics = np.clip(_RESOLVED * (lengths - 1) / cycles, 1, most).astype(np.intp)
     mean = rows.mean(axis=2, keepdims=True)
     fit = fit_harmonics(rows - mean, cycles, n_harmonics)
     total = ((rows - mean) ** 2).sum(axis=(1, 2))
