@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.movements.trajectories._locate import locate
+from kineme.movements.trajectories._compiled import locate
 from kineme.runtime.compiled import jit
 
 _LANES = 32  # with fewer the processor waits, more do not fit its cache
