@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import arrays_movements, join
+from kineme.files.arrays.arrays import arrays_movements, parsed_arrays
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz
 from kineme.files.limits import check_expanded
@@ -16,7 +16,7 @@ from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
-from kineme.movements.tables.table_movements import table_movements
+from kineme.movements.tables.table import table_movements
 
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
@@ -62,7 +62,9 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
-    return join(demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos"))
+    return parsed_arrays(
+        demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
+    )
 
 
 def _read_bag(data: bytes, layout: Layout) -> Parsed:
