@@ -15,6 +15,7 @@ from kineme.movements.trajectories.axes import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
+from kineme.sampling import evenly_spaced
 
 _PANELS = 30  # labels that are drawn
 _OVERLAID = 25  # movements of a label that are drawn, evenly spaced
@@ -51,7 +52,7 @@ def draw_recordings(recordings: Recordings) -> Figure:
 
 def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
     chosen = [i for i, one in enumerate(recordings.labels) if one == label]
-    drawn = np.unique(np.linspace(0, len(chosen) - 1, min(len(chosen), _OVERLAID)).round().astype(int))
+    drawn = evenly_spaced(len(chosen), _OVERLAID)
     paths = [_path(recordings.demonstrations[chosen[k]]) for k in drawn]
     opacity = max(0.25, 0.9 - 0.05 * len(paths))
     for path in paths:
@@ -86,7 +87,7 @@ def _tidy_space(axes: Any) -> None:
 
 def _path(one: Trajectory) -> Any:
     """The points of a movement that are drawn, (points, 2 or 3)."""
-    kept = np.unique(np.linspace(0, len(one) - 1, min(len(one), _POINTS)).round().astype(int))
+    kept = evenly_spaced(len(one), _POINTS)
     x = one.positions[kept, :3]
     return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))
 
