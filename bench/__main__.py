@@ -18,6 +18,7 @@ SUBJECTS = (
     "rhythm",
     "control",
     "recognize",
+    "recognize_files",
     "one_shot",
     "defaults",
     "library",

@@ -14,7 +14,6 @@ from kineme._lazy import names_in
 
 PAGE = Path(__file__).with_name("reference.md")
 MODULES = [kineme, *(one for name in kineme.__all__ if isinstance(one := getattr(kineme, name), ModuleType))]
-MODULES = [one for one in MODULES if Path(str(one.__file__)).with_suffix(".pyi").exists()]
 
 _HEAD = """# Reference
 

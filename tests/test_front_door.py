@@ -65,7 +65,7 @@ def test_an_unknown_name_is_refused_with_the_known_ones():
 
 def test_a_former_name_warns_and_leads_to_the_name_of_today(monkeypatch):
     load, listed, names = lazy_names("kineme.datasets", {"load_handwriting": "load_lasa"})
-    with pytest.warns(DeprecationWarning, match=r"kineme.datasets.load_handwriting is now called load_lasa"):
+    with pytest.warns(DeprecationWarning, match=r"kineme.datasets.load_handwriting is now kineme.datasets.load_lasa"):
         assert load("load_handwriting") is kineme.load_lasa
     assert "load_handwriting" not in {*listed(), *names}
 

@@ -44,6 +44,25 @@ def test_files_and_functions_are_short(path):
             assert length <= MAX_FUNCTION, f"{node.name} has {length} lines"
 
 
+_CHANGE = {"LibraryRecognizer", "Batch", "Decision"}  # what is remembered between calls
+
+
+def _classes():
+    return [node for path in SOURCES for node in ast.parse(path.read_text()).body if isinstance(node, ast.ClassDef)]
+
+
+def test_named_tuples_check_nothing_and_are_sequences_of_their_fields():
+    tuples = [one for one in _classes() if any(getattr(base, "id", "") == "NamedTuple" for base in one.bases)]
+    own = {"__new__", "__len__", "__iter__", "__getitem__", "__eq__", "__hash__"}
+    assert tuples
+    assert not [one.name for one in tuples for node in one.body if getattr(node, "name", "") in own]
+
+
+def test_dataclasses_are_frozen_but_for_those_that_change():
+    made = [(one.name, ast.unparse(each)) for one in _classes() for each in one.decorator_list]
+    assert {name for name, text in made if text.startswith("dataclass") and "frozen=True" not in text} <= _CHANGE
+
+
 def test_no_file_is_a_drawer_for_anything():
     drawers = {"util", "utils", "helper", "helpers", "common", "misc"}
     assert not [path for path in SOURCES if path.stem.strip("_") in drawers or path.parent.name in drawers]

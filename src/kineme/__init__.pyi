@@ -23,11 +23,11 @@ from kineme.datasets.lasa import load_lasa as load_lasa
 
 # Primitives
 from kineme.primitives.discrete.dmp import DMP as DMP
-from kineme.primitives.discrete.primitives import Primitives as Primitives
+from kineme.primitives.discrete.dmp import Primitives as Primitives
 from kineme.primitives.discrete.rollout import Rollout as Rollout
 from kineme import control as control
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
-from kineme.primitives.rhythmic.primitives import RhythmicPrimitives as RhythmicPrimitives
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimitives
 from kineme import orientation as orientation
 from kineme import styles as styles
 

@@ -37,7 +37,7 @@ def lazy_names(
         if name in former:
             from warnings import warn
 
-            warn(f"{module}.{name} is now called {former[name]}", DeprecationWarning, stacklevel=2)
+            warn(f"{module}.{name} is now {module}.{former[name]}", DeprecationWarning, stacklevel=2)
             return getattr(sys.modules[module], former[name])
         if name in names:
             home, there = names[name]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from sklearn.utils import Bunch
@@ -13,8 +15,8 @@ from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.anchoring.proposals import merge_split
 from kineme.anchoring.proposals.assign import agreement
-from kineme.anchoring.proposals.merge_split import Split, suggest_splits
-from kineme.anchoring.proposals.subsample import radii, subsample
+from kineme.anchoring.proposals.merge_split import Split, suggest_merges, suggest_splits
+from kineme.anchoring.proposals.subsample import largest_clustered, radii, subsample
 from kineme.comparison.describe import describe
 
 
@@ -125,3 +127,35 @@ def test_symbols_shown_once_agree_up_to_six_tenths_of_the_way_to_the_nearest_oth
     assert agreement(known.comparison_, known.references_) == pytest.approx(
         np.exp(-0.5 * (0.6 * np.median(away)) ** 2), rel=1e-3
     )
+
+
+def _similar(within, between, sizes=(3, 3)):
+    """Similarities of symbols of these sizes: those of different members, and those between symbols."""
+    member = np.repeat(np.arange(len(sizes)), sizes)
+    K = np.where(member[:, None] == member, np.asarray(within)[member], between)
+    np.fill_diagonal(K, 1.0)
+    return K
+
+
+def test_symbols_agree_up_to_half_way_from_their_own_members_to_the_nearest_other(monkeypatch):
+    known = Recognizer().fit(draw_kinds([3, 3, 3]), list("aaabbbccc"))
+    K = _similar([0.9, 0.8, 0.6], 0.2, (3, 3, 3))
+    monkeypatch.setattr(import_module("kineme.anchoring.proposals.assign"), "compare", lambda *_: K.copy())
+    assert agreement(known.comparison_, known.references_) == pytest.approx(0.5 * (0.8 + 0.2))
+
+
+@pytest.mark.parametrize(("overlap", "n"), [(0.49, 0), (0.51, 1)])
+def test_symbols_that_overlap_by_half_could_be_merged(overlap, n, monkeypatch):
+    monkeypatch.setattr(merge_split, "similarities", lambda *_, **__: _similar([0.8, 0.8], 0.8 * overlap))
+    assert len(suggest_merges(draw_kinds([3, 3]), list("aaabbb"))) == n
+
+
+def test_a_symbol_with_one_member_is_as_cohesive_as_the_others_typically_are(monkeypatch):
+    monkeypatch.setattr(merge_split, "similarities", lambda *_, **__: _similar([0.5, 0.0], 0.3, (3, 1)))
+    (merge,) = suggest_merges(draw_kinds([3, 1]), list("aaab"))
+    assert merge.overlap == pytest.approx(0.3 / 0.5)
+
+
+def test_in_space_fewer_movements_are_all_compared():
+    """A pair costs a decomposition there; the page of `propose` names the numbers."""
+    assert [largest_clustered(d) for d in (1, 2, 3, 4)] == [5000, 5000, 800, 5000]

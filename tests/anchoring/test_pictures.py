@@ -98,5 +98,5 @@ def test_pictures_of_other_movements():
 def test_every_public_name_leads_somewhere():
     for name in kineme.anchoring.__all__:
         assert getattr(kineme.anchoring, name).__doc__
-    with pytest.raises(AttributeError, match=r"'kineme\.anchoring' has no attribute 'draw'; it has Assignment, Con"):
+    with pytest.raises(AttributeError, match=r"'kineme\.anchoring' has no attribute 'draw' .*; it has describe, "):
         _ = kineme.anchoring.draw

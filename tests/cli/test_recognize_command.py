@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import subprocess
@@ -53,6 +54,31 @@ def test_known_and_unknown_in_one_folder(folder, asked):
     assert "×0.5, +23°, 0.8 × as long" in text
     assert "unknown" in text
     assert "not read: bad.csv, line 2" in text
+
+
+def test_progress_goes_on_to_the_end_and_does_not_change_the_answers(folder, asked, monkeypatch):
+    """Through reading, one step a file, and recognizing."""
+    import tqdm
+
+    bars = []
+
+    class Bar(tqdm.tqdm):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options | {"disable": False, "file": io.StringIO(), "mininterval": 0})
+            self.seen = [0]
+            bars.append(self)
+
+        def update(self, n=1):
+            self.seen.append(self.seen[-1] + n)
+            return super().update(n)
+
+    plain = answer("recognize", asked, "-l", folder)
+    monkeypatch.setattr(tqdm, "tqdm", Bar)
+    monkeypatch.setattr("kineme.cli.recognize._AT_ONCE", 1)
+    assert answer("recognize", asked, "-l", folder) == plain
+    reading, recognizing = bars
+    assert (reading.desc, reading.total) == ("reading", 3)
+    assert (recognizing.desc, recognizing.total, recognizing.seen) == ("recognizing", 2, [0, 1, 2])
 
 
 def test_the_answer_is_that_of_python(folder, asked):

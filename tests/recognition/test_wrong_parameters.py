@@ -44,7 +44,7 @@ def test_a_phase_cannot_turn_back():
 
 
 def test_a_search_beside_the_array_stays_inside():
-    from kineme.movements.trajectories._locate import locate
+    from kineme.movements.trajectories._compiled import locate
 
     interval, local = np.zeros(7, dtype=np.int64), np.zeros(5)
     locate(np.array([0.0, -2.0, np.nan, -0.3, 1.0]), interval[1:6], local)

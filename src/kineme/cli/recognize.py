@@ -13,6 +13,8 @@ from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read
 from kineme.output.text import printable
 
+_AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
+
 
 @click.command(short_help="Recognize recordings with the symbols of a library.")
 @click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
@@ -36,13 +38,25 @@ def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_js
 
     found = read(recordings, options)
     with ActionLibrary(folder, read_only=True) as library:
-        answers = library.recognize(found.demonstrations, error_rate)
+        answers = _recognized(library, found.demonstrations, error_rate)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [_as_data(source, one, stored, top) for source, one in zip(found.sources, answers, strict=True)],
         "problems": [str(problem) for problem in found.problems],
     }
     say(as_json, data, lambda: _text(data, error_rate))
+
+
+def _recognized(library: Any, movements: Any, error_rate: float) -> list[Any]:
+    """An answer for each movement, with a progress bar on a terminal."""
+    from tqdm import tqdm
+
+    answers: list[Any] = []
+    with tqdm(total=len(movements), desc="recognizing", unit="movement", leave=False, disable=None) as bar:
+        for start in range(0, len(movements), _AT_ONCE):
+            answers += library.recognize(movements[start : start + _AT_ONCE], error_rate)
+            bar.update(len(answers) - bar.n)
+    return answers
 
 
 def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[str, Any]:

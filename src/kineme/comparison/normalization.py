@@ -41,7 +41,10 @@ class Normalization:
         centered = paths - self.center(paths)
         if self.scale == "none":
             _check_size(centered)
-        return np.asarray(centered / self.size(paths))
+            return np.asarray(centered)
+        squares = np.einsum("ijk,ijk->ij", centered, centered)[:, :, None] / paths.shape[2]
+        centered /= self._size(squares if self.translation else paths.var(axis=2, keepdims=True))
+        return np.asarray(centered)
 
     def center(self, paths: Array) -> Array:
         """The center of each path (n, d, T), shape (n, d, 1): its mean position along the phase."""
@@ -51,7 +54,10 @@ class Normalization:
         """The size of each path (n, d, T), shape (n, 1, 1) or (n, d, 1); 1 for a path that does not move."""
         if self.scale == "none":
             return np.ones((len(paths), 1, 1))
-        squares = paths.var(axis=2, keepdims=True)
+        return self._size(paths.var(axis=2, keepdims=True))
+
+    def _size(self, squares: Array) -> Array:
+        """From the variance in each dimension, (n, d, 1)."""
         whole = np.sqrt(squares.sum(axis=1, keepdims=True))
         whole[whole == 0] = 1.0
         if self.scale == "path":

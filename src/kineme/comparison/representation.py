@@ -10,8 +10,9 @@ from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.spline import spline_matrix
 from kineme.primitives.discrete.basis import MOST_BASIS
-from kineme.primitives.discrete.dmp import DMP, MOST_POINTS
+from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.operators import encoder, forcing_matrix
+from kineme.primitives.discrete.specification import MOST_POINTS
 from kineme.validation import Array, check_choice, check_count, check_number
 
 QUANTITIES = ("positions", "forcing")

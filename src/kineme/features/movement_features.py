@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.trajectories.axes import axis_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.formulations import FORMULATIONS

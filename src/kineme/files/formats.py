@@ -16,7 +16,7 @@ from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
-from kineme.movements.tables.table_movements import table_movements
+from kineme.movements.tables.table import table_movements
 
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 

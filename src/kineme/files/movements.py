@@ -11,7 +11,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.movements.segmentation.segment import as_recording
-from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
 from kineme.validation import Array

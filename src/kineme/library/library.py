@@ -17,6 +17,7 @@ from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
 from kineme.library.storage.store import Store, history
+from kineme.movements.trajectories.movements_like import MovementsLike
 
 if TYPE_CHECKING:
     from kineme.anchoring.grounding.space import Between, Near
@@ -133,7 +134,7 @@ class ActionLibrary:
 
     def learn(
         self,
-        movements: Any,
+        movements: MovementsLike,
         labels: Sequence[Any] | None = None,
         source: Source | Sequence[Source | None] | None = None,
         *,
@@ -222,7 +223,7 @@ class ActionLibrary:
     @overload
     def recognize(self, movements: Demonstrations | Sequence[Any], error_rate: float = ...) -> list[Answer]: ...
 
-    def recognize(self, movements: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
+    def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
         With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, few are, which are

@@ -15,6 +15,7 @@ from kineme.comparison.describe import Tile, recorded_paths
 from kineme.comparison.references import IndexedMovements, References
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.classifiers import Classifier
 from kineme.recognition.conformal import Calibration
@@ -85,7 +86,7 @@ class Answer:
         return f"Answer(label={self.label!r}, {sure}, like={self.nearest[0]})"
 
 
-def is_one(X: Any) -> bool:
+def is_one(X: MovementsLike) -> bool:
     """Whether this is one movement: a `Trajectory`, or an array of shape (T,) or (T, d)."""
     return isinstance(X, Trajectory) or (isinstance(X, np.ndarray) and X.dtype != object and X.ndim <= 2)
 

@@ -19,6 +19,7 @@ from kineme.movements.segmentation.segment import as_recording, moving
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.movements.segmentation.speed_minima import SpeedMinima
 from kineme.movements.trajectories.labels import Label
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.validation import Array, check_count
@@ -52,7 +53,7 @@ def spot(
     comparison: Comparison,
     references: References,
     calibration: Calibration,
-    recording: Any,
+    recording: MovementsLike,
     error_rate: float,
     max_pieces: int,
 ) -> list[Spotted]:

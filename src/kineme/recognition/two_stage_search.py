@@ -19,6 +19,7 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
 from kineme.recognition.conformal import Calibration, check_error_rate, distances
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 
 _LEADING, _BEST = 3, 16  # classes, and movements of each, compared first
@@ -66,7 +67,8 @@ class TwoStageSearch:
         for start in range(0, len(demos), step):
             some = demos[start : start + step] if len(demos) > step else demos
             tile = describe_tile(some, 0, len(some), self.comparison, self.comparison.procrustes)
-            verdicts = self._verdicts(tile.described, held, error_rate)
+            with single_threaded_blas():  # held once, not for each of many small products
+                verdicts = self._verdicts(tile.described, held, error_rate)
             every = OnDemand(np.arange(held.n_rows), self.stored.movements)
             found += with_transforms(verdicts, self.comparison, every, some, recorded_paths(some, tile.paths))
         return found
@@ -74,10 +76,12 @@ class TwoStageSearch:
     def _verdicts(self, described: Described, held: HeldReferences, error_rate: float) -> list[Verdict]:
         """What each movement is; ``nearest[k].index`` is a row of the features."""
         bounds = self.stored.bounds(self.comparison.similarity, self.reduced(described))
-        held.described(self.stored.members[np.unique(np.concatenate([self._promising(one) for one in bounds]))])
+        promising = [self._promising(one) for one in bounds]
+        held.described(self.stored.members[np.unique(np.concatenate(promising))])
         found = []
         for i in range(len(described)):
-            chosen, _, compared = self.compare(described.take(slice(i, i + 1)), bounds[i], held)
+            one = described.take(slice(i, i + 1))
+            chosen, _, compared = self.compare(one, bounds[i], held, promising[i])
             owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
             verdict = verdicts_of(compared, Nearest(), self.calibration.select(np.unique(owners)), error_rate)[0]
             rows = self.stored.members[chosen]
@@ -94,7 +98,7 @@ class TwoStageSearch:
         return reduce_features(self.stored.bases, rows, self.comparison.n_dims)
 
     def compare(
-        self, one: Described, bounds: Single, held: HeldReferences | None = None
+        self, one: Described, bounds: Single, held: HeldReferences | None = None, promising: Rows | None = None
     ) -> tuple[Rows, Array, Compared]:
         """Which members one movement was compared with, ascending; log similarities; the comparison with them.
 
@@ -102,7 +106,7 @@ class TwoStageSearch:
         class found so far or, in a class not compared with yet, than the nearest of all.
         """
         held = held or HeldReferences(self.stored, self.comparison.similarity)
-        chosen = self._promising(bounds)
+        chosen = self._promising(bounds) if promising is None else promising
         squares, logs = self._exact(one, held.described(self.stored.members[chosen]))
         near = np.full(len(self.classes), logs.max())
         owners = np.searchsorted(self.stored.first, chosen, side="right") - 1

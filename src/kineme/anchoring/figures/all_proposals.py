@@ -14,6 +14,7 @@ from kineme.comparison.alignment import paths_of
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.figures import GRAY, ORANGE, new_figure
 from kineme.validation import Array
 
@@ -21,7 +22,7 @@ _CELL = 1.35  # inches
 _LEFT_OVER = 24  # of those left over, drawn at most
 
 
-def draw_proposals(movements: Any, proposals: Proposals, like: Compares | None = None) -> Figure:
+def draw_proposals(movements: MovementsLike, proposals: Proposals, like: Compares | None = None) -> Figure:
     """One small drawing for each proposal, with its number, size and stability; last, what is left over.
 
     Number k is ``proposals[k - 1]``; members, medoid and start are drawn as by `draw_proposal`.

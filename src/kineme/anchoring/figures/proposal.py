@@ -11,13 +11,16 @@ from kineme.anchoring.proposals.proposals import Proposal, check_members
 from kineme.comparison.alignment import maps_onto, paths_of
 from kineme.comparison.specification import Compares
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
 
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
 
 
-def draw_proposal(movements: Any, proposal: Proposal, title: str = "", like: Compares | None = None) -> Figure:
+def draw_proposal(
+    movements: MovementsLike, proposal: Proposal, title: str = "", like: Compares | None = None
+) -> Figure:
     """Members laid onto the medoid, the medoid bold, a dot at the start; inset, as they were recorded.
 
     Parameters

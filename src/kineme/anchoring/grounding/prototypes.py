@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
-from kineme.comparison.describe import describe
+from kineme.comparison.describe import Described, describe
 from kineme.comparison.similarity import similarities
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.styles.average import AveragePrimitive, average
 from kineme.primitives.styles.parameters import check_primitives
@@ -68,7 +68,7 @@ def prototype(primitives: Primitives, medoid: int | None = None, like: Compares 
     return Prototype(medoid, average(moved(primitives, maps)), maps)
 
 
-def medoid_of(movements: Any, like: Compares | None = None) -> int:
+def medoid_of(movements: Described | MovementsLike, like: Compares | None = None) -> int:
     """The movement with the largest mean similarity to the others; the first of one or two."""
     described = describe(movements, like)
     if len(described) < 3:

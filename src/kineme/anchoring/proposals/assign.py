@@ -17,6 +17,7 @@ from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe
 from kineme.comparison.references import References
 from kineme.comparison.similarity import compare
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.known_classes import KnownClasses, known_classes, open_set_labels
@@ -59,7 +60,7 @@ class Assignment:
         )
 
 
-def assign(movements: Any, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Assignment:
+def assign(movements: MovementsLike, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Assignment:
     """Assign movements to the symbols that they are recognized as, and cluster the unknown ones.
 
     Parameters

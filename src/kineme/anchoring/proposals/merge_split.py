@@ -15,6 +15,7 @@ from kineme.comparison.similarity import averaged, compare, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count, check_number
 
@@ -41,7 +42,7 @@ class Split(NamedTuple):
 
 
 def suggest_merges(
-    movements: Any,
+    movements: MovementsLike | Described,
     labels: ArrayLike,
     *,
     least: float = 0.5,
@@ -91,7 +92,7 @@ def suggest_merges(
 
 
 def suggest_splits(
-    movements: Any,
+    movements: MovementsLike | Described,
     labels: ArrayLike,
     *,
     most: float = 0.25,
@@ -159,7 +160,9 @@ def _mean_within(K: Array) -> float:
     return float((K.sum() - m) / (m * (m - 1))) if m > 1 else 1.0
 
 
-def _labeled(movements: Any, labels: ArrayLike, like: Compares | None) -> tuple[Described, NDArray[np.intp], list[Any]]:
+def _labeled(
+    movements: MovementsLike | Described, labels: ArrayLike, like: Compares | None
+) -> tuple[Described, NDArray[np.intp], list[Any]]:
     described, known = describe(movements, like), label_array(labels)
     if len(known) != len(described):
         raise SpecificationError(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,17 +10,18 @@ from kineme.anchoring.clustering.number_of_clusters import count_clusters
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
-from kineme.comparison.describe import describe
+from kineme.comparison.describe import Described, describe
 from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_choice, check_count
 
 _REPEATS = 20  # subsets that clusters must come again in
 
 
 def propose(
-    movements: Any,
+    movements: MovementsLike | Described,
     method: str = "agglomerative",
     n_clusters: int | None = None,
     *,

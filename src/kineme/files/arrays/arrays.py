@@ -12,7 +12,7 @@ from kineme.errors import DataError
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
-from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array
 
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")

@@ -11,7 +11,7 @@ from matplotlib.ticker import NullFormatter
 
 from kineme.files.inspection.inspect import labels_in_order
 from kineme.files.join_files import Recordings
-from kineme.movements.trajectories.axes import axis_names
+from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable

@@ -20,6 +20,7 @@ from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import describe as name_of
 
 Progress = Callable[[int, int], object]
@@ -57,7 +58,7 @@ class LearnReport:
 
 def learn(
     store: Store,
-    movements: Any,
+    movements: MovementsLike,
     labels: Sequence[Any] | None = None,
     source: Source | Sequence[Source | None] | None = None,
     places: Sequence[Any] | None = None,

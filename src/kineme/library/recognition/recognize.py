@@ -15,6 +15,7 @@ from kineme.library.recognition.reduced_features_cache import ReducedMovements, 
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.known_classes import KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
@@ -35,9 +36,9 @@ class LibraryRecognizer:
     _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _model: KnownClasses | TwoStageSearch | None = None
 
-    def recognize(self, X: Any, error_rate: float = 0.05) -> Answer | list[Answer]:
+    def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
-        found = self._named(self.model().recognize([X] if is_one(X) else X, error_rate))
+        found = self._named(self.model().recognize(X, error_rate))
         return found[0] if is_one(X) else found
 
     def model(self) -> KnownClasses | TwoStageSearch:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.movements.trajectories._locate import locate
+from kineme.movements.trajectories._compiled import locate
 from kineme.runtime.compiled import jit
 
 _LANES = 32  # with fewer the processor waits, more do not fit its cache
@@ -18,7 +18,8 @@ _FAR = 1e200  # gap behind the last sample
 _BEFORE, _BEHIND = 1, 3  # empty knots that the equations of the outer ones refer to
 
 _FIELDS = ("gap", "inverse", "x", "m", "above", "pivot")  # gap to the next knot; second derivative m
-_KNOT = np.dtype([(name, np.float64, (_LANES,)) for name in _FIELDS])
+# A cache line more, or the numbers of a lane in consecutive knots would fall into an eighth of the sets of L1.
+_KNOT = np.dtype([*((name, np.float64, (_LANES,)) for name in _FIELDS), ("unused", np.float64, (8,))])
 
 
 @jit

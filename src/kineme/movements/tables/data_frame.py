@@ -14,8 +14,7 @@ from kineme.errors import DataError
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed, no_lines
-from kineme.movements.tables.table import Table
-from kineme.movements.tables.table_movements import table_movements
+from kineme.movements.tables.table import Table, table_movements
 from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates
 
 _KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`

@@ -1,10 +1,20 @@
-"""A table of samples in memory, from any file."""
+"""A table of samples, and its movements: wide, one; or long, many that columns tell apart."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.movements.tables.columns import Roles
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Block, Detected, Parsed
+from kineme.movements.tables.time_stamps import in_seconds, unit_by_size, unit_in_head
+from kineme.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,3 +41,81 @@ class Table:
     line_of: Callable[[int], int | None]
     faults: dict[int, str] = field(default_factory=dict)
     dates_in: str | None = None
+
+
+def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Parsed:
+    """The movements of a table.
+
+    With columns that tell movements apart, all rows with equal texts in them, and with equal labels, are one movement,
+    in any order. With a column of labels alone, a new movement begins where the label changes or the time decreases.
+    Otherwise the table is one movement.
+    """
+    positions = np.column_stack([table.columns[k] for k in roles.positions])
+    times, units, units_from = _times(table, roles, layout)
+    codes, keys, labels = _split(table, roles, times)
+    n = len(keys)
+    rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
+    if rows is not None:
+        positions, times, codes = positions[rows], times[rows], codes[rows]
+    offsets = np.searchsorted(codes, np.arange(n + 1))
+    if roles.time is None:
+        times = (np.arange(len(times)) - np.repeat(offsets[:-1], np.diff(offsets))) * float(units)
+    heads = table.heads
+    detected = Detected(
+        kind,
+        "long" if roles.movement or roles.label is not None else "wide",
+        tuple(heads[k] for k in roles.positions),
+        None if roles.time is None else heads[roles.time],
+        units,
+        units_from,
+        tuple(heads[k] for k in roles.movement),
+        () if roles.label is None else (heads[roles.label],),
+        tuple(heads[k] for k in roles.ignored),
+    )
+    places = [""] * n if n == 1 and not roles.movement else keys
+    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
+
+
+def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
+    """Times [s], their unit in the file, and the source of the unit."""
+    if roles.time is None:
+        return np.zeros(table.n_rows), layout.units or 1.0, "given"
+    stamps, head = table.columns[roles.time], table.heads[roles.time]
+    if table.dates_in is not None:
+        return in_seconds(stamps, table.dates_in), table.dates_in, "dates"
+    if layout.units is not None:
+        return in_seconds(stamps, layout.units), layout.units, "given"
+    named = unit_in_head(head)
+    units, known = (named, "head") if named else unit_by_size(stamps)
+    return in_seconds(stamps, units), units, known
+
+
+def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
+    """Per row the number of its movement; per movement its place and its label."""
+    n_rows, label = table.n_rows, roles.label
+    if label is None and not roles.movement:
+        return np.zeros(n_rows, np.intp), [""], [None]
+    labels = [None] * n_rows if label is None else table.columns[label].tolist()
+    if not roles.movement:
+        changes = np.array([before != label for before, label in pairwise(labels)], dtype=bool)
+        codes = np.append(0, np.cumsum(changes | (times[1:] < times[:-1])))
+        firsts = np.flatnonzero(np.diff(codes, prepend=-1))
+        return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
+    columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
+    number_of: dict[Any, int] = {}
+    keys = zip(labels, *columns, strict=True) if label is not None else zip(*columns, strict=True)
+    codes = np.fromiter((number_of.setdefault(key, len(number_of)) for key in keys), np.intp, n_rows)
+    names: list[str | None] = [key[0] or None if label is not None else None for key in number_of]
+    return codes, _places(list(number_of), label is not None), names
+
+
+def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:
+    """A unique text for each movement from the columns that tell them apart, with the label if it is needed.
+
+    It is needed where the movements of every label are counted from 1.
+    """
+    for some in ([key[labeled:] for key in keys], keys):
+        places = ["/".join(map(str, key)) for key in some]
+        if len(set(places)) == len(places):
+            return places
+    return ["/".join(str(part).replace("\\", "\\\\").replace("/", "\\/") for part in key) for key in keys]

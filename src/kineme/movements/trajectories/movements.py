@@ -102,3 +102,8 @@ class Movements:
             None if self.names is None else tuple(self.names[i] for i in chosen),
             self.dimensions,
         )
+
+
+def axis_names(n_dims: int) -> list[str]:
+    """The names x, y, z, or q1, q2, ... beyond three dimensions."""
+    return list("xyz"[:n_dims]) if n_dims <= len("xyz") else [f"q{k + 1}" for k in range(n_dims)]

@@ -24,5 +24,5 @@ class HasDemonstrations(Protocol):
 MovementLike = Trajectory | ArrayLike
 
 #: Whatever `Demonstrations.of` takes: Demonstrations, recordings that were read, a segmentation, a rollout; one
-#: movement; a list of any of these; or one array of shape (n, T, d).
+#: movement; one array of shape (n, T, d); a data frame; or a list of any of these.
 MovementsLike = HasDemonstrations | MovementLike | Sequence[Trajectory | HasDemonstrations | ArrayLike]

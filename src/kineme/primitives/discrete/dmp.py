@@ -1,25 +1,28 @@
-"""The specification of a DMP: every parameter that the weights depend on."""
+"""`DMP`, the specification that learns, and `Primitives`, what it learns."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import math
+from dataclasses import dataclass, replace
 
-from kineme.movements.preparation.preprocess import check_steps
-from kineme.primitives.discrete.basis import ExponentialPhase, GaussianBasis
-from kineme.primitives.discrete.fits import FITS, REGRESSIONS
-from kineme.primitives.discrete.formulations import FORMULATIONS, Formulation
-from kineme.primitives.spring_damper import SpringDamper
-from kineme.validation import check_choice, check_count
+import numpy as np
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from kineme.primitives.discrete.primitives import Primitives
-
-MOST_POINTS = 10_000  # a fit with T points needs matrices of T^2 numbers
+from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.primitives.control import Controller, ObstacleAvoidance, Options
+from kineme.primitives.discrete.encode import encode
+from kineme.primitives.discrete.formulations import safe_amplitudes
+from kineme.primitives.discrete.learned import Learned
+from kineme.primitives.discrete.operators import forcing_matrix
+from kineme.primitives.discrete.plan import plan_of
+from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
+from kineme.primitives.discrete.specification import Specification
+from kineme.validation import Array, check_count, check_samples
 
 
 @dataclass(frozen=True)
-class DMP(SpringDamper):
+class DMP(Specification):
     """A Dynamical Movement Primitive, as a frozen specification.
 
     In normalized time u = t / tau, with one canonical system s(u) shared by all dimensions,
@@ -71,41 +74,7 @@ class DMP(SpringDamper):
     (7, 20, 2)
     """
 
-    formulation: str = "bio-inspired"
-    n_basis: int = 40
-    stiffness: float = 100.0
-    damping: float | None = None
-    gating: str = "none"
-    fit: str = "trajectory"
-    regression: str = "local"
-    ridge: float | None = None
-    phase_end: float = 0.01
-    overlap: float = 0.3
-    n_points: int = 200
-    preprocessing: tuple[Any, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_choice("formulation", self.formulation, list(FORMULATIONS))
-        check_choice("fit", self.fit, FITS)
-        check_choice("regression", self.regression, REGRESSIONS)
-        self._check_spring_damper()
-        check_count("n_points", self.n_points, 10, most=MOST_POINTS)
-        if self.fit == "trajectory":
-            check_count("n_basis", self.n_basis, 3)
-        object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
-        _ = self.basis  # checks its own parameters
-
-    @property
-    def basis(self) -> GaussianBasis:
-        """Basis functions over the shared canonical system."""
-        return GaussianBasis(self.n_basis, self.overlap, self.gating, ExponentialPhase(self.phase_end))
-
-    @property
-    def system(self) -> Formulation:
-        """The formulation's row in the table."""
-        return FORMULATIONS[self.formulation]
-
-    def learn(self, movements: Any) -> Primitives:
+    def learn(self, movements: MovementsLike) -> Primitives:
         """Learn one primitive per movement, all in one matrix product.
 
         Parameters
@@ -123,6 +92,193 @@ class DMP(SpringDamper):
         TrajectoryError
             Movements that cannot be used: see `Demonstrations`; also a movement that does not move.
         """
-        from kineme.primitives.discrete.encode import encode
+        return Primitives(self, **encode(self, movements))
 
-        return encode(self, movements)
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Primitives(Learned):
+    """n primitives of d dimensions that share one specification; made by `DMP.learn`.
+
+    Attributes
+    ----------
+    dmp : DMP
+        The specification.
+    scaled_weights : ndarray of shape (n, d, N)
+        Weights times the formulation's scale: ``(g - x0) w`` (original) or ``K w`` (bio-inspired). They
+        exist for every movement, closed ones too.
+    starts, goals : ndarray of shape (n, d)
+        x0 and g, in the user's unit.
+    velocities : ndarray of shape (n, d)
+        Initial velocities, in the user's unit per second.
+    durations : ndarray of shape (n,)
+        tau [s].
+    extents : ndarray of shape (n, d)
+        Largest minus smallest position of each demonstration; g counts as close to x0 relative to it.
+    labels : ndarray of shape (n,) or None
+    names : tuple of str or None
+    """
+
+    SPECIFICATION = DMP
+    KIND = "primitives"
+
+    dmp: DMP
+
+    @property
+    def weights(self) -> Array:
+        """Weights w of Eq. (2), shape (n, N, d).
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
+
+    def forcing(self, n_samples: int = 100) -> Array:
+        """The forcing term f, Eq. (2), at `n_samples` (S) even times, shape (n, S, d).
+
+        Contains s if the specification's gating is "phase"; never contains K or g - x0.
+
+        Raises
+        ------
+        DegenerateMovementError
+            In the original formulation, where g = x0 in a dimension.
+        """
+        return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
+
+    def shape_attractor(self, n_samples: int = 100) -> Array:
+        """The shape-attractor term as it acts in the equation, at `n_samples` (S) even times, shape (n, S, d).
+
+        ``(g - x0) f(s)`` in Eq. (1), ``s K (f(s)/s + x0 - x) = K f(s) + K s (x0 - x)`` in Eq. (4), with x the
+        primitive's own path. It needs no division, neither by g - x0 nor by s, so it exists for every
+        movement. Section 2.2 gives the name to the bracket without the leading s; that one grows without bound
+        as s vanishes.
+        """
+        term = self._scaled_forcing(n_samples)
+        s = self.dmp.basis.phase(np.linspace(0.0, 1.0, term.shape[2]))
+        coupling = self.dmp.system.coupling(self.dmp.K, s)
+        if coupling.any():
+            term += coupling * self._relative_path(n_samples)
+        return term.transpose(0, 2, 1)
+
+    def rollout(  # noqa: PLR0913 - one parameter per option
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> Rollout:
+        """Generate movements, as demonstrated or with another start, goal and duration; all in one matrix product.
+
+        One primitive can have many goals, many primitives one goal, or as many primitives as many goals.
+
+        Parameters
+        ----------
+        start, goal : array_like of shape (d,) or (n, d), optional
+            x0 and g; by default the demonstrated ones.
+        duration : float or array_like of shape (n,), optional
+            tau [s]; by default the demonstrated one. The path does not depend on it.
+        velocity : array_like of shape (d,) or (n, d), optional
+            Initial velocity, per second; by default the demonstrated one, in proportion to the tempo.
+        rate : float, optional
+            Samples per second, at least; all movements of a batch get the same number of samples, at most 50 million
+            over the number of basis functions.
+        n_samples : int, optional
+            Samples per movement; by default the specification's `n_points`. Give this or `rate`.
+        settle : float, optional
+            Continue past the duration until every dimension stays within this distance of the goal.
+
+        Returns
+        -------
+        Rollout
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+
+        Raises
+        ------
+        TrajectoryError
+            A start, goal or velocity of the wrong shape; numbers of movements that do not match.
+        SpecificationError
+            A duration of 0 or less, a rate too low to follow the dynamics.
+        DegenerateMovementError
+            The original formulation asked to move a closed or flat demonstration to another goal.
+        """
+        movement = rollout(self, start, goal, duration, velocity)
+        end = 1.0 if settle is None else settled_end(movement, settle)
+        if rate is not None and n_samples is not None:
+            raise SpecificationError("expected either rate or n_samples, got both")
+        if rate is not None:
+            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp)
+        elif n_samples is None:
+            n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return replace(movement, n_samples=n_samples, end=end)
+
+    def controller(  # noqa: PLR0913 - an option per parameter
+        self,
+        dt: float,
+        *,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: float | None = None,
+        velocity: ArrayLike | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+        settle: float | None = None,
+    ) -> Controller:
+        """One primitive under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt : float
+            Time of a step [s], at most the duration.
+        start, goal, duration, velocity : optional
+            As in `rollout`, for one movement.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
+            What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`.
+
+        Returns
+        -------
+        Controller
+            At the start, with ``step``, ``reset`` and ``state``.
+
+        Raises
+        ------
+        SpecificationError
+            More than one primitive; an option out of its range.
+        DegenerateMovementError
+            The original formulation asked to move a closed or flat demonstration to another goal.
+
+        Examples
+        --------
+        >>> import kineme
+        >>> primitives = kineme.DMP().learn(kineme.load_lasa(["CShape"]))
+        >>> controller = primitives[0].controller(dt=0.002)
+        >>> controller.step(goal=[10.0, 5.0]).time
+        0.002
+        """
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
+        return Controller(plan_of(self, start, goal, duration, velocity), dt, options)
+
+    def _scale(self, feature: str) -> Array:
+        """The formulation's scale (n, d, 1), refused where it is zero."""
+        amplitude = self.goals - self.starts
+        if self.dmp.system.divides_by_amplitude:
+            amplitude = safe_amplitudes(amplitude, self.extents, self.names, feature)
+        return self.dmp.system.scale(self.dmp.K, amplitude)[:, :, None]
+
+    def _scaled_forcing(self, n_samples: int) -> Array:
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T
+
+    def _relative_path(self, n_samples: int) -> Array:
+        """Positions minus the start, shape (n, d, S)."""
+        path = self.rollout(n_samples=n_samples).positions.transpose(0, 2, 1)
+        return path - self.starts[:, :, None]

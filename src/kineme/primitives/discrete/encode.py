@@ -10,16 +10,16 @@ from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import even_rows, extents_of, relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.primitives.discrete.dmp import DMP
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.operators import encoder
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.specification import Specification
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 
 _TILE_SAMPLES = 200_000  # in one tile: larger ones do not fit the cache, with smaller ones threads wait for each other
 
 
-def encode(dmp: DMP, movements: Any) -> Primitives:
+def encode(dmp: Specification, movements: MovementsLike) -> dict[str, Any]:
     """Learn one primitive per movement; see `DMP.learn`."""
     demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
     n, n_dims = len(demos), demos.n_dims
@@ -39,17 +39,16 @@ def encode(dmp: DMP, movements: Any) -> Primitives:
     for_tiles(learn_tile, n, max(1, _TILE_SAMPLES // (n_dims * n_samples)))
     starts = demos.positions[demos.offsets[:-1]]
     check_movement(demos, starts, extents)
-    return Primitives(
-        dmp,
-        scaled_weights=weights,
-        starts=starts,
-        goals=demos.positions[demos.offsets[1:] - 1],
-        velocities=velocities / demos.durations[:, None],
-        durations=demos.durations,
-        extents=extents,
-        labels=demos.labels,
-        names=demos.names,
-    )
+    return {
+        "scaled_weights": weights,
+        "starts": starts,
+        "goals": demos.positions[demos.offsets[1:] - 1],
+        "velocities": velocities / demos.durations[:, None],
+        "durations": demos.durations,
+        "extents": extents,
+        "labels": demos.labels,
+        "names": demos.names,
+    }
 
 
 def check_movement(demos: Demonstrations, starts: Array, extents: Array) -> None:

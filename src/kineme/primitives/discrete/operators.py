@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.movements.preparation.spline import spline_matrix
-from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.fits import (
     differentiation_matrices,
     forcing_target,
@@ -17,6 +16,7 @@ from kineme.primitives.discrete.fits import (
     trajectory_regression,
 )
 from kineme.primitives.discrete.response import Response, spring_damper_response
+from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array
 
 
@@ -28,7 +28,7 @@ class Encoder(NamedTuple):
 
 
 @lru_cache(maxsize=32)
-def encoder(dmp: DMP, n_samples: int) -> Encoder:
+def encoder(dmp: Specification, n_samples: int) -> Encoder:
     """The encode matrix of `dmp` for movements of `n_samples` even samples."""
     u = np.linspace(0.0, 1.0, dmp.n_points)
     if dmp.fit == "trajectory":
@@ -47,12 +47,12 @@ def encoder(dmp: DMP, n_samples: int) -> Encoder:
 
 
 @lru_cache(maxsize=32)
-def decoder(dmp: DMP, n_samples: int, end: float = 1.0) -> Response:
+def decoder(dmp: Specification, n_samples: int, end: float = 1.0) -> Response:
     """The decode matrices of `dmp` at `n_samples` even times from 0 to `end` durations."""
     return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, end, n_samples))
 
 
 @lru_cache(maxsize=32)
-def forcing_matrix(dmp: DMP, n_samples: int) -> Array:
+def forcing_matrix(dmp: Specification, n_samples: int) -> Array:
     """Psi_S (S, N): from weights to f at `n_samples` even times, Eq. (2)."""
     return dmp.basis.design(np.linspace(0.0, 1.0, n_samples))

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
 from kineme.primitives.control.plan import Plan
+from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.rollout import rollout
 from kineme.validation import Array, check_number
-
-if TYPE_CHECKING:
-    from kineme.primitives.discrete.primitives import Primitives
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
 
 
 def plan_of(
-    primitive: Primitives,
+    primitive: Learned,
     start: ArrayLike | None = None,
     goal: ArrayLike | None = None,
     duration: float | None = None,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
+from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import decoder
+from kineme.primitives.discrete.specification import Specification
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import (
     LARGEST,
@@ -25,10 +26,6 @@ from kineme.validation import (
     check_samples,
     describe,
 )
-
-if TYPE_CHECKING:
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.discrete.primitives import Primitives
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
 _LONGEST = 10.0  # durations after which a movement that has not settled is given up
@@ -49,7 +46,7 @@ class Rollout(BaseRollout):
         From 0 [s].
     """
 
-    primitives: Primitives
+    primitives: Learned
     ratio: Array  # (n, d), what scale f is multiplied by
     starts: Array  # (n, d)
     goals: Array  # (n, d)
@@ -126,7 +123,7 @@ class Rollout(BaseRollout):
 
 
 def rollout(
-    primitives: Primitives,
+    primitives: Learned,
     start: ArrayLike | None,
     goal: ArrayLike | None,
     duration: ArrayLike | None,
@@ -212,7 +209,7 @@ def broadcast_length(n_primitives: int, options: dict[str, Array | None]) -> int
     return n
 
 
-def _ratio(primitives: Primitives, amplitudes: Array) -> Array:
+def _ratio(primitives: Learned, amplitudes: Array) -> Array:
     learned = primitives.goals - primitives.starts
     ratio = primitives.dmp.system.ratio(amplitudes, learned, primitives.extents)
     if not np.isfinite(ratio).all():
@@ -226,7 +223,7 @@ def _ratio(primitives: Primitives, amplitudes: Array) -> Array:
     return ratio
 
 
-def samples_at_rate(rate: float, durations: Array, dmp: DMP) -> int:
+def samples_at_rate(rate: float, durations: Array, dmp: Specification) -> int:
     """Samples per movement so that none is sampled more coarsely than `rate` [Hz]."""
     check_number("rate", rate, above=0.0)
     wanted = float(durations.max()) * rate * (1 - 1e-12) + 1

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.primitives.pose.tangent import to_tangent
@@ -61,7 +61,7 @@ class PoseDMP:
         if not isinstance(self.dmp, DMP):
             raise SpecificationError(f"expected dmp to be a kineme.DMP, got {self.dmp!r}; write PoseDMP(kineme.DMP())")
 
-    def learn(self, movements: Any) -> PosePrimitives:
+    def learn(self, movements: MovementsLike) -> PosePrimitives:
         """Learn one primitive per movement of 4 (orientation) or 7 columns (position, orientation), all at once.
 
         Parameters

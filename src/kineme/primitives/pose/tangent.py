@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import Step, preprocess
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.pose.quaternions import conjugate, normalized_rows, product
 from kineme.primitives.pose.rotation_vectors import exp
 from kineme.primitives.pose.unwrap import unwrapped
@@ -22,7 +22,7 @@ _ROUNDING = 1e-13  # rad; below it quaternions do not know whether they turn
 _TILE_SAMPLES = 10_000  # samples in one tile: with its intermediate results it stays in a core's cache
 
 
-def to_tangent(movements: Any, steps: Iterable[Step] = ()) -> tuple[Demonstrations, Array]:
+def to_tangent(movements: MovementsLike, steps: Iterable[Step] = ()) -> tuple[Demonstrations, Array]:
     """Replace quaternion columns by the rotation vector from the goal to the orientation, continuous along time.
 
     ``p(t) = 2 log(q(t) conj(q_goal))``, in the world frame, so that ``q(t) = exp(p(t)) q_goal`` and p ends at 0.

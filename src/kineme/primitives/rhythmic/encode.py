@@ -12,13 +12,13 @@ from kineme.errors import TrajectoryError
 from kineme.movements.preparation.preprocess import preprocess
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.encode import check_movement
 from kineme.primitives.rhythmic.cycle import fold
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import encoder, even_phases
 from kineme.primitives.rhythmic.periods import FEWEST_CYCLES, SAMPLES_PER_PERIOD, Periodicity, find_cycles
-from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
+from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 
@@ -27,7 +27,7 @@ _LEAST_EXPLAINED = 0.5  # share of the variance that a found period must explain
 _ALMOST = 1 - 1e-6
 
 
-def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
+def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, Any]:
     """Learn one limit cycle per movement; see `RhythmicDMP.learn`."""
     demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
     n, n_dims, H = len(demos), demos.n_dims, dmp.n_harmonics
@@ -50,18 +50,17 @@ def encode(dmp: RhythmicDMP, movements: Any) -> RhythmicPrimitives:
     _for_even_rows(demos, fold_tile)
     series = as_real(coefficients)
     shape = series[:, :, 1:] @ waves(even_phases(dmp.n_points), H)[:, 1:].T
-    return RhythmicPrimitives(
-        dmp,
-        scaled_weights=series @ encoder(dmp),
-        baselines=starts + series[:, :, 0],
-        amplitudes=np.ptp(shape, axis=2).max(axis=1) / 2,
-        periods=demos.durations / found.cycles,
-        phases=phases,
-        aligned_on=aligned_on,
-        explained=explained,
-        labels=demos.labels,
-        names=demos.names,
-    )
+    return {
+        "scaled_weights": series @ encoder(dmp),
+        "baselines": starts + series[:, :, 0],
+        "amplitudes": np.ptp(shape, axis=2).max(axis=1) / 2,
+        "periods": demos.durations / found.cycles,
+        "phases": phases,
+        "aligned_on": aligned_on,
+        "explained": explained,
+        "labels": demos.labels,
+        "names": demos.names,
+    }
 
 
 def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Array], None]) -> None:
@@ -79,7 +78,7 @@ def _for_even_rows(demos: Demonstrations, work: Callable[[NDArray[np.intp], Arra
         for_tiles(tile, len(group), max(1, _TILE_SAMPLES // (demos.n_dims * length)))
 
 
-def periodicity(dmp: RhythmicDMP, demos: Demonstrations) -> Periodicity:
+def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicity:
     """Periods per recording: from the given period, or estimated; refused if there is none."""
     n = len(demos)
     if dmp.period is not None:

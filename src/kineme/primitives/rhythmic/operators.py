@@ -13,12 +13,12 @@ import numpy as np
 
 from kineme.primitives.discrete.fits import ridge_regression
 from kineme.primitives.rhythmic.harmonics import Complex, as_real, waves
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
+from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.validation import Array
 
 
 @lru_cache(maxsize=32)
-def encoder(dmp: RhythmicDMP) -> Array:
+def encoder(dmp: RhythmicSpecification) -> Array:
     """From a cycle's Fourier coefficients `as_real`, (2 H + 1,), to its weights times amplitude: shape (2 H + 1, N)."""
     H = dmp.n_harmonics
     phases = even_phases(dmp.n_points)
@@ -34,7 +34,7 @@ def encoder(dmp: RhythmicDMP) -> Array:
     return _frozen((ridge_regression(dmp.basis.design(phases), dmp.ridge_strength) @ target).T)
 
 
-def trajectory_regression(dmp: RhythmicDMP) -> Array:
+def trajectory_regression(dmp: RhythmicSpecification) -> Array:
     """Least squares of the path itself on the periodic response, (N, T).
 
     Minimizes ``mean (y - Phi W)^2 + ridge mean (diff^2 W / K)^2``; the second differences go around the circle.
@@ -49,14 +49,14 @@ def trajectory_regression(dmp: RhythmicDMP) -> Array:
     return np.asarray(np.linalg.solve(gram, Phi.T / len(phases)) * dmp.K)
 
 
-def transfer(dmp: RhythmicDMP, n_harmonics: int) -> Complex:
+def transfer(dmp: RhythmicSpecification, n_harmonics: int) -> Complex:
     """Response of x to a unit harmonic of the forcing, ``1 / (K - omega^2 + i omega D)``, shape (H + 1,)."""
     omega = 2 * np.pi * np.arange(n_harmonics + 1)
     return np.asarray(1 / (dmp.K - omega**2 + 1j * omega * dmp.D))
 
 
 @lru_cache(maxsize=32)
-def limit_cycle(dmp: RhythmicDMP) -> Complex:
+def limit_cycle(dmp: RhythmicSpecification) -> Complex:
     """Fourier coefficients of the periodic response of x - b to each weight, shape (N, H + 1)."""
     spectrum = dmp.basis.spectrum()
     h = np.arange(len(spectrum))
@@ -65,7 +65,7 @@ def limit_cycle(dmp: RhythmicDMP) -> Complex:
 
 
 @lru_cache(maxsize=32)
-def forcing_matrix(dmp: RhythmicDMP, n_samples: int) -> Array:
+def forcing_matrix(dmp: RhythmicSpecification, n_samples: int) -> Array:
     """Psi (S, N): from weights to f at `n_samples` even phases from 0, the last one step before 2 pi."""
     return _frozen(dmp.basis.design(even_phases(n_samples)))
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
 from kineme.primitives.control.plan import Plan
+from kineme.primitives.rhythmic.learned import RhythmicLearned
 from kineme.primitives.rhythmic.rollout import rollout
 from kineme.validation import Array
-
-if TYPE_CHECKING:
-    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
 
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
-def plan_of(primitive: RhythmicPrimitives, options: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
+def plan_of(primitive: RhythmicLearned, options: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
     """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
 
     A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.

@@ -1,25 +1,25 @@
-"""The specification of a rhythmic DMP."""
+"""`RhythmicDMP`, the specification that learns, and `RhythmicPrimitives`, what it learns."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
-from kineme.movements.preparation.preprocess import check_steps
-from kineme.primitives.discrete.dmp import MOST_POINTS
-from kineme.primitives.discrete.fits import FITS
-from kineme.primitives.rhythmic.basis import VonMisesBasis
-from kineme.primitives.spring_damper import SpringDamper
-from kineme.validation import check_choice, check_count, check_number
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
-
-APERIODIC = ("raise", "accept")
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.rhythmic.controller import RhythmicController
+from kineme.primitives.rhythmic.encode import encode
+from kineme.primitives.rhythmic.learned import RhythmicLearned
+from kineme.primitives.rhythmic.operators import forcing_matrix
+from kineme.primitives.rhythmic.plan import plan_of
+from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
+from kineme.primitives.rhythmic.specification import RhythmicSpecification
+from kineme.validation import Array, check_count, check_samples
 
 
 @dataclass(frozen=True)
-class RhythmicDMP(SpringDamper):
+class RhythmicDMP(RhythmicSpecification):
     """A rhythmic Dynamical Movement Primitive, as a frozen specification: a limit cycle that attracts.
 
     With the phase ``phi = 2 pi t / period`` shared by all dimensions, and in time u = t / period (' = d/du),
@@ -82,41 +82,7 @@ class RhythmicDMP(SpringDamper):
     0.8
     """
 
-    n_basis: int = 25
-    stiffness: float = 100.0
-    damping: float | None = None
-    fit: str = "trajectory"
-    ridge: float | None = None
-    n_points: int = 200
-    overlap: float = 0.5
-    period: float | None = None
-    align_on: int | None = None
-    aperiodic: str = "raise"
-    preprocessing: tuple[Any, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_choice("fit", self.fit, FITS)
-        check_choice("aperiodic", self.aperiodic, APERIODIC)
-        self._check_spring_damper()
-        if self.period is not None:
-            check_number("period", self.period, above=0.0)
-        if self.align_on is not None:
-            check_count("align_on", self.align_on, 0)
-        _ = self.basis  # checks its own parameters
-        check_count("n_points", self.n_points, 2 * self.n_basis, most=MOST_POINTS)
-        object.__setattr__(self, "preprocessing", check_steps(self.preprocessing))
-
-    @property
-    def basis(self) -> VonMisesBasis:
-        """Basis functions over the phase."""
-        return VonMisesBasis(self.n_basis, self.overlap)
-
-    @property
-    def n_harmonics(self) -> int:
-        """Number of harmonics of the folded cycle: twice as many as the basis functions can represent."""
-        return min(self.n_basis, (self.n_points - 1) // 2)
-
-    def learn(self, movements: Any) -> RhythmicPrimitives:
+    def learn(self, movements: MovementsLike) -> RhythmicPrimitives:
         """Learn one limit cycle per movement.
 
         Parameters
@@ -135,6 +101,145 @@ class RhythmicDMP(SpringDamper):
             Movements that cannot be used: see `Demonstrations`; no period found; less than one period; fewer than four
             samples per period; a movement that does not move.
         """
-        from kineme.primitives.rhythmic.encode import encode
+        return RhythmicPrimitives(self, **encode(self, movements))
 
-        return encode(self, movements)
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RhythmicPrimitives(RhythmicLearned):
+    """n limit cycles of d dimensions that share one specification; made by `RhythmicDMP.learn`.
+
+    Attributes
+    ----------
+    dmp : RhythmicDMP
+        The specification.
+    scaled_weights : ndarray of shape (n, d, N)
+        Weights times amplitude, ``r w``.
+    baselines : ndarray of shape (n, d)
+        b, the mean over whole periods, in the user's unit.
+    amplitudes : ndarray of shape (n,)
+        r, half of the largest minus the smallest position of the widest dimension, in the user's unit. One for all
+        dimensions: their proportions belong to the shape, and a dimension that does not move needs no division.
+    periods : ndarray of shape (n,)
+        Seconds.
+    phases : ndarray of shape (n,)
+        Phase at which the recording started, in [0, 2 pi). At phase 0 the first harmonic of the aligned dimension is
+        largest, so that recordings of one movement get the same weights wherever they start.
+    aligned_on : ndarray of shape (n,)
+        The aligned dimension.
+    explained : ndarray of shape (n,)
+        Share of the recording's variance that the folded cycle explains.
+    labels : ndarray of shape (n,) or None
+    names : tuple of str or None
+    """
+
+    SPECIFICATION = RhythmicDMP
+    KIND = "rhythmic primitives"
+
+    dmp: RhythmicDMP
+
+    @property
+    def weights(self) -> Array:
+        """Weights w, shape (n, N, d); they do not depend on baseline, amplitude and tempo."""
+        return (self.scaled_weights / self.amplitudes[:, None, None]).transpose(0, 2, 1)
+
+    def forcing(self, n_samples: int = 100) -> Array:
+        """The forcing term f at `n_samples` (S) even phases from 0, shape (n, S, d); without r, as the weights."""
+        return self.shape_attractor(n_samples) / self.amplitudes[:, None, None]
+
+    def shape_attractor(self, n_samples: int = 100) -> Array:
+        """The term as it acts in the equation, ``r f(phi)``, at `n_samples` (S) even phases, shape (n, S, d)."""
+        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
+        return (self.scaled_weights @ forcing_matrix(self.dmp, n_samples).T).transpose(0, 2, 1)
+
+    def rollout(  # noqa: PLR0913 - one parameter per option
+        self,
+        n_periods: float = 1.0,
+        *,
+        period: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        baseline: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        phase: ArrayLike = 0.0,
+        rate: float | None = None,
+        n_samples: int | None = None,
+    ) -> RhythmicRollout:
+        """Generate movements on the limit cycle or towards it, for any number of periods; all in one product.
+
+        Parameters
+        ----------
+        n_periods : float, default 1.0
+            Number of periods, not necessarily whole.
+        period, amplitude : float or array_like of shape (n,), optional
+            Seconds, and the user's unit; by default the demonstrated ones.
+        baseline : array_like of shape (d,) or (n, d), optional
+            By default the demonstrated one.
+        start, velocity : array_like of shape (d,) or (n, d), optional
+            State at the beginning, by default that of the limit cycle: no transient.
+        phase : float or array_like of shape (n,), default 0.0
+            Phase at the beginning [rad]; ``phase=primitives.phases`` starts where the recordings did.
+        rate : float, optional
+            Samples per second, at least.
+        n_samples : int, optional
+            Samples per movement, the last at `n_periods`; by default the specification's `n_points` per period. Give
+            this or `rate`.
+
+        Returns
+        -------
+        RhythmicRollout
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+
+        Raises
+        ------
+        TrajectoryError
+            An option of the wrong shape; numbers of movements that do not match.
+        SpecificationError
+            A period or n_periods of 0 or less, a rate too low to show a period.
+        """
+        options = {"period": period, "amplitude": amplitude, "phase": phase}
+        options |= {"baseline": baseline, "start": start, "velocity": velocity}
+        return rollout(self, options, n_periods, rate, n_samples)
+
+    def controller(  # noqa: PLR0913 - an option per parameter
+        self,
+        dt: float,
+        *,
+        phase: ArrayLike = 0.0,
+        period: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        baseline: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        feedback: str = "state",
+        phase_stopping: float | None = None,
+        goal_filter: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        avoidance: ObstacleAvoidance | None = None,
+    ) -> RhythmicController:
+        """One limit cycle under live control, in steps of `dt` [s].
+
+        Parameters
+        ----------
+        dt : float
+            Time of a step [s], at most 1000 periods.
+        phase, period, amplitude, baseline, start, velocity : optional
+            As in `rollout`, for one movement.
+        feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance : optional
+            What to do with measurements, new baselines and amplitudes, limits and obstacles; see
+            `kineme.control.Options`.
+
+        Returns
+        -------
+        RhythmicController
+            With ``step``, ``reset`` and ``state``. Its goal is the baseline; amplitude and period may change in a step.
+
+        Raises
+        ------
+        SpecificationError
+            More than one primitive; an option out of its range.
+        """
+        options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
+        changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
+        plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity})
+        return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,14 +13,12 @@ from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.rollout import broadcast_length, check_durations, per_movement
 from kineme.primitives.rhythmic.harmonics import as_real, waves
+from kineme.primitives.rhythmic.learned import RhythmicLearned
 from kineme.primitives.rhythmic.operators import limit_cycle
 from kineme.primitives.rhythmic.periods import SAMPLES_PER_PERIOD
+from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.primitives.spring_damper import transitions
 from kineme.validation import Array, check_count, check_number, check_samples
-
-if TYPE_CHECKING:
-    from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
-    from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,7 +31,7 @@ class RhythmicRollout(BaseRollout):
     spring-damper from the state off the cycle: ``x = b + a x_cycle(phi) + e^(A u) (z0 - z_cycle)``.
     """
 
-    primitives: RhythmicPrimitives
+    primitives: RhythmicLearned
     ratio: Array  # (n,), amplitude over the learned one
     baselines: Array  # (n, d)
     periods: Array  # (n,)
@@ -106,7 +103,7 @@ class RhythmicRollout(BaseRollout):
         return np.asarray(result + off_cycle @ rows.T)
 
 
-def cycle(primitives: RhythmicPrimitives, ratio: Array, phases: Array, turn: Array, order: int) -> Array:
+def cycle(primitives: RhythmicLearned, ratio: Array, phases: Array, turn: Array, order: int) -> Array:
     """The x - b, or a derivative in u, on the limit cycle `turn` (T,) radians past `phases`: (n, d, T)."""
     response = limit_cycle(primitives.dmp)
     harmonics = np.arange(response.shape[1])
@@ -121,7 +118,7 @@ def cycle(primitives: RhythmicPrimitives, ratio: Array, phases: Array, turn: Arr
 
 
 def rollout(
-    primitives: RhythmicPrimitives,
+    primitives: RhythmicLearned,
     options: dict[str, ArrayLike | None],
     n_periods: float,
     rate: float | None,
@@ -156,7 +153,9 @@ def rollout(
     )
 
 
-def _samples(dmp: RhythmicDMP, n_periods: float, periods: Array, rate: float | None, n_samples: int | None) -> int:
+def _samples(
+    dmp: RhythmicSpecification, n_periods: float, periods: Array, rate: float | None, n_samples: int | None
+) -> int:
     if rate is not None and n_samples is not None:
         raise SpecificationError("expected either rate or n_samples, got both")
     if rate is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.styles.metrics import compared
@@ -108,7 +109,7 @@ class StyleModel:
             raise SpecificationError(f"expected one style at each end, got {len(a)} and {len(b)}")
         return self.primitive(np.linspace(a[0], b[0], n), extrapolate)
 
-    def style_of(self, movements: Any) -> StyleEstimate:
+    def style_of(self, movements: MovementsLike) -> StyleEstimate:
         """Recover styles by least squares: the style whose movement is closest in the metric.
 
         Parameters

@@ -1,0 +1,92 @@
+"""What users write after the pages is complete to a type checker: ``mypy --strict`` passes on every page."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+_UNTYPED = "matplotlib.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
+_CONFIGURATION = f"[mypy]\nstrict = True\n[mypy-{_UNTYPED}]\nignore_missing_imports = True\n"
+
+#: What comes back is a record, which an editor completes, and not Any.
+RESULTS = """
+import kineme
+import numpy as np
+
+demos = kineme.load_lasa()
+movement: kineme.Trajectory = demos[0]
+primitives: kineme.Primitives = kineme.DMP().learn(demos)
+rollout: kineme.Rollout = primitives.rollout(goal=np.zeros(2))
+cut: kineme.Segmentation = kineme.segment(movement)
+read: kineme.Recordings = kineme.read_recordings("recordings/")
+recognizer = kineme.Recognizer().fit(read)
+answer: kineme.Answer = recognizer.recognize(movement)
+answers: list[kineme.Answer] = recognizer.recognize(demos)
+for held in (demos, read, cut, rollout):
+    many: kineme.Demonstrations = kineme.Demonstrations.of(held)
+for array in (movement.positions, [movement.positions], [[0.0, 1.0, 2.0, 4.0]]):
+    kineme.DMP().learn(array)
+kineme.preprocess([cut, cut], [kineme.Smooth()])
+kineme.preprocess([movement, movement], (kineme.TrimRest(), kineme.Resample(50)))
+for taken in (demos, read, cut, rollout):
+    recognizer.predict(taken)
+with kineme.ActionLibrary("actions", create=True) as library:
+    library.learn(read)
+    reveal_type(library.recognize(movement))
+reveal_type(recognizer.spot(movement))
+reveal_type(recognizer.stream().update(0.0, [0.0, 0.0]))
+reveal_type(kineme.anchoring.propose(demos))
+reveal_type(primitives.controller(0.01))
+"""
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    """Lines of mypy about each page, by its name; all pages in one run."""
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "mypy.ini").write_text(_CONFIGURATION)
+    for page in PAGES:
+        blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+        (folder / f"{page.stem.replace('-', '_')}_page.py").write_text("\n".join(blocks), encoding="utf-8")
+    (folder / "results.py").write_text(RESULTS)
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--config-file",
+        "mypy.ini",
+        "--cache-dir",
+        str(ROOT / ".mypy_cache" / "pages"),
+    ]
+    done = subprocess.run(
+        [*command, *sorted(path.name for path in folder.glob("*.py"))],
+        capture_output=True, text=True, check=False, cwd=folder, env={**os.environ, "MYPYPATH": str(ROOT / "src")},
+    )  # fmt: skip
+    assert done.returncode in (0, 1), done.stderr
+    return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_python_of_pages_passes(checked, page):
+    assert not [
+        line for line in checked if line.startswith(f"{page.stem.replace('-', '_')}_page.py") and "error" in line
+    ]
+
+
+def test_results_are_records_and_not_any(checked):
+    about = [line for line in checked if line.startswith("results.py")]
+    assert not [line for line in about if "error" in line]
+    revealed = [line.partition('Revealed type is "')[2].rstrip('"') for line in about if "Revealed" in line]
+    assert len(revealed) == RESULTS.count("reveal_type")
+    assert not [one for one in revealed if "kineme." not in one]  # Any, list[Any]
+
+
+def test_nothing_else_is_wrong(checked):
+    assert not [line for line in checked if "error" in line and not re.match(r"\w+_page\.py|results\.py|Found ", line)]
