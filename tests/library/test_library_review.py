@@ -6,9 +6,12 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import kineme
+from kineme.anchoring.proposals.proposals import Proposal, Proposals
+from kineme.library.symbols.proposals import _without
 
 MIXED = {"CShape": "round", "GShape": "gee", "NShape": "mixed", "Sine": "mixed"}
 
@@ -56,3 +59,18 @@ def test_one_symbol_has_nothing_to_be_compared_with(tmp_path):
         assert library.review().merges == ()
         library.learn(kineme.load_lasa(["CShape"]))
         assert library.review().splits == ()
+
+
+@pytest.mark.parametrize(("rejected", "left"), [(8, 1), (7, 2)])
+def test_a_proposal_is_left_out_if_four_fifths_of_it_were_rejected(rejected, left):
+    """The others are numbered anew."""
+    members = (np.arange(10), np.arange(10, 14))
+    found = Proposals(
+        tuple(Proposal(some, int(some[0]), 1.0, 1.0, 1 - k, 0.5) for k, some in enumerate(members)),
+        np.repeat([0, 1], [10, 4]),
+        np.ones(3),
+    )
+    kept = _without(found, [np.arange(rejected)])
+    assert [len(one) for one in kept.proposals] == [10, 4][-left:]
+    assert kept.clusters.tolist() == ([-1] * 10 + [0] * 4 if left == 1 else [0] * 10 + [1] * 4)
+    assert kept[-1].nearest == (None if left == 1 else 0)

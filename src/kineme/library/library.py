@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from kineme.library.symbols.proposals import LibraryProposals
     from kineme.library.symbols.review import Review
     from kineme.movements.trajectories.demonstrations import Demonstrations
+    from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementsLike
     from kineme.movements.trajectories.trajectory import Trajectory
     from kineme.primitives.discrete.dmp import DMP
     from kineme.primitives.discrete.primitives import Primitives
@@ -221,7 +222,7 @@ class ActionLibrary:
     def recognize(self, movements: Trajectory | NDArray[Any], error_rate: float = ...) -> Answer: ...
 
     @overload
-    def recognize(self, movements: Demonstrations | Sequence[Any], error_rate: float = ...) -> list[Answer]: ...
+    def recognize(self, movements: HasDemonstrations | Sequence[Any], error_rate: float = ...) -> list[Answer]: ...
 
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.

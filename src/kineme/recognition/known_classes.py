@@ -21,6 +21,7 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, answers, known_labels
 from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 
 
@@ -92,8 +93,10 @@ def fit_known_classes(
 
 
 def _known(comparison: Comparison, references: References, classifier: str) -> KnownClasses:
-    calibration = calibrate(comparison.similarity, references)
-    return KnownClasses(comparison, references, fit_classifier(classifier, comparison, references), calibration)
+    with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
+        fitted = fit_classifier(classifier, comparison, references)
+        calibration = calibrate(comparison.similarity, references)
+    return KnownClasses(comparison, references, fitted, calibration)
 
 
 def open_set_labels(
