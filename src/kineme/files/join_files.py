@@ -18,6 +18,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.output.text import counted
 
 
 class Source(NamedTuple):
@@ -90,7 +91,8 @@ class Recordings:
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
-        return f"Recordings({self.demonstrations!r}, {n_files} files, {len(self.problems)} problems)"
+        files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
+        return f"Recordings({self.demonstrations!r}, {files}, {problems})"
 
     def without_labels(self) -> Recordings:
         """The same movements, with no label on any."""
