@@ -70,8 +70,6 @@ EXEMPT = {
     "primitives.styles.figure.draw_morph": "one picture",
     "primitives.styles.learn.learn_styles": "what differs within the batch; see test_order_of_training.py",
     "movements.trajectories.collect.collect_trajectories": "joins arrays that the table's movements are made of",
-    "movements.trajectories.demonstrations.Demonstrations.dimensions": "names of columns, the same for all",
-    "movements.trajectories.demonstrations.Demonstrations.from_dataframe": "reads a table, movement by movement",
     "movements.trajectories.demonstrations.require_labels": "hands out labels, or raises",
     "movements.preparation.preprocess.Step.apply": "a protocol; the steps are in the table",
     "movements.trajectories.trajectory.Trajectory.n_dims": "of one movement; its length counts samples",
