@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from kineme.files.inspection.inspect import labels_in_order
-from kineme.files.join_files import Recordings
+from kineme.files.merge_files import Recordings
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
