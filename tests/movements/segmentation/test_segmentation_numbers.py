@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kineme import Trajectory, TrajectoryError, segment
-from kineme.movements.segmentation.motion import Motion, observe
+from kineme.movements.segmentation.motion import Motion, noise_variance, observe
 from kineme.movements.segmentation.onset import onset_rows
 
 
@@ -23,6 +23,13 @@ def test_what_smoothing_moves_the_ends_outward_is_taken_back_half_way(smooth, no
         (start, end), cutoff = segment(recording).cuts[0], observe(recording, 0.05).cutoff
         errors += [(1.5 - start) * cutoff, (end - 2.5) * cutoff]
     assert np.mean(errors) == pytest.approx(-0.15 if smooth else 0.15, abs=0.08)
+
+
+def test_the_variance_of_noise_is_found_beside_a_movement_and_jumps():
+    t = np.linspace(0.0, 1.0, 20_001)
+    x = np.column_stack((np.sin(5.0 * t), t**2)) + np.random.default_rng(0).normal(size=(len(t), 2)) * [0.01, 0.02]
+    x[::1000] += 1.0
+    assert noise_variance(x) == pytest.approx(0.01**2 + 0.02**2, rel=0.04)
 
 
 def _with_dips(*dips, share):

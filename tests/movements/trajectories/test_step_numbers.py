@@ -31,6 +31,14 @@ def test_rest_is_a_hundredth_of_the_extent():
     assert demos.durations[0] == pytest.approx(trimmed.duration)
 
 
+def test_the_extent_of_a_rest_is_the_diagonal_of_the_box():
+    """Both sides are 1, so rest is what stays within 0.01 sqrt 2 of the start; the drift is along x alone."""
+    way = np.linspace(0.05, 1.0, 60)
+    x = np.concatenate((np.linspace(0.0, 0.03, 301), way)), np.concatenate((np.zeros(301), way))
+    (trimmed,) = preprocess([np.column_stack(x)], [TrimRest()])
+    assert trimmed.positions[0, 0] == pytest.approx(0.01 * np.sqrt(2.0), abs=2e-4)
+
+
 def test_movements_are_resampled_to_two_hundred_points():
     assert len(preprocess([np.random.default_rng(0).normal(size=(37, 2))], [Resample()])[0]) == 200
 
