@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import kineme
 from bench.rows import Row
-from kineme.anchoring.proposals.proposals import propose
+from kineme.anchoring import propose
 from kineme.movements.preparation.perturbations import Perturbation
 
 #: All perturbations of one-shot recognition together.

@@ -16,7 +16,7 @@ from kineme.movements.segmentation.segmentation import Segmentation as Segmentat
 # Recordings in files, and data sets
 from kineme.files.recordings import read_recordings as read_recordings
 from kineme.files.recordings import read_recording as read_recording
-from kineme.files.join_files import Recordings as Recordings
+from kineme.files.merge_files import Recordings as Recordings
 from kineme.files.movements import write_movement as write_movement
 from kineme import datasets as datasets
 from kineme.datasets.lasa import load_lasa as load_lasa

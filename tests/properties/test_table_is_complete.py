@@ -37,6 +37,8 @@ OTHER_PARTS = {
 
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
+    "movements.trajectories.demonstrations.Demonstrations.dimensions": "of columns",
+    "movements.trajectories.demonstrations.Demonstrations.from_dataframe": "reads tables; from_arrays does the rest",
     "primitives.batch.Batch.join": "the former name of concatenate",
     "primitives.base_rollout.BaseRollout.axis_names": "of columns",
     "primitives.base_rollout.BaseRollout.plot": "one picture",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import arrays_movements, join
+from kineme.files.arrays.arrays import arrays_movements, parsed_arrays
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz
 from kineme.files.limits import check_expanded
@@ -62,7 +62,9 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
-    return join(demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos"))
+    return parsed_arrays(
+        demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
+    )
 
 
 def _read_bag(data: bytes, layout: Layout) -> Parsed:

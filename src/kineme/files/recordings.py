@@ -7,8 +7,8 @@ from pathlib import Path
 
 from kineme.errors import DataError
 from kineme.files.folders import files_under
-from kineme.files.join_files import Recordings, join_files
 from kineme.files.limits import max_file_bytes
+from kineme.files.merge_files import Recordings, merge_files
 from kineme.files.read_file import format_of, read_bytes, read_file
 from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -65,15 +65,15 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     if path.is_dir():
         files, problems = files_under(path, follow_links)
         watched = files if progress is None else progress(files)
-        return join_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
+        return merge_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
     if not path.exists():
         raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
-    return join_files([read_file(path, Path(path.name), layout)], str(path))
+    return merge_files([read_file(path, Path(path.name), layout)], str(path))
 
 
 def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
     """Read what a file of that name would hold, for data that come from elsewhere."""
-    return join_files([read_bytes(data, Path(name), layout)], name)
+    return merge_files([read_bytes(data, Path(name), layout)], name)
 
 
 def read_recording(path: str | Path) -> Trajectory:
@@ -94,7 +94,7 @@ def read_recording(path: str | Path) -> Trajectory:
     read = read_file(path, Path(path.name), Layout())
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    one = join_files([read], str(path)).demonstrations
+    one = merge_files([read], str(path)).demonstrations
     if len(one) > 1:
         raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
     return Trajectory(one[0].times, one[0].positions, name=path.name)

@@ -39,6 +39,7 @@ SINGLE = {
     "dates": pd.DataFrame({"timestamp": pd.Timestamp("2024-05-06") + pd.to_timedelta(T, "s"), "x": X, "y": Y}),
     "dates of a zone": pd.DataFrame({"time": pd.Timestamp("2024-05-06", tz="CET") + pd.to_timedelta(T, "s"), "x": X, "y": Y}),
     "dates as texts": pd.DataFrame({"time": [(datetime.datetime(2024, 5, 6) + datetime.timedelta(seconds=t)).isoformat() for t in T], "x": X, "y": Y}),
+    "an index that counts, with a name": _frame().rename_axis("part"),
     "dates in the index": pd.DataFrame({"x": X, "y": Y}, index=pd.Timestamp("2024-05-06") + pd.to_timedelta(T, "s")),
     "durations in the index": pd.DataFrame({"x": X, "y": Y}, index=pd.to_timedelta(T, "s")),
     "beside counters, texts and velocities": _frame(frame=np.arange(50), note="a", v_x=X, on=True),

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from sklearn.model_selection import cross_val_score
 
 import kineme
 from kineme import Demonstrations, Trajectory
@@ -105,6 +106,26 @@ def test_a_segmentation_is_recognized(letters, recognizer):
     assert recognizer.predict(pieces).tolist() == [one.label for one in shown]
     assert [one.name for one in pieces] == list(pieces.demonstrations.names)
     _same(pieces[1:], pieces.demonstrations[1:])
+
+
+def test_a_rollout_to_another_goal_is_recognized(letters, recognizer):
+    primitives = kineme.DMP().learn(letters)
+    goals = letters.positions[letters.offsets[1:] - 1] + [10.0, -5.0]
+    rollout = primitives.rollout(goal=goals, duration=2.0)
+    assert (recognizer.predict(rollout) == letters.labels).mean() > 0.9
+    assert recognizer.recognize(rollout[0]).label == recognizer.recognize(rollout)[0].label
+    _same(Demonstrations.of(rollout), rollout.demonstrations)
+
+
+def test_scikit_learn_splits_recordings(folder):
+    recordings = kineme.read_recordings(folder)
+    assert cross_val_score(kineme.Recognizer(), recordings, recordings.labels, cv=2).tolist() == [1.0, 1.0]
+
+
+def test_what_was_read_says_so(folder):
+    assert repr(kineme.read_recordings(folder)) == (
+        "Recordings(Demonstrations(16 movements, 2 dims (x, y), 125 samples each, 4 labels), 16 files, 0 problems)"
+    )
 
 
 def test_a_library_learns_recordings(folder, tmp_path):

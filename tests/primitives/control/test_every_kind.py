@@ -15,7 +15,7 @@ from kineme.primitives.control.plan import Plan
 
 U = np.linspace(0.0, 1.0, 100)
 RISE = U**3 * (10 - 15 * U + 6 * U**2)
-TURN = exp(np.outer(RISE, [0.3, 0.2, 1.5]))
+TURN = exp(np.column_stack((0.3 * RISE, 0.8 * RISE * (1 - U), 1.5 * RISE)))  # about an axis that changes
 
 
 def discrete():

@@ -41,16 +41,16 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     DataError
         No positions, or arrays that do not fit together.
     """
-    arrays = _axes_joined(arrays)
+    arrays = _axes_stacked(arrays)
     key = _named(arrays, POSITIONS)
     if key is not None:
         xs, ts, how = _of_one(arrays, _numbers(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
-    return join(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
+    return parsed_arrays(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
 
 
-def join(
+def parsed_arrays(
     xs: Sequence[Array],
     ts: Sequence[Array] | None,
     named: tuple[Sequence[str | None], str],
@@ -83,7 +83,7 @@ def join(
     return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
 
 
-def _axes_joined(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     """Coordinates ``x`` (T,), ``y`` (T,), ``z`` (T,) as positions (T, d)."""
     axes = [name for name in "xyz" if name in arrays]
     if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:

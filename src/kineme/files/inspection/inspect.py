@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.sampling import Sampling, sampling_of
-from kineme.files.join_files import Recordings
+from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED

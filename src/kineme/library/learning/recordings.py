@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from pathlib import PurePath
 from typing import Any
 
-from kineme.files.join_files import Recordings
-from kineme.files.join_files import Source as File
+from kineme.files.merge_files import Recordings
+from kineme.files.merge_files import Source as File
 from kineme.library.learning.learn import LearnReport, Progress, learn
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store

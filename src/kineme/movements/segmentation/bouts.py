@@ -26,7 +26,7 @@ def typical_duration(durations: Array) -> float:
     return float(ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())])
 
 
-def join_across(bouts: Rows, times: Array, gap: float) -> Rows:
+def merge_across(bouts: Rows, times: Array, gap: float) -> Rows:
     """Merge bouts that are at most `gap` seconds apart."""
     starts, ends = times[bouts[:, 0]], times[bouts[:, 1] - 1]
     apart = np.flatnonzero(starts[1:] - ends[:-1] > gap)

@@ -12,7 +12,7 @@ from kineme.movements.segmentation.bouts import (
     Rows,
     consecutive,
     durations_of,
-    join_across,
+    merge_across,
     moving_bouts,
     typical_duration,
 )
@@ -86,7 +86,7 @@ class Rest:
         # A rest is measured between extrapolated ends: a smooth reversal is no rest, however long it is slow.
         bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
         typical = typical_duration(durations_of(bouts, motion.times))
-        bouts = join_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
+        bouts = merge_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
         lasting = durations_of(bouts, motion.times)
         least = _MIN_MOVEMENT * typical_duration(lasting) if self.min_movement is None else self.min_movement
         return bouts, lasting >= least

@@ -51,10 +51,10 @@ def merge_close(
     steps = _usual_steps(times, offsets)
     if not steps.any():
         return None
-    joined = _joined(times, offsets, steps)
-    if not joined.any():
+    is_merged = _merged(times, offsets, steps)
+    if not is_merged.any():
         return None
-    heads = np.flatnonzero(~joined)
+    heads = np.flatnonzero(~is_merged)
     counts = np.diff(np.append(heads, len(times)))
     # The mean of differences lies within its group after rounding too.
     merged_times = times[heads] + np.add.reduceat(times - np.repeat(times[heads], counts), heads) / counts
@@ -89,22 +89,22 @@ def spread_close(times: Array, offsets: NDArray[np.intp]) -> Array:
     return spread
 
 
-def _joined(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
+def _merged(times: Array, offsets: NDArray[np.intp], steps: Array) -> NDArray[np.bool_]:
     """Whether each sample belongs to the group of the one before; `steps` are 0 for movements without close samples."""
     lengths, total = np.diff(offsets), len(times)
     step = np.repeat(steps, lengths)
-    joined = np.zeros(total, dtype=bool)
-    joined[1:] = np.diff(times) < SHARE * step[1:]
-    joined[offsets[:-1]] = False
-    heads = np.flatnonzero(~joined)
+    is_merged = np.zeros(total, dtype=bool)
+    is_merged[1:] = np.diff(times) < SHARE * step[1:]
+    is_merged[offsets[:-1]] = False
+    heads = np.flatnonzero(~is_merged)
     counts = np.diff(np.append(heads, total))
     spans = times[heads + counts - 1] - times[heads]
-    joined &= np.repeat(spans <= step[heads], counts)  # a longer group is a dense stretch
+    is_merged &= np.repeat(spans <= step[heads], counts)  # a longer group is a dense stretch
     since = times - np.repeat(times[heads], counts)
-    part = np.floor(np.divide(since, SHARE * step, out=np.zeros(total), where=joined))
-    joined[1:] &= part[1:] == part[:-1]
-    too_few = lengths - np.add.reduceat(joined, offsets[:-1], dtype=np.intp) < MIN_SAMPLES
-    return joined & ~np.repeat(too_few, lengths)
+    part = np.floor(np.divide(since, SHARE * step, out=np.zeros(total), where=is_merged))
+    is_merged[1:] &= part[1:] == part[:-1]
+    too_few = lengths - np.add.reduceat(is_merged, offsets[:-1], dtype=np.intp) < MIN_SAMPLES
+    return is_merged & ~np.repeat(too_few, lengths)
 
 
 def _usual_steps(times: Array, offsets: NDArray[np.intp]) -> Array:

@@ -34,7 +34,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
                 "use Demonstrations.from_arrays for arrays"
             )
     names = tuple(one.name for one in trajectories)
-    positions, offsets = _join([one.positions for one in trajectories], names)
+    positions, offsets = _concatenate([one.positions for one in trajectories], names)
     times = np.concatenate([one.times for one in trajectories])
     labels = [one.label for one in trajectories]
     labeled = any(label is not None for label in labels)
@@ -69,7 +69,7 @@ def collect_arrays(
         _refuse_transposed(offsets, positions.shape[1], names)
     check_finite(positions, offsets, names, "positions")
     check_extents(positions, offsets, names)
-    stamps = None if times is None else _join_times(times, offsets, names)
+    stamps = None if times is None else _concatenate_times(times, offsets, names)
     durations = np.ones(n) if stamps is None else stamps[offsets[1:] - 1] - stamps[offsets[:-1]]
     return Movements(
         positions,
@@ -114,7 +114,7 @@ def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[s
 
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
     known = tuple(names) if names is not None and len(names) == len(arrays) else None
-    return _join(_check_each(as_positions, (arrays,), known), known)
+    return _concatenate(_check_each(as_positions, (arrays,), known), known)
 
 
 def _check_sized(value: Any, expected: str) -> None:
@@ -132,7 +132,7 @@ def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...],
         raise
 
 
-def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
+def _concatenate(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
     if not checked:
         raise TrajectoryError("expected at least one movement, got none")
     lengths = np.fromiter(map(len, checked), np.intp, len(checked))
@@ -147,7 +147,7 @@ def _join(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.intp]]:
         ) from None
 
 
-def _join_times(
+def _concatenate_times(
     times: Sequence[ArrayLike] | Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None
 ) -> Array:
     n, lengths = len(offsets) - 1, np.diff(offsets)

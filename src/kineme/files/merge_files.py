@@ -18,6 +18,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.output.text import counted
 
 
 class Source(NamedTuple):
@@ -90,7 +91,8 @@ class Recordings:
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
-        return f"Recordings({self.demonstrations!r}, {n_files} files, {len(self.problems)} problems)"
+        files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
+        return f"Recordings({self.demonstrations!r}, {files}, {problems})"
 
     def without_labels(self) -> Recordings:
         """The same movements, with no label on any."""
@@ -99,7 +101,7 @@ class Recordings:
         return replace(self, demonstrations=plain, sources=sources)
 
 
-def join_files(files: Sequence[FileRead], where: str, problems: Sequence[Problem] = ()) -> Recordings:
+def merge_files(files: Sequence[FileRead], where: str, problems: Sequence[Problem] = ()) -> Recordings:
     """One `Recordings` of all files that hold movements.
 
     Raises
@@ -139,8 +141,8 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Dem
     blocks = [_block(one) for one in files]
     lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
-    positions = _joined([block.positions for block in blocks])
-    times = _joined([_stamps(block) for block in blocks])
+    positions = _concatenated([block.positions for block in blocks])
+    times = _concatenated([_stamps(block) for block in blocks])
     labels: Any = [source.label for source in sources]
     names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
@@ -150,7 +152,7 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Dem
     return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names, dimensions))
 
 
-def _joined(arrays: Sequence[Any]) -> Any:
+def _concatenated(arrays: Sequence[Any]) -> Any:
     return np.ascontiguousarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays))
 
 
