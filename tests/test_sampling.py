@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.comparison.sampling import evenly_spaced
+from kineme.sampling import evenly_spaced
 
 
 @given(n=st.integers(1, 5000), most=st.integers(1, 6000))

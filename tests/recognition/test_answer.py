@@ -57,7 +57,9 @@ def test_what_is_not_taken_out_is_not_in_the_transform():
 
 @pytest.mark.parametrize("classifier", ["nearest", "prototype", "svm"])
 def test_many_at_once_are_each_alone(classifier):
-    demos = draw_shapes([4] * 5, seed=4)
+    shapes = draw_shapes([4] * 5, seed=4)
+    lasting = [np.linspace(0.0, 1.0 + 0.1 * i, len(one)) for i, one in enumerate(shapes)]
+    demos = Demonstrations.from_arrays([one.positions for one in shapes], shapes.labels, lasting)
     recognizer = Recognizer(classifier=classifier).fit(demos)
     fresh = draw_shapes([2] * 5, seed=4, spread=0.2)
     answers = recognizer.recognize(fresh)
@@ -68,6 +70,8 @@ def test_many_at_once_are_each_alone(classifier):
         np.testing.assert_allclose(list(alone.p_values.values()), list(answer.p_values.values()))
         np.testing.assert_allclose(alone.transform.matrix, answer.transform.matrix, atol=1e-5)
         assert alone.confidence == pytest.approx(answer.confidence)
+        example = recognizer.demonstrations_[answer.nearest[0].index]
+        assert answer.transform.duration_ratio == pytest.approx(movement.duration / example.duration)
 
 
 def test_one_movement_in_a_list_is_a_list():

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.describe import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
-from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 ENOUGH = 8  # demonstrations of every class from which on weights are fitted

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.describe import Described
-from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.

@@ -9,6 +9,7 @@ import numpy as np
 from kineme.errors import SpecificationError
 from kineme.kernels._rows import Rows
 from kineme.kernels._sums import Term, fill_gram
+from kineme.sampling import evenly_spaced
 
 _MAX_ROWS = 1000
 _MAX_DIFFERENCES = 2**21
@@ -20,7 +21,7 @@ def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> flo
     Of large X, 1000 evenly spaced rows are used, so the result is deterministic. Pairs of equal rows are
     left out: copies of a row say nothing about the distances between different rows.
     """
-    rows = _evenly_spaced(X, _MAX_ROWS)
+    rows = _some_rows(X, _MAX_ROWS)
     sums = np.empty((len(rows), len(rows)))
     fill_gram(term, 0.0, finish, rows, None, sums)
     return _median_of_positive(sums[np.triu_indices(len(rows), 1)], len(X))
@@ -31,15 +32,14 @@ def median_difference(X: Rows) -> float:
 
     Of large X, as many evenly spaced rows are used as give about two million differences.
     """
-    rows = _evenly_spaced(X, max(10, min(_MAX_ROWS, int((2 * _MAX_DIFFERENCES / X.shape[1]) ** 0.5))))
+    rows = _some_rows(X, max(10, min(_MAX_ROWS, int((2 * _MAX_DIFFERENCES / X.shape[1]) ** 0.5))))
     first, second = np.triu_indices(len(rows), 1)
     return _median_of_positive(np.abs(rows[first] - rows[second]), len(X))
 
 
-def _evenly_spaced(X: Rows, n_rows: int) -> Rows:
-    if len(X) > n_rows:
-        X = X[np.linspace(0, len(X) - 1, n_rows).astype(np.intp)]
-    return np.ascontiguousarray(X, np.float64)
+def _some_rows(X: Rows, most: int) -> Rows:
+    """At most `most` evenly spaced rows, in double precision."""
+    return np.ascontiguousarray(X[evenly_spaced(len(X), most)] if len(X) > most else X, np.float64)
 
 
 def _median_of_positive(values: Rows, n_rows: int) -> float:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.references import References
-from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced

@@ -16,12 +16,12 @@ from kineme.anchoring.proposals.subsample import extend, largest_clustered, subs
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe
 from kineme.comparison.references import References
-from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.known_classes import KnownClasses, known_classes, open_set_labels
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count
 
 _REPEATS = 20

@@ -11,12 +11,12 @@ from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cu
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.propose import own_order
 from kineme.comparison.describe import Described, describe
-from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import averaged, compare, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count, check_number
 
 _LARGEST = 5000  # movements compared at once

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from numpy.typing import NDArray
 
 from kineme.files.inspection.inspect import labels_in_order
 from kineme.files.merge_files import Recordings
@@ -16,6 +15,7 @@ from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
+from kineme.sampling import evenly_spaced
 
 _PANELS = 30  # labels that are drawn
 _OVERLAID = 25  # movements of a label that are drawn, evenly spaced
@@ -52,7 +52,7 @@ def draw_recordings(recordings: Recordings) -> Figure:
 
 def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
     chosen = [i for i, one in enumerate(recordings.labels) if one == label]
-    drawn = _evenly_spaced(len(chosen), _OVERLAID)
+    drawn = evenly_spaced(len(chosen), _OVERLAID)
     paths = [_path(recordings.demonstrations[chosen[k]]) for k in drawn]
     opacity = max(0.25, 0.9 - 0.05 * len(paths))
     for path in paths:
@@ -87,7 +87,7 @@ def _tidy_space(axes: Any) -> None:
 
 def _path(one: Trajectory) -> Any:
     """The points of a movement that are drawn, (points, 2 or 3)."""
-    kept = _evenly_spaced(len(one), _POINTS)
+    kept = evenly_spaced(len(one), _POINTS)
     x = one.positions[kept, :3]
     return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))
 
@@ -100,8 +100,3 @@ def _key(across: str) -> list[Any]:
         Line2D([], [], linestyle="none", marker="*", color=ORANGE, markersize=7, label="end"),
         Line2D([], [], color=BLUE, linewidth=0.9, label=across),
     ]
-
-
-def _evenly_spaced(n: int, most: int) -> NDArray[np.intp]:
-    """At most `most` of the indices 0 to n - 1, the first and the last among them."""
-    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.intp))

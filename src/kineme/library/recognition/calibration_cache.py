@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.fit import fit_to_references
-from kineme.comparison.sampling import evenly_spaced
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored import StoredReferences
 from kineme.library.recognition.members import Members, described_references
@@ -22,6 +21,7 @@ from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
 from kineme.recognition.conformal import Calibration
 from kineme.recognition.sampled_calibration import calibrate_sample
+from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 FILE = "calibration.cache"

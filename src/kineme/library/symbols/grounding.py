@@ -12,7 +12,6 @@ from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
-from kineme.comparison.sampling import evenly_spaced
 from kineme.errors import SpecificationError
 from kineme.library.recognition.members import described
 from kineme.library.storage import read
@@ -20,6 +19,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
 from kineme.primitives.discrete.primitives import Primitives
+from kineme.sampling import evenly_spaced
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
 

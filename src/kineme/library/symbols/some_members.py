@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.sampling import evenly_spaced
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import symbols
 from kineme.movements.trajectories.labels import label_array
+from kineme.sampling import evenly_spaced
 
 _MOST = 3000  # movements that are compared at most, equally many of each symbol
 

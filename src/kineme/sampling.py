@@ -1,4 +1,4 @@
-"""Evenly spaced subsets of movements."""
+"""Evenly spaced subsets, where all would take too long."""
 
 from __future__ import annotations
 
