@@ -147,7 +147,8 @@ class Demonstrations(Sequence[Trajectory]):
         """
         if isinstance(movements, Demonstrations):
             return movements
-        if (held := getattr(movements, "demonstrations", None)) is not None:
+        held: Any = getattr(movements, "demonstrations", None)
+        if held is not None and held is not movements:
             return cls.of(held)
         several: Any = [movements] if isinstance(movements, Trajectory) or is_data_frame(movements) else movements
         if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
@@ -256,7 +257,8 @@ def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
     held = [one if isinstance(one, Demonstrations) else getattr(one, "demonstrations", None) for one in several]
     if not any(some is not None or isinstance(one, Trajectory) for one, some in zip(several, held, strict=True)):
         return None
-    return [each for one, some in zip(several, held, strict=True) for each in ([one] if some is None else some)]
+    parts = ([one] if some is None else Demonstrations.of(some) for one, some in zip(several, held, strict=True))
+    return [each for part in parts for each in part]
 
 
 def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
