@@ -106,6 +106,8 @@ class ActionLibrary:
     def __len__(self) -> int:
         return read.count(self.store)
 
+    __iter__ = None  # its length counts movements, its items are symbols: iterate `movements` or `symbols`
+
     def __repr__(self) -> str:
         dims = "" if self.n_dims is None else f"{self.n_dims} dims, "
         return (

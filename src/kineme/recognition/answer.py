@@ -83,7 +83,7 @@ class Answer:
 
     def __repr__(self) -> str:
         sure = f"confidence={self.confidence:.3g}, calibrated={self.calibrated}"
-        return f"Answer(label={self.label!r}, {sure}, like={self.nearest[0]})"
+        return f"Answer(label={self.label!r}, {sure}, nearest={self.nearest[0]})"
 
 
 def is_one(X: MovementsLike) -> bool:

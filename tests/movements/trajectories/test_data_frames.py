@@ -84,6 +84,14 @@ def test_a_long_frame_is_told_apart_by_its_columns():
     ]
 
 
+def test_groups_of_a_frame_are_movements():
+    groups = pd.concat([_frame(demo=0, label="wave"), _frame(demo=1, label="point")]).groupby("demo")
+    for movements in (groups, list(groups)):
+        demos = Demonstrations.of(movements)
+        _check(demos, 2)
+        assert demos.labels.tolist() == ["wave", "point"]
+
+
 def test_labels_that_are_numbers_stay_numbers():
     demos = Demonstrations.of([_frame(label=0), _frame(label=3)])
     assert demos.labels.tolist() == [0, 3]
@@ -110,6 +118,8 @@ REFUSED = {
     "time that stands still": (_frame(time=0.0), "trajectory 0: expected strictly increasing times"),
     "other coordinates": ([_frame(), _frame().rename(columns={"y": "z"})], r"data frame 1: expected the coordinates \['x', 'y'\] as in data frame 0, got \['x', 'z'\]"),
     "frames beside arrays": ([_frame(), np.ones((9, 2))], "expected data frames, got ndarray at index 1"),
+    "numbers that are words": (_frame().astype(str), r"expected a column of times and .*; there are no numbers in \['x', 'y'\]"),
+    "one column alone": (_frame()["x"], r"expected movements as a list of .*, got Series; pass its numbers, series.to_numpy\(\)"),
     "times that are words": (_frame(time="now"), "data frame 0: expected times in 'time', got 'now'"),
 }  # fmt: skip
 
