@@ -148,6 +148,12 @@ def test_every_color_of_a_picture_has_a_name_or_there_is_one_color():
         assert sum(len(legend.get_texts()) for legend in figure.legends) == n_named
 
 
+def test_a_movement_that_rests_has_a_picture_too(make_movement):
+    primitive = kineme.DMP("original", n_basis=10).learn([make_movement(1, 3)[1]])
+    here = primitive.starts[0]
+    primitive.rollout(start=here, goal=here, velocity=np.zeros(3)).plot().savefig(io.BytesIO())
+
+
 def test_a_table_has_a_row_for_each_sample(kind, rollout, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))  # whatever is installed
     table = rollout.to_dataframe()

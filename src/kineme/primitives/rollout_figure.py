@@ -34,11 +34,11 @@ def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: 
     """
     n, _, d = positions.shape
     drawn = np.arange(0, n, math.ceil(n / _MOST))
-    kinds = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
-    palette = _palette(len(kinds))
-    colors = [palette[0 if labels is None else kinds.index(label)] for label in _labels(labels, drawn)]
-    n_rows, is_named = min(d, _ROWS), 1 < len(kinds) <= _NAMED
-    figure = new_figure(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * is_named * (len(kinds) // _IN_A_ROW))
+    distinct = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
+    palette = _palette(len(distinct))
+    colors = [palette[0 if labels is None else distinct.index(label)] for label in _labels(labels, drawn)]
+    n_rows, is_named = min(d, _ROWS), 1 < len(distinct) <= _NAMED
+    figure = new_figure(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * is_named * (len(distinct) // _IN_A_ROW))
     over_time: Figure | SubFigure = figure
     if d in (2, 3):
         left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
@@ -59,7 +59,7 @@ def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: 
     if len(drawn) < n:
         figure.suptitle(f"{len(drawn)} of {n:,} movements", fontsize=9)
     if is_named:
-        _add_legend(figure, kinds, palette)
+        _add_legend(figure, distinct, palette)
     return figure
 
 
@@ -88,14 +88,15 @@ def _draw_paths(figure: SubFigure, paths: Array, axis_names: list[str], colors: 
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
     else:
-        axes.set_box_aspect(np.maximum(np.ptp(paths, axis=(0, 1)), 0.2 * np.ptp(paths, axis=(0, 1)).max()), zoom=0.8)
+        extents = np.ptp(paths, axis=(0, 1))
+        axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
         axes.locator_params(nbins=4)
 
 
-def _add_legend(figure: Figure, kinds: list[Any], palette: list[Any]) -> None:
+def _add_legend(figure: Figure, distinct: list[Any], palette: list[Any]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=color, label=drawable(str(kind))) for kind, color in zip(kinds, palette, strict=False)
+        Line2D([], [], color=color, label=drawable(str(label))) for label, color in zip(distinct, palette, strict=False)
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), _IN_A_ROW))
