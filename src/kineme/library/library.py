@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.demonstrations import Demonstrations
     from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementsLike
     from kineme.movements.trajectories.trajectory import Trajectory
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.discrete.primitives import Primitives
+    from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
     from kineme.recognition.recognizer import Recognizer
 

@@ -14,7 +14,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.validation import Array
 
 _INCHES = 6.9  # width of a map

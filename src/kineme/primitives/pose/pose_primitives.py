@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.batch import Batch
 from kineme.primitives.control import ObstacleAvoidance, Options
-from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.plan import plan_of
-from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
 from kineme.primitives.persistence import Arrays
 from kineme.primitives.pose.pose_controller import PoseController

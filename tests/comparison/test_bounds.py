@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from movement_samples import draw_shapes
 
-from kineme.comparison.averages import LOG_MEANS
 from kineme.comparison.bounds import fit_bases, log_bounds, reduce_features
 from kineme.comparison.describe import feature_rows, prepare
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.procrustes import Procrustes
