@@ -46,6 +46,19 @@ def test_a_good_cache_is_believed(tmp_path, monkeypatch, labels):
         assert _answers(library) == expected
 
 
+def test_a_cache_of_other_members_is_not_believed_however_many_they_are(tmp_path):
+    """Two movements change places: names and sizes of symbols stay."""
+    with ActionLibrary(tmp_path, create=True) as library:
+        ids = library.learn(draw_movements(12, n_samples=12, labels=LABELS[0])).ids
+        before = _answers(library)
+        library.assign(ids[:1], "nod")
+        library.assign(ids[4:5], "wave")
+        found = _answers(library)
+        (tmp_path / CALIBRATION).unlink()
+        assert found == _answers(library)
+        assert found != before
+
+
 def _header(data, **changes):
     """Codes with another header, and the checksum that fits."""
     header = json.loads(data[: features_cache._HEADER].rstrip(b"\0")) | changes

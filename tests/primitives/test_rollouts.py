@@ -135,6 +135,12 @@ def test_a_picture_has_any_number_of_dimensions_and_not_too_many_lines(make_move
     assert all(len(axes.lines) <= 150 for axes in figure.findobj(match=_is_axes))
 
 
+def test_a_movement_that_rests_has_a_picture_too(make_movement):
+    primitive = kineme.DMP("original", n_basis=10).learn([make_movement(1, 3)[1]])
+    here = primitive.starts[0]
+    primitive.rollout(start=here, goal=here, velocity=np.zeros(3)).plot().savefig(io.BytesIO())
+
+
 def test_a_table_has_a_row_for_each_sample(kind, rollout, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))  # whatever is installed
     table = rollout.to_dataframe()

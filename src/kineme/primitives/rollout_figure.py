@@ -31,8 +31,10 @@ def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: 
     """
     n, _, d = positions.shape
     drawn = np.arange(0, n, math.ceil(n / _MOST))
-    kinds = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
-    colors = [_COLORS[0 if labels is None else kinds.index(label) % len(_COLORS)] for label in _labels(labels, drawn)]
+    distinct = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
+    colors = [
+        _COLORS[0 if labels is None else distinct.index(label) % len(_COLORS)] for label in _labels(labels, drawn)
+    ]
     n_rows = min(d, _ROWS)
     figure = new_figure(7.2, max(3.2, 1.0 + 0.95 * n_rows))
     over_time: Figure | SubFigure = figure
@@ -54,8 +56,8 @@ def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: 
         axes.set_xlabel("time [s]")
     if len(drawn) < n:
         figure.suptitle(f"{len(drawn)} of {n:,} movements", fontsize=9)
-    if 1 < len(kinds) <= len(_COLORS):
-        _add_legend(figure, kinds)
+    if 1 < len(distinct) <= len(_COLORS):
+        _add_legend(figure, distinct)
     return figure
 
 
@@ -77,14 +79,15 @@ def _draw_paths(figure: SubFigure, paths: Array, axis_names: list[str], colors: 
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
     else:
-        axes.set_box_aspect(np.maximum(np.ptp(paths, axis=(0, 1)), 0.2 * np.ptp(paths, axis=(0, 1)).max()), zoom=0.8)
+        extents = np.ptp(paths, axis=(0, 1))
+        axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
         axes.locator_params(nbins=4)
 
 
-def _add_legend(figure: Figure, kinds: list[Any]) -> None:
+def _add_legend(figure: Figure, distinct: list[Any]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=color, label=drawable(str(kind))) for kind, color in zip(kinds, _COLORS, strict=False)
+        Line2D([], [], color=color, label=drawable(str(label))) for label, color in zip(distinct, _COLORS, strict=False)
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))

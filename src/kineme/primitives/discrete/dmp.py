@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.control import Controller, ObstacleAvoidance, Options
+from kineme.primitives.control.controller import Controller
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.primitives.control.options import Options
 from kineme.primitives.discrete.encode import encode
 from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.learned import Learned

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.batch import Batch
-from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.primitives.control.options import Options
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement

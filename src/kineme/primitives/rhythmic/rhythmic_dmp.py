@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.control import ObstacleAvoidance, Options
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.primitives.control.options import Options
 from kineme.primitives.rhythmic.controller import RhythmicController
 from kineme.primitives.rhythmic.encode import encode
 from kineme.primitives.rhythmic.learned import RhythmicLearned

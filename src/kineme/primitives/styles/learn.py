@@ -34,7 +34,7 @@ def learn_styles(
     Parameters
     ----------
     primitives : Primitives
-        n demonstrations of one kind of movement.
+        n demonstrations of one movement.
     n_styles : int, optional
         Number J of style parameters.
     variance : float, optional

@@ -28,7 +28,7 @@ class StyleEstimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StyleModel:
-    """Primitives of one kind as a function of a style s of J numbers; made by `learn_styles`.
+    """Primitives of one label as a function of a style s of J numbers; made by `learn_styles`.
 
     Every number of a primitive is affine in s, ``theta(s) = mean + s @ basis``, so styles mix like the
     demonstrations' paths do; ln tau is affine in s too. Style zero is the average.
