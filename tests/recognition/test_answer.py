@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from movement_samples import draw_shapes, turn
 
 from kineme import Demonstrations, Recognizer, Trajectory
-from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.log_averages import LOG_MEANS
 
 any_seed = given(seed=st.integers(0, 10**6))
 

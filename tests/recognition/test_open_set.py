@@ -12,7 +12,7 @@ from sklearn.metrics import roc_auc_score
 
 import kineme
 from kineme import Recognizer, SpecificationError
-from kineme.comparison.compared import nearest as nearest_of_each
+from kineme.comparison.scores import nearest as nearest_of_each
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
 

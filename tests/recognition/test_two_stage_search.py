@@ -14,7 +14,7 @@ from kineme import Demonstrations, Recognizer
 from kineme.comparison import stored
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import feature_rows
-from kineme.comparison.stored import StoredReferences
+from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch

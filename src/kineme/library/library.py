@@ -31,10 +31,9 @@ if TYPE_CHECKING:
     from kineme.library.symbols.proposals import LibraryProposals
     from kineme.library.symbols.review import Review
     from kineme.movements.trajectories.demonstrations import Demonstrations
-    from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementsLike
+    from kineme.movements.trajectories.movements_like import HasDemonstrations
     from kineme.movements.trajectories.trajectory import Trajectory
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.discrete.primitives import Primitives
+    from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
     from kineme.recognition.recognizer import Recognizer
 
@@ -230,8 +229,9 @@ class ActionLibrary:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
         With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, few are, which are
-        chosen by short codes of all: the label is the same, and p-values are given for the 64 nearest symbols. The
-        first answer after a change takes longer; what it prepares is cached beside the database unless `read_only`.
+        chosen by bounds from the reduced features of all: the label is the same, and p-values are given for the 64
+        nearest symbols. The first answer after a change takes longer; what it prepares is cached beside the database
+        unless `read_only`.
 
         Parameters
         ----------

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from movement_samples import draw_shapes
 
 from kineme import Recognizer, SpecificationError
-from kineme.comparison.averages import LOG_MEANS, SHARES
+from kineme.comparison.log_averages import LOG_MEANS, SHARES
 
 any_seed = given(seed=st.integers(0, 10**6))
 
