@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes
 
 from kineme import Demonstrations, Recognizer
 from kineme.comparison import stored
@@ -18,6 +17,7 @@ from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
+from movement_samples import draw_shapes
 
 
 def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
