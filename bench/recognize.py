@@ -13,7 +13,7 @@ from bench.peers import dtw_nearest
 from bench.rows import Row
 from bench.space import lifted
 from bench.timing import medians
-from kineme.comparison.compared import Compared
+from kineme.comparison.scores import Compared
 from kineme.movements.preparation.perturbations import Perturbation
 
 SHORTEST, LONGEST = 120, 200

@@ -112,3 +112,38 @@ def test_no_tracked_file_contains(what, pattern):
         str(path.relative_to(ROOT)): match[0] for path in _tracked() if (match := re.search(pattern, path.read_bytes()))
     }
     assert not found, what
+
+
+#: Words for which the field has others: score, options, neighbor, weight, cluster map, grounding.
+_PRIVATE = {
+    "judge",
+    "wish",
+    "wishes",
+    "mate",
+    "mates",
+    "speak",
+    "speaks",
+    "loud",
+    "shout",
+    "unheard",
+    "sheet",
+    "regain",
+    "seen",
+}
+
+
+def _names(path):
+    """What a file names: functions, classes, arguments and variables."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            yield node.name
+        elif isinstance(node, ast.arg):
+            yield node.arg
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+
+
+def test_names_are_the_fields_words():
+    named = {name for path in SOURCES for name in _names(path)}
+    words = {name: set(re.sub("([a-z])([A-Z])", r"\1_\2", name).lower().split("_")) for name in named}
+    assert not {name for name, parts in words.items() if parts & _PRIVATE}

@@ -17,7 +17,7 @@ from kineme.movements.segmentation.segmentation import Segmentation as Segmentat
 from kineme.files.recordings import read_recordings as read_recordings
 from kineme.files.recordings import read_recording as read_recording
 from kineme.files.merge_files import Recordings as Recordings
-from kineme.files.movements import write_movement as write_movement
+from kineme.files.write_movement import write_movement as write_movement
 from kineme import datasets as datasets
 from kineme.datasets.lasa import load_lasa as load_lasa
 

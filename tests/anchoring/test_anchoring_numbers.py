@@ -7,7 +7,6 @@ from importlib import import_module
 import numpy as np
 import pytest
 from sklearn.utils import Bunch
-from unlabeled_samples import draw_kinds
 
 from kineme import DMP, Demonstrations, Recognizer
 from kineme.anchoring.clustering import number_of_clusters
@@ -18,6 +17,7 @@ from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import Split, suggest_merges, suggest_splits
 from kineme.anchoring.proposals.subsample import largest_clustered, radii, subsample
 from kineme.comparison.describe import describe
+from unlabeled_samples import draw_kinds
 
 
 def _space(ab, ac, cb):

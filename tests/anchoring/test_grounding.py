@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from unlabeled_samples import draw_kinds
 
 import kineme
 from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
 from kineme.primitives.discrete.formulations import FORMULATIONS
+from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)
 WAVE = SymbolName("sym-1", "wave", "a hand says hello", ("sym-0",))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from unlabeled_samples import draw_kinds
 
 import kineme.anchoring
 from kineme.anchoring.grounding.space import conceptual_space
+from unlabeled_samples import draw_kinds
 
 RENAMED = {"place": "assign", "Placement": "Assignment", "see": "describe", "see_rows": "describe_rows"}
 

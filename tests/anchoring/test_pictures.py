@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib import image
-from unlabeled_samples import draw_kinds
 
 import kineme
 import kineme.anchoring
@@ -18,6 +17,7 @@ from kineme.anchoring.proposals.propose import propose
 from kineme.comparison.alignment import paths_of
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.output.figures import save_figure
+from unlabeled_samples import draw_kinds
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 4])

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.cluster import AgglomerativeClustering
-from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
 import kineme
 from kineme.anchoring.proposals.proposals import describe_clusters
@@ -20,6 +19,7 @@ from kineme.comparison.similarity import averaged, similarities
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
+from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
 METHODS = ("agglomerative", "hdbscan")
 seeds = st.integers(0, 10_000)

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
-from unlabeled_samples import draw_kinds
 
 import kineme
 from kineme.anchoring.figures.symbol_map import apart, classical_scaling
 from kineme.anchoring.grounding.morph import morph
 from kineme.anchoring.grounding.space import ConceptualSpace, conceptual_space
 from kineme.recognition.recognizer import Recognizer
+from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=8, deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
 import kineme
 from kineme.anchoring.proposals.assign import assign
 from kineme.anchoring.proposals.merge_split import suggest_merges, suggest_splits
 from kineme.recognition.recognizer import Recognizer
+from unlabeled_samples import ALL_TOGETHER, draw_kinds
 
 quick = settings(max_examples=5, deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.files.movements import write_movement
 from kineme.files.recordings import read_recording
+from kineme.files.write_movement import write_movement
 
 
 def run(*arguments, by=commands.run, **options):

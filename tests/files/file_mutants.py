@@ -16,7 +16,7 @@ import numpy as np
 
 import kineme
 from kineme.orientation import PosePrimitives
-from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives
 
 N_SAMPLES = 12
 WORDS = (

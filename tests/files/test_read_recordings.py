@@ -8,8 +8,8 @@ import pytest
 
 import kineme
 from kineme.files.formats import FORMATS
-from kineme.files.movements import write_movement
 from kineme.files.recordings import read_recording, read_recordings
+from kineme.files.write_movement import write_movement
 
 
 @pytest.mark.parametrize("source", lasa_files.SOURCES)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.files.movements import WRITERS, write_movement
 from kineme.files.recordings import read_recording
+from kineme.files.write_movement import WRITERS, write_movement
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 PATH = np.array([[0.0, 1.0], [0.5, 1.5], [1.0, 2.5], [1.5, 2.0], [2.0, 3.0]])

@@ -333,3 +333,11 @@ def test_what_is_no_text_names_no_symbol(tmp_path, who):
         for ask in (library.__getitem__, library.nearest):
             with pytest.raises(SpecificationError, match="expected"):
                 ask(who)
+
+
+def test_a_library_is_not_iterated_over(library):
+    library.learn(draw_movements(3, 2, 0, False), labels=["a", "b", "b"])
+    with pytest.raises(TypeError, match="not iterable"):
+        list(library)
+    assert "a" in library
+    assert [one.name for one in library.symbols()] == ["a", "b"]

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import kineme
@@ -133,6 +134,18 @@ def test_a_picture_has_any_number_of_dimensions_and_not_too_many_lines(make_move
     figure.savefig(io.BytesIO())
     assert figure.get_suptitle() == "50 of 500 movements"
     assert all(len(axes.lines) <= 150 for axes in figure.findobj(match=_is_axes))
+
+
+def test_every_color_of_a_picture_has_a_name_or_there_is_one_color():
+    u = np.linspace(0.0, 1.0, 30)
+    for n, n_named in ((1, 0), (4, 4), (5, 5), (30, 30), (31, 0)):
+        demos = kineme.Demonstrations.from_arrays(
+            [np.column_stack((u, u**2))] * n, labels=[f"label {i}" for i in range(n)]
+        )
+        figure = kineme.DMP().learn(demos).rollout().plot()
+        lines = [line for axes in figure.findobj(match=_is_axes) for line in axes.lines]
+        assert len({to_rgba(line.get_color()) for line in lines}) == max(n_named, 1)
+        assert sum(len(legend.get_texts()) for legend in figure.legends) == n_named
 
 
 def test_a_movement_that_rests_has_a_picture_too(make_movement):

@@ -19,7 +19,7 @@ TILES = {
     "kineme.primitives.discrete.rollout._TILE_SAMPLES": 700,
     "kineme.movements.preparation.smooth._TILE_MOVEMENTS": 7,
     "kineme.comparison.describe._TILE_SAMPLES": 3000,
-    "kineme.comparison.compared._TILE_PAIRS": 100,
+    "kineme.comparison.scores._TILE_PAIRS": 100,
     "kineme.recognition.early.early._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
     "kineme.primitives.pose.tangent._TILE_SAMPLES": 400,

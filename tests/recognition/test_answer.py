@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes, turn
 
 from kineme import Demonstrations, Recognizer, Trajectory
-from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.log_averages import LOG_MEANS
+from movement_samples import draw_shapes, turn
 
 any_seed = given(seed=st.integers(0, 10**6))
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 from kineme import Recognizer, Trajectory
 from kineme.anchoring.proposals.assign import assign
 from kineme.comparison import describe
+from movement_samples import draw_shapes
 
 QUESTIONS = ["predict", "predict_proba", "decision_function", "p_values", "predict_known", "novelty", "describe"]
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 import kineme
 from kineme import Recognizer
 from kineme.recognition.answer import Answer
 from kineme.recognition.conformal import Calibration
+from movement_samples import draw_shapes
 
 ROOT = Path(__file__).parents[2]
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes
 from scipy.stats import binom
 from sklearn.metrics import roc_auc_score
 
 import kineme
 from kineme import Recognizer, SpecificationError
-from kineme.comparison.compared import nearest as nearest_of_each
+from kineme.comparison.scores import nearest as nearest_of_each
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.conformal import calibrate
+from movement_samples import draw_shapes
 
 ALL = Perturbation(shift=1, scale=1, rotation=np.deg2rad(20), warp=0.35, noise=0.01)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import turn
 from scipy.spatial.transform import Rotation
 
 from kineme import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from movement_samples import turn
 
 any_seed = given(seed=st.integers(0, 10**6))
 

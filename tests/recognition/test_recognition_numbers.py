@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
@@ -21,6 +20,7 @@ from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import beginnings, smooth_paths
 from kineme.recognition.spotting import _recognized
+from movement_samples import draw_shapes
 
 
 def test_of_four_demonstrations_the_own_scale_counts_half():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes, turn
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.neighbors import KNeighborsClassifier
@@ -20,6 +19,7 @@ from kineme.comparison import compared as module
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.perturbations import Perturbation
+from movement_samples import draw_shapes, turn
 
 any_seed = given(seed=st.integers(0, 10**6))
 planes = pytest.mark.parametrize("d", [2, 3])

@@ -6,13 +6,13 @@ import pickle
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 from sklearn.base import clone, is_classifier
 from sklearn.exceptions import NotFittedError
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import GridSearchCV, cross_val_predict, cross_val_score
 
 from kineme import Recognizer, SpecificationError
+from movement_samples import draw_shapes
 
 CLASSIFIERS = ["nearest", "prototype", "svm"]
 ASKED_OF_MOVEMENTS = [

@@ -10,11 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 import kineme
 from kineme import Recognizer, SpecificationError, Trajectory, TrajectoryError
 from kineme.recognition.spotting import Spotted, _best_chain, _left_over, _unions
+from movement_samples import draw_shapes
 
 KNOWN = ["CShape", "NShape", "Sshape", "WShape"]
 UNKNOWN = ["heee", "Spoon", "Khamesh"]

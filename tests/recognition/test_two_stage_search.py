@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes
 
 from kineme import Demonstrations, Recognizer
 from kineme.comparison import stored
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import feature_rows
-from kineme.comparison.stored import StoredReferences
+from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
 from kineme.recognition.two_stage_search import TwoStageSearch
+from movement_samples import draw_shapes
 
 
 def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):

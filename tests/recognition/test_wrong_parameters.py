@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 from kineme import Recognizer, SpecificationError, TrajectoryError
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from movement_samples import draw_shapes
 
 DEMOS = draw_shapes([2, 2])
 

@@ -124,7 +124,7 @@ def _plot(path: Path, primitive: Any, made: Any, obstacles: Any) -> None:
 
 
 def _write(output: Path, made: Any, ending: str) -> None:
-    from kineme.files.movements import encode_movement, write_movement
+    from kineme.files.write_movement import encode_movement, write_movement
 
     if str(output) == "-":
         write_bytes(encode_movement(made, ending))

@@ -14,10 +14,10 @@ from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
+from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
-from kineme.cli.revise import COMMANDS as REVISING
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -51,7 +51,7 @@ main.add_command(generate)
 main.add_command(inspect)
 main.add_command(learn)
 main.add_command(library)
-for command in (*REVISING, *MEANING):
+for command in (*MERGE_SPLIT, *MEANING):
     library.add_command(command)
 main.add_command(recognize)
 main.add_command(reproduce)

@@ -12,7 +12,7 @@ from kineme.comparison.representation import Representation
 from kineme.comparison.specification import Compares, specification_of
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.validation import Array
 

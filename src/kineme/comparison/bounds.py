@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Procrustes
 from kineme.runtime.parallel import for_tiles

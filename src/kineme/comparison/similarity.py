@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.comparison.averages import LOG_MEANS
 from kineme.comparison.describe import Described, describe
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import gap_widths
 from kineme.errors import SpecificationError

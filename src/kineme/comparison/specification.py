@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from kineme.comparison.averages import LOG_MEANS
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
 from kineme.errors import SpecificationError

@@ -16,11 +16,9 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.formulations import FORMULATIONS
-from kineme.primitives.discrete.primitives import Primitives
-from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
-from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP, RhythmicPrimitives
 from kineme.validation import check_choice, check_count
 
 #: Feature name -> (primitives, S) -> array (n, size, d).

@@ -31,10 +31,9 @@ if TYPE_CHECKING:
     from kineme.library.symbols.proposals import LibraryProposals
     from kineme.library.symbols.review import Review
     from kineme.movements.trajectories.demonstrations import Demonstrations
-    from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementsLike
+    from kineme.movements.trajectories.movements_like import HasDemonstrations
     from kineme.movements.trajectories.trajectory import Trajectory
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.discrete.primitives import Primitives
+    from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
     from kineme.recognition.recognizer import Recognizer
 
@@ -105,6 +104,8 @@ class ActionLibrary:
 
     def __len__(self) -> int:
         return read.count(self.store)
+
+    __iter__ = None  # its length counts movements, its items are symbols: iterate `movements` or `symbols`
 
     def __repr__(self) -> str:
         dims = "" if self.n_dims is None else f"{self.n_dims} dims, "
@@ -228,8 +229,9 @@ class ActionLibrary:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
         With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, few are, which are
-        chosen by short codes of all: the label is the same, and p-values are given for the 64 nearest symbols. The
-        first answer after a change takes longer; what it prepares is cached beside the database unless `read_only`.
+        chosen by bounds from the reduced features of all: the label is the same, and p-values are given for the 64
+        nearest symbols. The first answer after a change takes longer; what it prepares is cached beside the database
+        unless `read_only`.
 
         Parameters
         ----------

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.compared import Compared, for_compared
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Tile, recorded_paths
 from kineme.comparison.references import IndexedMovements, References
+from kineme.comparison.scores import Compared, for_compared
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -83,7 +83,7 @@ class Answer:
 
     def __repr__(self) -> str:
         sure = f"confidence={self.confidence:.3g}, calibrated={self.calibrated}"
-        return f"Answer(label={self.label!r}, {sure}, like={self.nearest[0]})"
+        return f"Answer(label={self.label!r}, {sure}, nearest={self.nearest[0]})"
 
 
 def is_one(X: MovementsLike) -> bool:

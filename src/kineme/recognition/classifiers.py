@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.averages import LOG_MEANS
-from kineme.comparison.compared import Compared
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
+from kineme.comparison.scores import Compared
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.validation import Array

@@ -9,11 +9,11 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.compared import nearest, score
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described
 from kineme.comparison.fit import fit_comparison, fit_to_references
 from kineme.comparison.references import References
+from kineme.comparison.scores import nearest, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import CANDIDATES
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.comparison.compared import Compared, Score, nearest, score
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe
 from kineme.comparison.fit import fit_comparison
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.references import References
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.scores import Compared, Score, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import CANDIDATES
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kineme.comparison.bounds import log_bounds
 from kineme.comparison.describe import Described
 from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.stored import Rows, StoredReferences
+from kineme.comparison.stored_references import Rows, StoredReferences
 from kineme.recognition.conformal import Calibration, ClassDistances, distances, score_classes, typical_scale
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array

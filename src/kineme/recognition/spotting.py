@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.compared import nearest, score
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.references import References
+from kineme.comparison.scores import nearest, score
 from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.motion import Motion, observe

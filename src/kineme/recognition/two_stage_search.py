@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.averages import LOG_MEANS
 from kineme.comparison.bounds import ReducedFeatures, Single, reduce_features
-from kineme.comparison.compared import Compared
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe_tile, recorded_paths
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
-from kineme.comparison.stored import HeldReferences, OnDemand, Rows, StoredReferences
+from kineme.comparison.scores import Compared
+from kineme.comparison.stored_references import HeldReferences, OnDemand, Rows, StoredReferences
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest

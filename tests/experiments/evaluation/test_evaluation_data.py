@@ -5,7 +5,7 @@ import pytest
 
 import kineme
 from kineme.experiments.evaluation.data import load_data
-from kineme.files.movements import write_movement
+from kineme.files.write_movement import write_movement
 
 
 @pytest.fixture

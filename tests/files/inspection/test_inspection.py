@@ -10,8 +10,8 @@ from kineme.files.inspection.figure import draw_recordings
 from kineme.files.inspection.inspect import inspect
 from kineme.files.inspection.report import as_data, as_words
 from kineme.files.inspection.sampling import GAP, sampling_of
-from kineme.files.movements import write_movement
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
+from kineme.files.write_movement import write_movement
 from kineme.movements.tables.layout import Layout
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import encode_figure

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,6 +101,10 @@ BAD_COLLECTIONS = {
     "None": (lambda: Demonstrations.of(None), "expected movements as a list of (T, d) arrays or one (n, T, d) array, got NoneType"),
     "a word": (lambda: Demonstrations.of("CShape"), "got str"),
     "a generator": (lambda: Demonstrations.of(x for x in [X]), "got generator"),
+    "a file name": (lambda: Demonstrations.of("recordings/"), "got str; read files with kineme.read_recordings(path)"),
+    "a path": (lambda: Demonstrations.of(Path("recordings")), "; read files with kineme.read_recordings(path)"),
+    "a dictionary": (lambda: Demonstrations.of({"a": X}), "got dict; pass its values as a list, or a table as a data frame"),
+    "an iterator": (lambda: Demonstrations.of(iter([X])), "got list_iterator; pass list(...) of it"),
     "trajectories and arrays": (lambda: Demonstrations([Trajectory(T, X), X]), "expected a sequence of Trajectory, got ndarray at index 1; use Demonstrations.from_arrays"),
     "labels": (lambda: Demonstrations.from_arrays([X, X], labels=["a"]), "expected one label for each of the 2 movements, got labels of shape (1,)"),
     "names": (lambda: Demonstrations.from_arrays([X, X], names=["a"]), "expected one name for each of the 2 movements, got 1"),

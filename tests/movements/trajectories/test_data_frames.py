@@ -85,6 +85,14 @@ def test_a_long_frame_is_told_apart_by_its_columns():
     ]
 
 
+def test_groups_of_a_frame_are_movements():
+    groups = pd.concat([_frame(demo=0, label="wave"), _frame(demo=1, label="point")]).groupby("demo")
+    for movements in (groups, list(groups)):
+        demos = Demonstrations.of(movements)
+        _check(demos, 2)
+        assert demos.labels.tolist() == ["wave", "point"]
+
+
 def test_labels_that_are_numbers_stay_numbers():
     demos = Demonstrations.of([_frame(label=0), _frame(label=3)])
     assert demos.labels.tolist() == [0, 3]
@@ -111,6 +119,8 @@ REFUSED = {
     "time that stands still": (_frame(time=0.0), "trajectory 0: expected strictly increasing times"),
     "other coordinates": ([_frame(), _frame().rename(columns={"y": "z"})], r"data frame 1: expected the coordinates \['x', 'y'\] as in data frame 0, got \['x', 'z'\]"),
     "frames beside arrays": ([_frame(), np.ones((9, 2))], "expected data frames, got ndarray at index 1"),
+    "numbers that are words": (_frame().astype(str), r"expected a column of times and .*; there are no numbers in \['x', 'y'\]"),
+    "one column alone": (_frame()["x"], r"expected movements as a list of .*, got Series; pass its numbers, series.to_numpy\(\)"),
     "times that are words": (_frame(time="now"), "data frame 0: expected times in 'time', got 'now'"),
 }  # fmt: skip
 
@@ -156,6 +166,11 @@ def test_a_coordinate_with_something_else_than_numbers_is_refused_not_left_out(c
         Demonstrations.of(_frame(x=column))
     only_y = Demonstrations.from_dataframe(_frame(x=column), columns=["y"])
     np.testing.assert_array_equal(only_y.positions[:, 0], Y)
+
+
+def test_dates_are_no_coordinates():
+    with pytest.raises(TrajectoryError, match="expected numbers in the column 'x', got .*2024"):
+        Demonstrations.from_dataframe(_frame(x=pd.date_range("2024-01-01", periods=50)), columns=["x"])
 
 
 def test_decimals_are_numbers_and_objects_of_durations_are_times():

@@ -46,6 +46,23 @@ def test_lists_of_what_holds_movements_are_one_after_the_other():
     _same(Demonstrations.of(held), pair)
 
 
+def test_a_list_may_hold_arrays_beside_trajectories():
+    demos = Demonstrations.of([Trajectory(T, X), X, Demonstrations.of([X]), np.stack((X, X))])
+    assert len(demos) == 5
+    _same(demos[1:2], Demonstrations.of([X]))
+    with pytest.raises(kineme.TrajectoryError, match="index 1 of the list: the movement: expected at least 4 samples"):
+        Demonstrations.of([Trajectory(T, X), X[:2].repeat(40, 1)])
+
+
+@pytest.mark.parametrize("index", [("a", "b") == "a", np.bool_(True)])
+def test_a_truth_value_is_no_index(index):
+    demos = Demonstrations.of([X, X])
+    with pytest.raises(
+        IndexError, match="expected an index, a slice, a list of indices or a mask with an entry per movement"
+    ):
+        demos[index]
+
+
 def test_more_dimensions_than_samples_are_taken_with_time_stamps():
     wide = np.random.default_rng(0).normal(size=(20, 63))  # a hand of 21 joints, for less than a second
     assert Demonstrations.of(Trajectory(np.arange(20) / 30, wide)).n_dims == 63

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from rotation_samples import carry, random_quaternions, seeds, tumble, turn
 
 import kineme
 from kineme.control import Status
 from kineme.orientation import PoseDMP, angle_between, conjugate, exp, product
+from rotation_samples import carry, random_quaternions, seeds, tumble, turn
 
 DEMONSTRATIONS = {"orientation": tumble, "pose": carry, "more than pi": lambda seed: turn(5.0)[0]}
 kinds = pytest.mark.parametrize("kind", ["orientation", "pose"])

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from rotation_samples import carry, minimum_jerk, random_quaternions, seeds, tumble, turn
 from scipy.integrate import solve_ivp
 
 import kineme
 from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP, angle_between, conjugate, exp, log, product, slerp
+from rotation_samples import carry, minimum_jerk, random_quaternions, seeds, tumble, turn
 
 PATH = kineme.DMP(fit="trajectory", n_basis=80)
 SPECIFICATIONS = {

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rotation_samples import random_quaternions, seeds
 
 from kineme.orientation import angular_acceleration, angular_velocity, conjugate, exp, product, rotation_vector_rate
+from rotation_samples import random_quaternions, seeds
 
 
 def polynomial(seed, size):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from rotation_samples import as_rotation, carry, random_quaternions, seeds, tumble, turn
 
 from kineme import Demonstrations, Resample, Trajectory
 from kineme.errors import TrajectoryError
 from kineme.orientation import angle_between, exp, from_tangent, product, to_tangent
+from rotation_samples import as_rotation, carry, random_quaternions, seeds, tumble, turn
 
 
 def vectors(movement):

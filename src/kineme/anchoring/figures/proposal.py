@@ -14,6 +14,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
+from kineme.validation import Array
 
 _SHOWN = 60  # members drawn at most, evenly spread; more would hide each other
 
@@ -64,13 +65,13 @@ def words(proposal: Proposal) -> str:
     return f"{len(proposal)} movements, cohesion {proposal.cohesion:.2f}, stability {proposal.stability:.2f}"
 
 
-def shown_paths(demos: Demonstrations, proposal: Proposal, like: Compares | None) -> tuple[Any, Any]:
+def shown_paths(demos: Demonstrations, proposal: Proposal, like: Compares | None) -> tuple[Array, Array]:
     """Paths of the members that are shown (m, d, T), and the medoid's (1, d, T)."""
     step = -(-len(proposal) // _SHOWN)
     return paths_of(demos[proposal.members[::step]], like), paths_of(demos[[proposal.medoid]], like)
 
 
-def overlay(axes: Any, recorded: Any, medoid: Any, like: Compares | None, thin: float = 0.9) -> None:
+def overlay(axes: Any, recorded: Array, medoid: Array, like: Compares | None, thin: float = 0.9) -> None:
     """Members (m, d, T) laid onto the medoid (1, d, T)."""
     laid = flat(maps_onto(recorded, medoid[0], like).move(recorded), medoid[0])
     typical = flat(medoid, medoid[0])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -12,9 +10,10 @@ from kineme.anchoring.grounding.space import ConceptualSpace
 from kineme.comparison.alignment import paths_of
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.validation import Array
 
 _INCHES = 6.9  # width of a map
@@ -42,7 +41,7 @@ def classical_scaling(distances: Array) -> tuple[Array, float]:
     return positions, float(positive[:2].sum() / total) if total > 0 else 1.0
 
 
-def draw_map(space: ConceptualSpace, prototypes: Any) -> Figure:
+def draw_map(space: ConceptualSpace, prototypes: Primitives | MovementsLike) -> Figure:
     """Symbols by classical scaling of their distances, each as a little drawing of its prototype.
 
     Parameters

@@ -13,7 +13,7 @@ from kineme.anchoring.grounding.prototypes import Prototype, prototype
 from kineme.comparison.alignment import moved
 from kineme.comparison.specification import Compares
 from kineme.errors import TrajectoryError
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.persistence import specification_to_dict
 from kineme.primitives.styles.learn import learn_styles
 from kineme.primitives.styles.metrics import compared

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from kineme.anchoring.grounding.ground import FORMAT, VERSION, style_model
 from kineme.errors import DataError, SpecificationError
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.persistence import check_array, specification_from_dict
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from kineme.comparison.alignment import Maps, maps_onto, paths_of
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.parameters import check_primitives, from_numbers, to_numbers
 from kineme.validation import Array
 

@@ -11,7 +11,7 @@ from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.average import AveragePrimitive, average
 from kineme.primitives.styles.parameters import check_primitives
 

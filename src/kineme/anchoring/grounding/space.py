@@ -20,6 +20,7 @@ from kineme.comparison.similarity import averaged
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_count, check_number
 
 
@@ -92,7 +93,10 @@ class ConceptualSpace:
 
 
 def conceptual_space(
-    symbols: Sequence[Hashable], prototypes: Any, like: Compares | None = None, widths: ArrayLike | None = None
+    symbols: Sequence[Hashable],
+    prototypes: Described | MovementsLike,
+    like: Compares | None = None,
+    widths: ArrayLike | None = None,
 ) -> ConceptualSpace:
     """Distances between symbols, by their prototypes.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
-from kineme.recognition.known_classes import KnownClasses, known_classes, open_set_labels
+from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count
 
@@ -60,7 +59,13 @@ class Assignment:
         )
 
 
-def assign(movements: MovementsLike, symbols: Any, error_rate: float = 0.05, *, min_members: int = 3) -> Assignment:
+def assign(
+    movements: MovementsLike,
+    symbols: FittedRecognizer | MovementsLike,
+    error_rate: float = 0.05,
+    *,
+    min_members: int = 3,
+) -> Assignment:
     """Assign movements to the symbols that they are recognized as, and cluster the unknown ones.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 from numpy.typing import NDArray
 
 from kineme.experiments.evaluation.generative import HiddenMarkov
-from kineme.experiments.evaluation.machines import AlignmentSVM, MiniRocket
+from kineme.experiments.evaluation.linear_classifiers import AlignmentSVM, MiniRocket
 from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures, PointCloud
 from kineme.experiments.evaluation.optional import why_missing
 from kineme.movements.trajectories.demonstrations import Demonstrations

@@ -15,7 +15,7 @@ from kineme.experiments.reproduction.protocol import draw
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS, specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.output.figures import GRAY, LINES, SEQUENCE, new_figure
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.validation import Array
 
 

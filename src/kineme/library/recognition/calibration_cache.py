@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.fit import fit_to_references
 from kineme.comparison.similarity import AveragedSimilarity
-from kineme.comparison.stored import StoredReferences
+from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.members import Members, described_references
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically

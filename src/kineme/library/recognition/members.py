@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, describe_rows
 from kineme.comparison.references import References
-from kineme.comparison.stored import OnDemand
+from kineme.comparison.stored_references import OnDemand
 from kineme.errors import SpecificationError
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids

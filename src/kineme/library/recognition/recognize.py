@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.stored import StoredReferences
+from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrated, sample_comparison
 from kineme.library.recognition.members import Members, described_references, members_of
 from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated

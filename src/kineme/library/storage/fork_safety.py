@@ -68,11 +68,11 @@ def awake() -> Iterator[None]:
 
 
 class Connection(Watched):
-    """A connection that holds off forks until it is closed, or until its owner calls `rest`."""
+    """A connection that holds off forks until it is closed, or until its owner calls `allow_forks`."""
 
     _thread: int | None = None
 
-    def rest(self) -> Connection:
+    def allow_forks(self) -> Connection:
         """Hold off forks no more; the owner is registered, and closes the connection before a fork."""
         if self._thread is not None:
             _leave(self._thread)
@@ -82,7 +82,7 @@ class Connection(Watched):
     def close(self) -> None:
         """As `sqlite3.Connection.close`."""
         super().close()
-        self.rest()
+        self.allow_forks()
 
 
 def open_connection(address: str | Path, **options: Any) -> Connection:

@@ -17,7 +17,7 @@ from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]

@@ -79,7 +79,7 @@ class Store:
 
     def _connect(self) -> sqlite3.Connection:
         fork_safety.refuse_if_lost(self.path)
-        return connect(self.path, "ro" if self.read_only else "rw", self.wait).rest()
+        return connect(self.path, "ro" if self.read_only else "rw", self.wait).allow_forks()
 
     def sleep(self) -> None:
         """Close the connections for a fork; the next read or write opens them again."""
@@ -200,7 +200,7 @@ class Store:
                 self._wake()
                 self.check_writable()
                 if self._writer is None:
-                    self._writer = connect(self.path, "rw", self.wait).rest()
+                    self._writer = connect(self.path, "rw", self.wait).allow_forks()
                 with transaction(self._writer):
                     self.check_writable()  # again: waiting for the turn may have taken long
                     last = self.moment(self._writer)

@@ -67,7 +67,9 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         plain = set(map(_plain, heads))
         positions = tuple(k for k in free if not (named and _says_nothing_new(heads[k], plain)))
     if not positions:
-        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+        texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
+        of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
+        raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
     taken.update(positions)
     ignored = tuple(k for k in range(len(heads)) if k not in taken)
     return Roles(time, positions, movement, label, ignored)

@@ -27,6 +27,18 @@ def is_data_frame(value: Any) -> bool:
     return hasattr(value, "columns") and hasattr(value, "to_numpy") and hasattr(value, "__getitem__")
 
 
+def frames_of(value: Any) -> list[Any] | None:
+    """The data frames of one, of its groups as ``groupby`` makes them, or of a list of (key, group); else None."""
+    if is_data_frame(value):
+        return [value]
+    if not hasattr(value, "get_group") and not isinstance(value, list):
+        return None
+    pairs = list(value)
+    if pairs and all(isinstance(one, tuple) and len(one) == 2 and is_data_frame(one[1]) for one in pairs):
+        return [frame for _, frame in pairs]
+    return None
+
+
 def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     """The movements of a data frame: one, or many that are told apart by columns.
 
@@ -124,6 +136,6 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
 
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
     if _KINDS.get(values.dtype.kind) != "number":
-        i, got = next((i, one) for i, one in enumerate(values.tolist()) if not _is_number(one))
+        i, got = next(((i, one) for i, one in enumerate(values.tolist()) if not _is_number(one)), (0, values[0]))
         raise DataError(f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, or say columns=")
     return values.astype(np.float64)

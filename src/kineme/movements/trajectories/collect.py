@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -118,8 +119,24 @@ def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) 
 
 
 def _check_sized(value: Any, expected: str) -> None:
-    if not hasattr(value, "__len__") or isinstance(value, (str, bytes, dict)) or getattr(value, "ndim", 1) == 0:
-        raise TrajectoryError(f"expected {expected}, got {type(value).__name__}")
+    if (
+        not hasattr(value, "__len__")
+        or isinstance(value, (str, bytes, dict))
+        or hasattr(value, "to_frame")
+        or getattr(value, "ndim", 1) == 0
+    ):
+        raise TrajectoryError(f"expected {expected}, got {type(value).__name__}{_instead_of(value)}")
+
+
+def _instead_of(value: Any) -> str:
+    """What to pass instead of something that is no list and no array."""
+    if isinstance(value, (str, PurePath)):
+        return "; read files with kineme.read_recordings(path)"
+    if isinstance(value, dict):
+        return "; pass its values as a list, or a table as a data frame"
+    if isinstance(value, Iterator):
+        return "; pass list(...) of it"
+    return "; pass its numbers, series.to_numpy()" if hasattr(value, "to_frame") else ""
 
 
 def _check_each(check: Callable[..., Array], columns: tuple[Iterable[Any], ...], names: Names) -> list[Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.tables.data_frame import is_data_frame
+from kineme.movements.tables.data_frame import frames_of, is_data_frame
 from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.data_frames import collect_data_frames
@@ -133,7 +133,7 @@ class Demonstrations(Sequence[Trajectory]):
               and rollouts.
             - One `Trajectory`, or one array of shape (T, d) or (T,): one movement.
             - One array of shape (n, T, d): n movements, used without a copy.
-            - One data frame of pandas or polars, see `from_dataframe`.
+            - One data frame of pandas or polars, see `from_dataframe`; or the groups of one, as ``groupby`` makes them.
             - A list of `Trajectory`, of (T_i, d) arrays, or of anything above. A list is always many movements, also
               one of plain numbers in lists.
 
@@ -150,7 +150,9 @@ class Demonstrations(Sequence[Trajectory]):
         held: Any = getattr(movements, "demonstrations", None)
         if held is not None and held is not movements:
             return cls.of(held)
-        several: Any = [movements] if isinstance(movements, Trajectory) or is_data_frame(movements) else movements
+        if (frames := frames_of(movements)) is not None:
+            return cls.from_dataframe(frames)
+        several: Any = [movements] if isinstance(movements, Trajectory) else movements
         if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
             if any(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
@@ -220,6 +222,11 @@ class Demonstrations(Sequence[Trajectory]):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
     def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
         """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
+        if isinstance(index, (bool, np.bool_)):  # as ("a", "b") == "a" is
+            raise IndexError(
+                f"expected an index, a slice, a list of indices or a mask with an entry per movement, got {index}; "
+                "compare an array, numpy.array(labels) == label"
+            )
         if isinstance(index, (int, np.integer)):
             if not -len(self) <= index < len(self):
                 raise IndexError(f"expected an index below {len(self)}, got {index}")
@@ -253,12 +260,16 @@ def _listed(names: tuple[str, ...] | None) -> str:
 
 
 def _held_by_each(several: Sequence[Any]) -> list[Any] | None:
-    """The movements of a list of trajectories and of what holds them, one by one; None of a list of arrays."""
-    held = [one if isinstance(one, Demonstrations) else getattr(one, "demonstrations", None) for one in several]
-    if not any(some is not None or isinstance(one, Trajectory) for one, some in zip(several, held, strict=True)):
+    """The movements of a list with trajectories or what holds them, one by one; None of a list of arrays."""
+    if not any(isinstance(one, Trajectory) or hasattr(one, "demonstrations") for one in several):
         return None
-    parts = ([one] if some is None else Demonstrations.of(some) for one, some in zip(several, held, strict=True))
-    return [each for part in parts for each in part]
+    held: list[Any] = []
+    for i, one in enumerate(several):
+        try:
+            held += [one] if isinstance(one, Trajectory) else Demonstrations.of(one)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"index {i} of the list: {error}") from error
+    return held
 
 
 def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from kineme.primitives.control import plain
+from kineme.primitives.control.advance import advance
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.plan import Influences, Plan
 from kineme.primitives.control.shape_table import shape_table
@@ -25,7 +25,7 @@ def stepper(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:
     Compiled, unless ``KINEME_COMPILED=never``: what that costs - Numba's import, loading or building the machine code,
     tabulating the shape - is spent here, so that no step waits for it.
     """
-    return _compiled(plan, avoidance) if use_compiled(_A_LONG_LIFE) else partial(plain.advance, plan, avoidance)
+    return _compiled(plan, avoidance) if use_compiled(_A_LONG_LIFE) else partial(advance, plan, avoidance)
 
 
 def _compiled(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:

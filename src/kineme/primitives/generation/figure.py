@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure, SubFigure
 
-from kineme.files.movements import Columns
+from kineme.files.write_movement import Columns
 from kineme.movements.trajectories.movements import axis_names
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.validation import Array
 
 

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from kineme.errors import SpecificationError
-from kineme.files.movements import Columns
 from kineme.files.recordings import read_recording
+from kineme.files.write_movement import Columns
 from kineme.primitives.control.state import State, Status
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.validation import Array
 
 SAVED = ".kineme"  # file extension of saved primitives

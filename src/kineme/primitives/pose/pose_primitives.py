@@ -12,9 +12,8 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options
-from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.plan import plan_of
-from kineme.primitives.discrete.primitives import Primitives
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
 from kineme.primitives.persistence import Arrays
 from kineme.primitives.pose.pose_controller import PoseController

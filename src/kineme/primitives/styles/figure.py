@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.learn import learn_styles
 from kineme.primitives.styles.model import StyleModel
 from kineme.validation import Array, check_count

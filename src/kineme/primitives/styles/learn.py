@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.metrics import METRICS, compared
 from kineme.primitives.styles.model import StyleModel
 from kineme.primitives.styles.parameters import check_primitives, shared_label, to_numbers

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.dmp import DMP
-from kineme.primitives.discrete.primitives import Primitives
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.metrics import compared
 from kineme.primitives.styles.parameters import from_numbers, to_numbers
 from kineme.validation import Array, as_numbers, check_count

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.labels import label_array
-from kineme.primitives.discrete.dmp import DMP
+from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.operators import decoder
-from kineme.primitives.discrete.primitives import Primitives
 from kineme.validation import Array
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
-from kineme.comparison.averages import LOG_MEANS
 from kineme.comparison.bounds import fit_bases, log_bounds, reduce_features
 from kineme.comparison.describe import feature_rows, prepare
+from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.procrustes import Procrustes
+from movement_samples import draw_shapes
 
 ANGLES = {1: (0.0,), 2: (0.0, 0.4, np.pi / 3, 2.0, np.pi), 3: (0.0, 0.4, np.pi / 3, np.pi), 4: (0.0,)}
 

@@ -7,7 +7,7 @@ import pytest
 
 import kineme
 from kineme.orientation import PoseDMP, PosePrimitives, exp
-from kineme.primitives.rhythmic.primitives import RhythmicPrimitives
+from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives
 
 LABELS, NAMES = ["a", "b", "a"], ["one", None, "三"]
 

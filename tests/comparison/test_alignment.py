@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from unlabeled_samples import draw_kinds
 
 import kineme
 from kineme.anchoring.grounding.morph import morph
@@ -18,6 +17,7 @@ from kineme.comparison.alignment import maps_onto, moved, paths_of
 from kineme.comparison.describe import N_POINTS
 from kineme.comparison.similarity import similarities
 from kineme.recognition.recognizer import Recognizer
+from unlabeled_samples import draw_kinds
 
 quick = settings(max_examples=10, deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from rotation_samples import as_rotation, carry, random_quaternions, seeds, tumble
 from sklearn.base import clone
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
@@ -11,6 +10,7 @@ from sklearn.pipeline import make_pipeline
 from kineme import DMP, DMPFeatures, Smooth
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseFeatures, product, to_tangent
+from rotation_samples import as_rotation, carry, random_quaternions, seeds, tumble
 
 
 def blocks(rows, n_vectors):

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.averages import LOG_MEANS, SHARES
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import Described, Tile, for_described
+from kineme.comparison.log_averages import LOG_MEANS, SHARES
 from kineme.comparison.references import References
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import for_tiles

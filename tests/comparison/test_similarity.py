@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from movement_samples import draw_shapes
 
 from kineme import Recognizer, SpecificationError
-from kineme.comparison.averages import LOG_MEANS, SHARES
+from kineme.comparison.log_averages import LOG_MEANS, SHARES
+from movement_samples import draw_shapes
 
 any_seed = given(seed=st.integers(0, 10**6))
 

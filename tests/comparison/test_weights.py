@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 from sklearn.base import clone
 
 from kineme import Recognizer
@@ -15,6 +14,7 @@ from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
+from movement_samples import draw_shapes
 
 
 def _timed(n, seed):
