@@ -169,7 +169,7 @@ def test_a_coordinate_with_something_else_than_numbers_is_refused_not_left_out(c
 
 
 def test_dates_are_no_coordinates():
-    with pytest.raises(TrajectoryError, match="expected numbers in the column 'x', got .*2024"):
+    with pytest.raises(TrajectoryError, match=r"expected numbers in the column 'x', got .*2024"):
         Demonstrations.from_dataframe(_frame(x=pd.date_range("2024-01-01", periods=50)), columns=["x"])
 
 

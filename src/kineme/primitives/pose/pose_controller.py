@@ -18,7 +18,6 @@ from kineme.primitives.pose.rates import angular_acceleration, angular_velocity,
 from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
-
 _MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors
 _FASTEST = 1e50  # rates of rotation vectors; the products in angular accelerations are finite
 
