@@ -49,7 +49,7 @@ def test_a_kind_reaches_as_far_as_its_members_and_at_least_as_far_as_most_member
     n = 20
     clusters = np.repeat([0, 1], n)
     K = np.zeros((2 * n, 2 * n))
-    K[:n, :n] = 0.9  # 0.1 to the nearest mate
+    K[:n, :n] = 0.9  # 0.1 to the nearest neighbor
     K[n:, n:] = 0.7
     K[-1, n:] = K[n:, -1] = 0.4  # one at the rim
     kinds = [Bunch(members=np.flatnonzero(clusters == k)) for k in (0, 1)]

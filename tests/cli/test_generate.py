@@ -125,8 +125,8 @@ def test_numbers_that_are_not_finite_never_reach_a_file(recording, tmp_path):
     path = tmp_path / "wild.kineme"
     replace(primitive, scaled_weights=np.full_like(primitive.scaled_weights, 1e308)).save(path)
     for out in ("new.json", "new.csv", "new.npz"):
-        wishes = "--duration", 0.001, "--rate", 1e6, "--save", tmp_path / "again.kineme"
-        done = run(path, *wishes, "-o", tmp_path / out)
+        options = "--duration", 0.001, "--rate", 1e6, "--save", tmp_path / "again.kineme"
+        done = run(path, *options, "-o", tmp_path / out)
         assert done.returncode == 1
         assert "expected finite" in done.stderr
         assert not (tmp_path / out).exists()

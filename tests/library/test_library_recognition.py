@@ -173,7 +173,7 @@ def test_the_codes_of_a_history_that_was_rolled_back_are_not_believed(make, tmp_
 def test_answers_follow_every_change(make):
     demos, asked = _kinds([4] * 6), _questions([4] * 6)
     library = make(demos[:8])
-    serving, fresh = LibraryRecognizer(library.store, exhaustive=0), []
+    recognizing, fresh = LibraryRecognizer(library.store, exhaustive=0), []
     for change in (
         lambda: library.learn(demos[8:16]),
         lambda: library.learn(demos[16:]),
@@ -183,10 +183,10 @@ def test_answers_follow_every_change(make):
         lambda: library.delete(library["wave"].members[:2]),
         lambda: library.delete("kind 04"),
     ):
-        serving.recognize(asked)
+        recognizing.recognize(asked)
         change()
         fresh = LibraryRecognizer(library.store, exhaustive=0)
-        _same(_plain(serving.recognize(asked)), _plain(fresh.recognize(asked)))
+        _same(_plain(recognizing.recognize(asked)), _plain(fresh.recognize(asked)))
     names = {name for answer in fresh.recognize(asked) for name in answer.p_values}
     assert names == {"kind 00", "wave", "both", "kind 05"}
 
@@ -215,17 +215,17 @@ def test_one_movement_gets_one_answer_and_unlabeled_ones_give_none(make):
     demos = _kinds([3] * 4)
     library = make(demos)
     nameless = library.learn(_questions([3] * 4), labels=[None] * 4).ids
-    for serving in (library, LibraryRecognizer(library.store, exhaustive=0)):
+    for recognizing in (library, LibraryRecognizer(library.store, exhaustive=0)):
         for one in _questions([3] * 4):
-            answer = serving.recognize(one)
+            answer = recognizing.recognize(one)
             assert answer.ranked[0] == one.label
             assert not {near.index for near in answer.nearest} & set(nameless.tolist())
 
 
 def test_a_library_with_one_symbol_knows_it_from_others(make):
     library = make(_kinds([12]))
-    for serving in (library, LibraryRecognizer(library.store, exhaustive=0)):
-        (answer,) = serving.recognize(_questions([12]))
+    for recognizing in (library, LibraryRecognizer(library.store, exhaustive=0)):
+        (answer,) = recognizing.recognize(_questions([12]))
         assert list(answer.p_values) == ["kind 00"]
 
 
@@ -237,6 +237,6 @@ def test_what_cannot_be_answered_says_why(make):
     with pytest.raises(SpecificationError, match=r"expected training movements that differ, got one movement"):
         make(_kinds([1]), "one").recognize(_questions([1]))
     for exhaustive in (0, 1000):
-        serving = LibraryRecognizer(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
+        recognizing = LibraryRecognizer(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
         with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as in fit, got 3"):
-            serving.recognize(_questions([1], d=3))
+            recognizing.recognize(_questions([1], d=3))

@@ -154,8 +154,8 @@ def rollout_of(demos: Demonstrations) -> list[dict[str, Any]]:
     """With other starts, goals, durations and velocities; each by the movement itself."""
     primitives = DMP("amplitude-scaled", n_basis=20).learn(demos)
     ends, tau = primitives.goals - primitives.starts, primitives.durations
-    wishes = {"start": primitives.starts + 0.1 * ends, "goal": primitives.goals + 0.3 * ends, "duration": 2 * tau}
-    return moved(demos, primitives.rollout(**wishes, velocity=0.5 * ends / tau[:, None]))
+    options = {"start": primitives.starts + 0.1 * ends, "goal": primitives.goals + 0.3 * ends, "duration": 2 * tau}
+    return moved(demos, primitives.rollout(**options, velocity=0.5 * ends / tau[:, None]))
 
 
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""The full answer: label, p-values, neighbors, the transform and who spoke."""
+"""The full answer: label, p-values, neighbors, the transform and the share of each representation."""
 
 from __future__ import annotations
 

@@ -114,16 +114,16 @@ def test_a_known_size_tells_a_large_movement_from_a_small_one():
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("options", "message"),
     [
         ({"n_progress": 1}, "expected n_progress to be a whole number of at least 2, got 1"),
         ({"size_spread": 0.0}, "expected size_spread to be a number above 0, got 0.0"),
         ({"duration_spread": math.nan}, "expected duration_spread to be a number above 0, got nan"),
     ],
 )
-def test_wishes_out_of_range_are_refused(wishes, message):
+def test_wishes_out_of_range_are_refused(options, message):
     with pytest.raises(SpecificationError, match=message):
-        Early(**wishes)
+        Early(**options)
 
 
 def test_wrong_inputs_are_refused():

@@ -1,4 +1,4 @@
-"""The recognizer: what it does not see, what its parameters do, its classifiers, its use in scikit-learn."""
+"""The recognizer: what it is invariant to, what its parameters do, its classifiers, its use in scikit-learn."""
 
 from __future__ import annotations
 

@@ -204,16 +204,16 @@ def test_a_decision_needs_patience_and_a_change_twice_as_much():
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("options", "message"),
     [
         ({"confidence": 0.5}, "expected confidence to be a number above 0.5, got 0.5"),
         ({"confidence": 1.0}, "expected confidence below 1, got 1.0"),
         ({"patience": -0.1}, "expected patience to be a number of at least 0, got -0.1"),
     ],
 )
-def test_wishes_out_of_range_are_refused(recognizer, wishes, message):
+def test_wishes_out_of_range_are_refused(recognizer, options, message):
     with pytest.raises(SpecificationError, match=message):
-        recognizer.stream(**wishes)
+        recognizer.stream(**options)
 
 
 def test_nothing_is_loaded_while_a_movement_is_under_way():

@@ -73,7 +73,13 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         self.seed = seed
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Draw the grids and count their bins."""
+        """Draw the grids and count their bins.
+
+        Raises
+        ------
+        SpecificationError
+            A parameter out of its range, or too many bins for the memory of a linear model.
+        """
         rows = _rows(X)
         check_number("sigma", self.sigma, above=0.0)
         check_count("n_shifts", self.n_shifts, 1, most=_MOST_SHIFTS)
@@ -99,7 +105,13 @@ class RandomBinning(TransformerMixin, BaseEstimator):
         return self
 
     def transform(self, X: ArrayLike) -> csr_array:
-        """Features Z, a `scipy.sparse.csr_array` of shape (n, n_columns_)."""
+        """Features Z, a `scipy.sparse.csr_array` of shape (n, n_columns_).
+
+        Raises
+        ------
+        SpecificationError
+            Another number of columns than in `fit`.
+        """
         from scipy.sparse import csr_array, diags_array, hstack
 
         check_is_fitted(self)

@@ -91,6 +91,8 @@ def test_groups_of_a_frame_are_movements():
         demos = Demonstrations.of(movements)
         _check(demos, 2)
         assert demos.labels.tolist() == ["wave", "point"]
+    clocked = pd.concat([_frame(demo=0), _frame(demo=1)]).rename(columns={"time": "clock"}).groupby("demo")
+    _check(Demonstrations.from_dataframe(clocked, time="clock"), 2)
 
 
 def test_labels_that_are_numbers_stay_numbers():

@@ -27,14 +27,14 @@ def test_it_equals_the_rollout_in_a_thousand_steps(primitive, steps, agree):
 
 
 def test_it_equals_the_rollout_with_wishes_and_beyond_the_end(primitive, twin, steps, agree):
-    wishes = {
+    options = {
         "start": [1.0, 2.0, -1.0],
         "goal": primitive.goals[0] + [2.0, 1.5, 0.1],
         "duration": 5.0,
         "velocity": [0.3, 0, 1],
     }
-    movement = replace(primitive.rollout(**wishes), n_samples=201, end=4.0)  # a sample at u = 1, where f has a kink
-    assert_same(steps, primitive.controller(0.1, **wishes), movement, agree)
+    movement = replace(primitive.rollout(**options), n_samples=201, end=4.0)  # a sample at u = 1, where f has a kink
+    assert_same(steps, primitive.controller(0.1, **options), movement, agree)
 
 
 @pytest.mark.parametrize("damping", [4.0, 20.0, 20.0 + 1e-9, 90.0])

@@ -1,4 +1,4 @@
-"""Generation in batch: invariances of Section 2, derivatives, broadcasting, settling, wrong wishes."""
+"""Generation in batch: invariances of Section 2, derivatives, broadcasting, settling, wrong options."""
 
 import warnings
 from dataclasses import replace

@@ -78,7 +78,7 @@ def test_the_path_is_fitted_with_any_spring_that_is_not_limp(make_movement, stif
     np.testing.assert_allclose(path, x, atol=0.02 * np.ptp(x))
 
 
-BAD_WISHES = [
+BAD_OPTIONS = [
     ({"start": [1.0]}, TrajectoryError, "expected start of shape (2,) or (n, 2), got shape (1,)"),
     ({"goal": np.zeros((3, 3))}, TrajectoryError, "expected goal of shape (2,) or (n, 2), got shape (3, 3)"),
     ({"goal": [0.0, NAN]}, TrajectoryError, "expected finite numbers for goal, got [0.0, nan]"),
@@ -96,13 +96,13 @@ BAD_WISHES = [
 ]
 
 
-@pytest.mark.parametrize(("wishes", "error", "message"), BAD_WISHES, ids=[str(case[0]) for case in BAD_WISHES])
-def test_a_wish_that_cannot_be_met_is_refused(make_movement, wishes, error, message):
+@pytest.mark.parametrize(("options", "error", "message"), BAD_OPTIONS, ids=[str(case[0]) for case in BAD_OPTIONS])
+def test_a_wish_that_cannot_be_met_is_refused(make_movement, options, error, message):
     t, x = make_movement(0, n_samples=50)
     learned = DMP(n_basis=10).learn([x, x[::-1]])
     slow = type(learned)(**{**learned.__dict__, "durations": np.full(2, t[-1])})
     with pytest.raises(error, match=re.escape(message)):
-        slow.rollout(**wishes)
+        slow.rollout(**options)
 
 
 @pytest.mark.parametrize("feature", ["forcing", "shape_attractor"])

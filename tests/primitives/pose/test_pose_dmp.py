@@ -203,7 +203,7 @@ def test_the_original_formulation_refuses_a_new_axis(seed):
 
 
 @pytest.mark.parametrize(
-    ("wishes", "message"),
+    ("options", "message"),
     [
         ({"goal": [1.0, 0, 0, 0]}, r"expected goal of shape \(7,\) or \(n, 7\), got shape \(4,\)"),
         ({"start": [0, 0, 0, 2.0, 0, 0, 0]}, r"start: quaternion at index \[0\]: .* got norm 2 "),
@@ -212,9 +212,9 @@ def test_the_original_formulation_refuses_a_new_axis(seed):
         ({"velocity": np.zeros((4, 6))}, "expected one or equally many .* got 6 primitives, 4 velocity"),
     ],
 )
-def test_wrong_wishes_are_refused(poses, wishes, message):
+def test_wrong_wishes_are_refused(poses, options, message):
     with pytest.raises(TrajectoryError, match=message):
-        poses.rollout(**wishes)
+        poses.rollout(**options)
 
 
 def test_wrong_specifications_are_refused():

@@ -48,7 +48,7 @@ def test_recordings(parameters, movements, message):
 
 
 @pytest.mark.parametrize(
-    ("wishes", "error", "message"),
+    ("options", "error", "message"),
     [
         ({"n_periods": 0}, SpecificationError, "expected n_periods to be a number above 0, got 0"),
         ({"period": -2.0}, SpecificationError, "expected period above 0 seconds, got -2 for movement 0"),
@@ -65,9 +65,9 @@ def test_recordings(parameters, movements, message):
         ({"phase": [0, 1], "amplitude": [1, 2, 3]}, TrajectoryError, "got 1 primitives, 3 amplitude, 2 phase"),
     ],
 )
-def test_wishes(wishes, error, message):
+def test_wishes(options, error, message):
     with pytest.raises(error, match=message):
-        RhythmicDMP().learn(WAVE).rollout(**wishes)
+        RhythmicDMP().learn(WAVE).rollout(**options)
 
 
 def test_a_step_needs_its_parentheses():

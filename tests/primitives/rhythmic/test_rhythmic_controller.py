@@ -33,11 +33,11 @@ def test_steps_of_any_length_follow_the_rollout(learned, twin, agree, dt, which)
 
 
 def test_it_begins_as_the_rollout_would(learned, twin, agree):
-    wishes = {"phase": 2.0, "period": 1.3, "amplitude": 0.4, "baseline": [3.0, -8.0], "start": [1.0, 2.0]}
-    wishes["velocity"] = [9.0, -9.0]
-    controller = learned[0].controller(0.013, **wishes)
+    options = {"phase": 2.0, "period": 1.3, "amplitude": 0.4, "baseline": [3.0, -8.0], "start": [1.0, 2.0]}
+    options["velocity"] = [9.0, -9.0]
+    controller = learned[0].controller(0.013, **options)
     states = [controller.state, *(controller.step() for _ in range(200))]
-    exact = learned[0].rollout(2.0, **wishes, n_samples=201)
+    exact = learned[0].rollout(2.0, **options, n_samples=201)
     for name, expected in (
         ("position", exact.positions),
         ("velocity", exact.velocities),

@@ -81,9 +81,9 @@ def test_a_style_is_found_again_in_its_movement(dmp, demonstrate, agree, metric,
     learned = dmp.learn(demonstrate(6, seed))
     model = learn_styles(learned, 3, metric=metric)
     agree(model.style_of(learned).styles, model.styles, 1e-8)
-    wishes = np.random.default_rng(seed).uniform(model.lowest, model.highest, (10, 3))
-    found = model.style_of(model.primitive(wishes))
-    agree(found.styles, wishes, 1e-8)
+    options = np.random.default_rng(seed).uniform(model.lowest, model.highest, (10, 3))
+    found = model.style_of(model.primitive(options))
+    agree(found.styles, options, 1e-8)
     assert found.residuals.max() < 1e-8 * model.singular_values[0]
     assert found.inside.all()
 

@@ -72,4 +72,4 @@ def _several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | 
     """One column or many, as a tuple."""
     if columns is None:
         return None
-    return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # none given is none said
+    return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # an empty one names none

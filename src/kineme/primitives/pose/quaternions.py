@@ -95,6 +95,11 @@ def continuous(q: ArrayLike) -> Array:
     -------
     ndarray of shape (..., T, 4)
         The first of each movement unchanged; ``sum(q[t] * q[t - 1]) >= 0`` afterwards.
+
+    Raises
+    ------
+    TrajectoryError
+        One quaternion alone, or an array of another shape.
     """
     q = as_quaternions(q)
     if q.ndim < 2:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import N_POINTS
@@ -66,7 +66,7 @@ class Live:
         self.skipped = 0
         self._leader, self._progress = -1, 0.0
 
-    def update(self, t: Any, x: Any) -> LiveState:
+    def update(self, t: ArrayLike, x: ArrayLike) -> LiveState:
         """Take in one sample, or a block of them.
 
         Parameters
@@ -95,7 +95,7 @@ class Live:
         kept = self._path.kept()
         return self._recognize(Trajectory(kept[:, 0].copy(), kept[:, 1:].copy()))
 
-    def _take_in(self, t: Any, x: Any) -> LiveStatus:
+    def _take_in(self, t: ArrayLike, x: ArrayLike) -> LiveStatus:
         status = LiveStatus(0)
         try:
             times, positions = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)

@@ -1,4 +1,4 @@
-"""New movements find their symbol or raise a new kind; symbols are merged and split where members say so."""
+"""New movements find their symbol or make a new proposal; symbols are merged and split where members say so."""
 
 from __future__ import annotations
 
