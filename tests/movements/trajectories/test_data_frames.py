@@ -184,3 +184,9 @@ def test_decimals_are_numbers_and_objects_of_durations_are_times():
 def test_labels_of_numbers_and_texts_are_texts():
     demos = Demonstrations.of(_frame(label=[1] * 25 + ["a"] * 25, trial=[1] * 25 + ["b"] * 25))
     assert demos.labels.tolist() == ["1", "a"]
+
+
+def test_labels_that_are_fractions_stay_numbers():
+    demos = Demonstrations.of(_frame(label=[0.5] * 25 + [2.0] * 25, trial=[1] * 25 + [2] * 25))
+    assert demos.labels.tolist() == [0.5, 2.0]
+    assert {type(label) for label in demos.labels.tolist()} == {float}

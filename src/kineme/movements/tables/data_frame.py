@@ -59,8 +59,9 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     roles = choose_roles(heads, kinds, layout)
     columns, dates_in = _by_role(heads, arrays, roles)
     parsed = table_movements(Table(heads, columns, len(arrays[0]), no_lines, dates_in=dates_in), roles, layout, "frame")
-    if roles.label is not None and arrays[roles.label].dtype.kind in "iu":  # numbers stay numbers
-        numbers = [None if one is None else int(one) for one in parsed.block.labels]
+    if roles.label is not None and (kind := arrays[roles.label].dtype.kind) in "iuf":  # numbers stay numbers
+        number = float if kind == "f" else int
+        numbers = [None if one is None else number(one) for one in parsed.block.labels]
         parsed.block.labels[:] = numbers  # type: ignore[assignment]
     return parsed
 
