@@ -147,7 +147,8 @@ class Demonstrations(Sequence[Trajectory]):
         """
         if isinstance(movements, Demonstrations):
             return movements
-        if (held := getattr(movements, "demonstrations", None)) is not None:
+        held: Any = getattr(movements, "demonstrations", None)
+        if held is not None and held is not movements:
             return cls.of(held)
         if (frames := frames_of(movements)) is not None:
             return cls.from_dataframe(frames)
