@@ -103,8 +103,10 @@ class BaseRollout(ABC):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Self: ...
     def __getitem__(self, index: Any) -> Trajectory | Self:
         """One `Trajectory` for an integer; a rollout for a slice, a mask or a list of indices."""
-        if isinstance(index, (int, np.integer, np.bool_)):  # a truth value is refused there
-            return self.demonstrations[index]
+        if isinstance(index, np.integer):
+            index = int(index)
+        if isinstance(index, (int, np.bool_)):
+            return self.demonstrations[index]  # type: ignore[index] # a truth value is refused there
         return self._take(np.arange(len(self))[index])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
