@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.control.controller import Controller
-from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.options import Options
 from kineme.primitives.discrete.encode import encode
 from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import forcing_matrix
-from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
 from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array, check_count, check_samples
+
+if TYPE_CHECKING:
+    from kineme.primitives.control.controller import Controller
+    from kineme.primitives.control.obstacles import ObstacleAvoidance
 
 
 @dataclass(frozen=True)
@@ -266,6 +267,10 @@ class Primitives(Learned):
         >>> controller.step(goal=[10.0, 5.0]).time
         0.002
         """
+        from kineme.primitives.control.controller import Controller  # these load where a robot moves, not to learn
+        from kineme.primitives.control.options import Options
+        from kineme.primitives.discrete.plan import plan_of
+
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return Controller(plan_of(self, start, goal, duration, velocity), dt, options)
 

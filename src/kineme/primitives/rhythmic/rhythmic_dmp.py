@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.options import Options
-from kineme.primitives.rhythmic.controller import RhythmicController
 from kineme.primitives.rhythmic.encode import encode
 from kineme.primitives.rhythmic.learned import RhythmicLearned
 from kineme.primitives.rhythmic.operators import forcing_matrix
-from kineme.primitives.rhythmic.plan import plan_of
 from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
 from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.validation import Array, check_count, check_samples
+
+if TYPE_CHECKING:
+    from kineme.primitives.control.obstacles import ObstacleAvoidance
+    from kineme.primitives.rhythmic.controller import RhythmicController
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,7 @@ class RhythmicPrimitives(RhythmicLearned):
         period: ArrayLike | None = None,
         amplitude: ArrayLike | None = None,
         baseline: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         feedback: str = "state",
@@ -226,6 +229,8 @@ class RhythmicPrimitives(RhythmicLearned):
             Time of a step [s], at most 1000 periods.
         phase, period, amplitude, baseline, start, velocity : optional
             As in `rollout`, for one movement.
+        goal : array_like of shape (d,), optional
+            Another name of the baseline, as in the other controllers; pass one of the two.
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance : optional
             What to do with measurements, new baselines and amplitudes, limits and obstacles; see
             `kineme.control.Options`.
@@ -238,8 +243,15 @@ class RhythmicPrimitives(RhythmicLearned):
         Raises
         ------
         SpecificationError
-            More than one primitive; an option out of its range.
+            More than one primitive; both `baseline` and `goal`; an option out of its range.
         """
+        from kineme.primitives.control.options import Options  # these load where a robot moves, not to learn
+        from kineme.primitives.rhythmic.controller import RhythmicController
+        from kineme.primitives.rhythmic.plan import plan_of
+
+        if goal is not None and baseline is not None:
+            raise SpecificationError("expected goal or baseline, which are the same, got both; pass one of them")
+        baseline = goal if baseline is None else baseline
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
         changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
         plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity})
