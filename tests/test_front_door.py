@@ -61,6 +61,7 @@ def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(AttributeError, match=r"module 'kineme.kernels' has no attribute 'rfb'; it has Kernel, RBF"):
         _ = kineme.kernels.rfb
     assert not hasattr(kineme, "__wrapped__")
+    assert not hasattr(kineme, "no.such")
 
 
 def test_a_former_name_warns_and_leads_to_the_name_of_today(monkeypatch):

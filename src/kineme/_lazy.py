@@ -57,7 +57,7 @@ def _module_below(package: str, name: str) -> object | None:
     """The module of that name in a package, as an attribute whether or not somebody imported it."""
     from importlib.util import find_spec
 
-    if name.startswith("_") or not hasattr(sys.modules[package], "__path__"):
+    if name.startswith("_") or not name.isidentifier() or not hasattr(sys.modules[package], "__path__"):
         return None
     return import_module(f"{package}.{name}") if find_spec(f"{package}.{name}") else None
 

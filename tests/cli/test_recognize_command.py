@@ -145,6 +145,12 @@ def test_what_is_near_and_between(folder, tmp_path):
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_that_nothing_lies_between_is_said(folder, monkeypatch):
+    monkeypatch.setattr(kineme.ActionLibrary, "between", lambda *_: ())
+    said = run("library", "between", "GShape", "Angle", "-l", folder)
+    assert said.stdout == "no symbol lies between GShape and Angle\n"
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [("kineme rec", "recognize"), ("kineme library na", None), ("kineme library li", "list")],

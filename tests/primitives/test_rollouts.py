@@ -64,6 +64,12 @@ def test_it_gives_one_trajectory_after_the_other(rollout):
         assert_same_movement(one, rollout, i)
 
 
+def test_a_truth_value_chooses_nothing(rollout):
+    for index in (True, np.bool_(False)):
+        with pytest.raises(IndexError, match="expected an index, a slice"):
+            rollout[index]
+
+
 def test_a_number_chooses_a_trajectory(rollout):
     for i in (0, 2, -1, np.intp(1)):
         assert isinstance(rollout[i], kineme.Trajectory)

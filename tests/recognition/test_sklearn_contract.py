@@ -11,7 +11,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import GridSearchCV, cross_val_predict, cross_val_score
 
-from kineme import Recognizer
+from kineme import Recognizer, SpecificationError
 from movement_samples import draw_shapes
 
 CLASSIFIERS = ["nearest", "prototype", "svm"]
@@ -104,3 +104,13 @@ def test_old_names_still_work_and_name_the_new_ones():
         assert recognizer.looks() == recognizer.representations_
     with pytest.warns(DeprecationWarning, match=r"look_at is now Recognizer\.describe"):
         assert len(recognizer.look_at(demos)) == len(recognizer.describe(demos)) == 4
+
+
+def test_a_fit_that_is_refused_leaves_the_last_one_whole():
+    demos = draw_shapes([4, 4])
+    recognizer = Recognizer(classifier="svm").fit(demos)
+    expected = recognizer.decision_function(demos)
+    with pytest.raises(SpecificationError, match="expected movements of two or more classes for classifier='svm', got"):
+        recognizer.fit(demos[:4])
+    assert len(recognizer.classes_) == 2
+    np.testing.assert_array_equal(recognizer.decision_function(demos), expected)

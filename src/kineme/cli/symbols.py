@@ -61,7 +61,11 @@ def between(first: str, second: str, folder: Path, as_json: bool) -> None:
     """List the symbols that lie between two, the smallest detour first."""
     with opened(folder) as actions:
         data = [one._asdict() for one in actions.between(first, second)]
-    say(as_json, data, lambda: "\n".join(map(_lies, data)) or "none")
+    say(
+        as_json,
+        data,
+        lambda: "\n".join(map(_lies, data)) or f"no symbol lies between {printable(first)} and {printable(second)}",
+    )
 
 
 @click.command("map", short_help="Draw a map of the symbols, similar ones near each other.")

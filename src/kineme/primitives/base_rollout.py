@@ -103,8 +103,10 @@ class BaseRollout(ABC):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Self: ...
     def __getitem__(self, index: Any) -> Trajectory | Self:
         """One `Trajectory` for an integer; a rollout for a slice, a mask or a list of indices."""
-        if isinstance(index, (int, np.integer)):
-            return self.demonstrations[int(index)]
+        if isinstance(index, np.integer):
+            index = int(index)
+        if isinstance(index, (int, np.bool_)):
+            return self.demonstrations[index]  # type: ignore[index] # a truth value is refused there
         return self._take(np.arange(len(self))[index])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -118,7 +120,8 @@ class BaseRollout(ABC):
         Returns
         -------
         matplotlib.figure.Figure
-            Shown at once in a notebook; ``figure.savefig("movements.png")`` writes it to a file.
+            Shown at once in a notebook; ``figure.savefig("movements.png")`` writes it to a file. It does not belong to
+            `matplotlib.pyplot`, whose ``show`` and ``savefig`` know nothing of it.
         """
         from kineme.primitives.rollout_figure import draw_rollout
 

@@ -15,6 +15,7 @@ from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
 from kineme.comparison.scores import Compared
 from kineme.comparison.similarity import AveragedSimilarity
+from kineme.errors import SpecificationError
 from kineme.validation import Array
 
 _MANY = 8  # demonstrations of every class, from which on "auto" takes the SVM
@@ -100,8 +101,20 @@ def fit_prototype(comparison: Comparison, references: References) -> Prototype:
 
 
 def fit_support_vectors(comparison: Comparison, references: References) -> SupportVectors:
-    """Fit an SVM to the Gram matrix of the references."""
+    """Fit an SVM to the Gram matrix of the references.
+
+    Raises
+    ------
+    SpecificationError
+        References of one class.
+    """
     from sklearn.svm import SVC
+
+    if len(references.classes) == 1:
+        raise SpecificationError(
+            f"expected movements of two or more classes for classifier='svm', got one class, "
+            f"{references.classes[0]!r}; add movements of another class, or pass classifier='nearest'"
+        )
 
     similarity = comparison.similarity.widened(_WIDER)
     gram = np.exp(similarity.log_average(references.described, references.described))

@@ -131,7 +131,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Raises
         ------
         SpecificationError
-            A parameter out of its range, or demonstrations that are all the same.
+            A parameter out of its range, demonstrations that are all the same, or an SVM of one class.
         TrajectoryError
             Not one label for each movement.
         """
@@ -140,8 +140,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
         candidates = CANDIDATES if self.representations is None else None
-        self.comparison_, self.references_ = fit_comparison(specification, demos, labels, self.weights, candidates)
-        self.classifier_ = fit_classifier(self.classifier, self.comparison_, self.references_)
+        comparison, references = fit_comparison(specification, demos, labels, self.weights, candidates)
+        classifier = fit_classifier(self.classifier, comparison, references)
+        # All at once: where a fit is refused, what was fitted before goes on as it was.
+        self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
         self._calibration: Calibration | None = None  # these two are made when first asked for
         self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self

@@ -1,6 +1,7 @@
 """What each perturbation changes, and what it leaves alone."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,13 @@ def paths(demos):
 
 def lengths(x):
     return np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1)
+
+
+def test_it_takes_movements_in_any_form(make_demos):
+    demos = make_demos(0)
+    some = Perturbation(**STRENGTHS)
+    for held in (list(demos), SimpleNamespace(demonstrations=demos)):
+        np.testing.assert_array_equal(some.apply(held, 1).positions, some.apply(demos, 1).positions)
 
 
 @given(seeds)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import datetime
+import decimal
 import subprocess
 import sys
 
@@ -90,6 +91,8 @@ def test_groups_of_a_frame_are_movements():
         demos = Demonstrations.of(movements)
         _check(demos, 2)
         assert demos.labels.tolist() == ["wave", "point"]
+    clocked = pd.concat([_frame(demo=0), _frame(demo=1)]).rename(columns={"time": "clock"}).groupby("demo")
+    _check(Demonstrations.from_dataframe(clocked, time="clock"), 2)
 
 
 def test_labels_that_are_numbers_stay_numbers():
@@ -151,3 +154,39 @@ def test_pandas_is_not_imported():
     code = "import sys, numpy, kineme\nkineme.DMP().learn([numpy.arange(20.0) ** 2])\nprint('pandas' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+REPAIRABLE = {
+    "a text among numbers": (["bad", *X[1:]], "expected numbers in the column 'x', got 'bad' in row 0"),
+    "complex numbers": (X + 1j, "expected numbers in the column 'x', got .*j in row 0"),
+}
+
+
+@pytest.mark.parametrize(("column", "message"), REPAIRABLE.values(), ids=REPAIRABLE)
+def test_a_coordinate_with_something_else_than_numbers_is_refused_not_left_out(column, message):
+    with pytest.raises(TrajectoryError, match=message):
+        Demonstrations.of(_frame(x=column))
+    only_y = Demonstrations.from_dataframe(_frame(x=column), columns=["y"])
+    np.testing.assert_array_equal(only_y.positions[:, 0], Y)
+
+
+def test_dates_are_no_coordinates():
+    with pytest.raises(TrajectoryError, match=r"expected numbers in the column 'x', got .*2024"):
+        Demonstrations.from_dataframe(_frame(x=pd.date_range("2024-01-01", periods=50)), columns=["x"])
+
+
+def test_decimals_are_numbers_and_objects_of_durations_are_times():
+    _check(Demonstrations.of(_frame(x=[decimal.Decimal(float(x)) for x in X])))
+    spans = pd.Series([datetime.timedelta(milliseconds=40 * k) for k in range(50)], dtype=object)
+    np.testing.assert_allclose(Demonstrations.of(_frame(time=spans)).times, 0.04 * np.arange(50))
+
+
+def test_labels_of_numbers_and_texts_are_texts():
+    demos = Demonstrations.of(_frame(label=[1] * 25 + ["a"] * 25, trial=[1] * 25 + ["b"] * 25))
+    assert demos.labels.tolist() == ["1", "a"]
+
+
+def test_labels_that_are_fractions_stay_numbers():
+    demos = Demonstrations.of(_frame(label=[0.5] * 25 + [2.0] * 25, trial=[1] * 25 + [2] * 25))
+    assert demos.labels.tolist() == [0.5, 2.0]
+    assert {type(label) for label in demos.labels.tolist()} == {float}

@@ -163,7 +163,7 @@ def test_movements_of_unequal_length_are_not_even():
 def test_labels_are_returned_or_asked_for(demos):
     assert require_labels(demos).tolist() == ["a", "b", "c", "a"]
     with pytest.raises(
-        TrajectoryError, match=r"expected labeled demonstrations.*pass labels= to Demonstrations.from_arrays"
+        TrajectoryError, match=r"expected labeled demonstrations.*pass y to fit, labels= to Demonstrations.from_arrays"
     ):
         require_labels(Demonstrations.from_arrays([np.arange(5.0)]))
 

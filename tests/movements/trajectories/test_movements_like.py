@@ -149,3 +149,24 @@ def test_a_library_learns_recordings(folder, tmp_path):
     with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(kineme.read_recordings(folder))
         assert [symbol.name for symbol in library.symbols()] == ["CShape", "GShape", "Line", "NShape"]
+
+
+def _holds_itself():
+    one = SimpleNamespace()
+    one.demonstrations = one
+    return one
+
+
+NOT_MOVEMENTS = {
+    "a number": SimpleNamespace(demonstrations=5),
+    "a method": SimpleNamespace(demonstrations=lambda: [X]),
+    "a text": SimpleNamespace(demonstrations="recordings"),
+    "itself": _holds_itself(),
+}
+
+
+@pytest.mark.parametrize("holder", NOT_MOVEMENTS.values(), ids=NOT_MOVEMENTS)
+def test_what_holds_something_else_than_movements_is_refused_alone_and_in_a_list(holder):
+    for movements in (holder, [holder, X], [Trajectory(T, X), holder]):
+        with pytest.raises(kineme.TrajectoryError, match=r"expected movements as a list of \(T, d\) arrays"):
+            Demonstrations.of(movements)

@@ -109,3 +109,17 @@ def test_one_primitive_at_a_time():
         both[0].controller(0.02, goal=random_quaternions(0, 3))
     with pytest.raises(kineme.TrajectoryError, match=r"goal: .*expected a unit quaternion"):
         both[0].controller(0.02, goal=[2.0, 0, 0, 0])
+
+
+@kinds
+@pytest.mark.parametrize("size", [1e3, 1e10, 1e49, 1e90, 1e149])
+def test_however_fast_it_is_said_to_turn_what_comes_back_is_a_pose(kind, size):
+    control, draw = learn(kind).controller(0.01), np.random.default_rng(0)
+    for k in range(40):
+        pushed = size * draw.normal(size=6)[-len(control.state.velocity) :]
+        state = control.step(velocity=pushed if k % 3 == 0 else None, coupling=pushed if k % 5 == 0 else None)
+        assert np.isfinite(np.concatenate((state.position, state.velocity, state.acceleration))).all()
+        assert abs(np.linalg.norm(state.orientation) - 1.0) < 1e-9
+    for _ in range(3000):
+        state = control.step()
+    assert angle_between(state.orientation, state.goal[-4:]) < 1e-3

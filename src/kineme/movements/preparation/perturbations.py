@@ -11,6 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_number, check_seed
 
 N_POINTS = 200  # samples afterwards
@@ -61,12 +62,13 @@ class Perturbation:
         """The same perturbation, without rotation unless `n_dims` is 2 or 3."""
         return self if n_dims in (2, 3) else replace(self, rotation=0.0)
 
-    def apply(self, demonstrations: Demonstrations, seed: int | Sequence[int]) -> Demonstrations:
+    def apply(self, demonstrations: MovementsLike, seed: int | Sequence[int]) -> Demonstrations:
         """The movements, perturbed, at 200 even samples; labels, names, durations stay.
 
         Parameters
         ----------
-        demonstrations : Demonstrations
+        demonstrations : MovementsLike
+            See `Demonstrations.of`.
         seed : int or sequence of int
             The same seed and number of movements give the same random numbers.
 
@@ -75,20 +77,21 @@ class Perturbation:
         SpecificationError
             A rotation of movements that have neither two nor three dimensions.
         """
-        n, d = len(demonstrations), demonstrations.n_dims
+        demos = Demonstrations.of(demonstrations)
+        n, d = len(demos), demos.n_dims
         if self.rotation > 0 and d not in (2, 3):
             raise SpecificationError(f"expected rotation=0 for movements of {d} dimensions, got {self.rotation!r}")
         check_seed("seed", seed)
         random = {name: np.random.default_rng([k, *np.atleast_1d(seed)]) for k, name in enumerate(_STREAMS)}
-        paths = self._warped(demonstrations, random["warp"])
+        paths = self._warped(demos, random["warp"])
         if self.rotation > 0:
             paths = _rotations(n, d, self.rotation, random["rotation"]) @ paths
         paths = paths * 2.0 ** (self.scale * random["scale"].uniform(-1, 1, (n, 1, 1)))
         extents = np.linalg.norm(np.ptp(paths, axis=2), axis=1)[:, None, None]
         paths += self.shift * extents * random["shift"].uniform(-1, 1, (n, d, 1))
         paths += self.noise * extents * random["noise"].normal(size=paths.shape)
-        paths += demonstrations.positions[demonstrations.offsets[:-1]][:, :, None]
-        return _with_paths(demonstrations, paths)
+        paths += demos.positions[demos.offsets[:-1]][:, :, None]
+        return _with_paths(demos, paths)
 
     def _warped(self, demonstrations: Demonstrations, random: np.random.Generator) -> Array:
         """Paths (n, d, 200) relative to their start, at even values of the warped time."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import datetime, timedelta
+from decimal import Decimal
 from numbers import Real
 from typing import Any
 
@@ -18,6 +19,7 @@ from kineme.movements.tables.table import Table, table_movements
 from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates
 
 _KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
+_NUMBERS = (Real, Decimal)
 
 
 def is_data_frame(value: Any) -> bool:
@@ -51,14 +53,15 @@ def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     read = [(head, _values(series), inside) for head, series, inside in _columns(frame)]
     heads = tuple(head for head, _, _ in read)
     arrays = [values for _, values, _ in read]
-    kinds = [_KINDS.get(values.dtype.kind, "text") if inside else "text" for _, values, inside in read]
+    kinds = [_kind(values) if inside else "text" for _, values, inside in read]
     if not heads or not len(arrays[0]):
         raise DataError("expected samples, got a data frame without rows")
     roles = choose_roles(heads, kinds, layout)
     columns, dates_in = _by_role(heads, arrays, roles)
     parsed = table_movements(Table(heads, columns, len(arrays[0]), no_lines, dates_in=dates_in), roles, layout, "frame")
-    if roles.label is not None and arrays[roles.label].dtype.kind in "iu":  # numbers stay numbers
-        numbers = [None if one is None else int(one) for one in parsed.block.labels]
+    if roles.label is not None and (kind := arrays[roles.label].dtype.kind) in "iuf":  # numbers stay numbers
+        number = float if kind == "f" else int
+        numbers = [None if one is None else number(one) for one in parsed.block.labels]
         parsed.block.labels[:] = numbers  # type: ignore[assignment]
     return parsed
 
@@ -76,16 +79,30 @@ def _columns(frame: Any) -> Iterator[tuple[str, Any, bool]]:
 
 
 def _values(series: Any) -> NDArray[Any]:
-    """Numbers, dates, or texts as objects; missing numbers are NaN, missing texts are empty."""
+    """Numbers, dates, or texts as objects, numbers among them as they are; missing numbers are NaN, texts empty."""
     values: NDArray[Any] = np.asarray(series.to_numpy())
     if values.dtype.kind != "O":
-        return values if values.dtype.kind in _KINDS else _texts(values.tolist())
+        return values if values.dtype.kind in _KINDS or values.dtype.kind == "c" else _texts(values.tolist())
     known = [one for one in values.tolist() if not _is_missing(one)]
     if known and all(isinstance(one, datetime) for one in known):
         return np.asarray(series.to_numpy(dtype="datetime64[ns]"))
-    if known and all(isinstance(one, Real) and not isinstance(one, bool) for one in known):
+    if known and all(isinstance(one, timedelta) for one in known):
+        return np.asarray(series.to_numpy(dtype="timedelta64[ns]"))
+    if known and all(map(_is_number, known)):
         return np.array([np.nan if _is_missing(one) else float(one) for one in values.tolist()])
-    return _texts(values.tolist())
+    texts = _texts(values.tolist())
+    texts[:] = [one if _is_number(one) else text for one, text in zip(values.tolist(), texts, strict=True)]
+    return texts
+
+
+def _kind(values: NDArray[Any]) -> str:
+    """What a column holds; one with a number among texts is one of numbers, and refused where it is a coordinate."""
+    mixed = values.dtype.kind == "c" or (values.dtype.kind == "O" and any(map(_is_number, values.tolist())))
+    return "number" if mixed else _KINDS.get(values.dtype.kind, "text")
+
+
+def _is_number(one: Any) -> bool:
+    return isinstance(one, _NUMBERS) and not isinstance(one, bool) and not _is_missing(one)
 
 
 def _texts(values: list[Any]) -> NDArray[Any]:
@@ -102,14 +119,14 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
     """Columns as `table_movements` takes them, and the unit of times that are dates."""
     columns: list[Any] = list(arrays)
     for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
-        columns[k] = arrays[k] if arrays[k].dtype.kind == "O" else _texts(arrays[k].tolist())
+        columns[k] = _texts(arrays[k].tolist())
     for k in roles.positions:
         columns[k] = _numbers(heads[k], arrays[k])
     dates_in, k = None, roles.time
     if k is not None and arrays[k].dtype.kind in "Mm":
         columns[k], dates_in = nanoseconds(arrays[k]), "ns"
     elif k is not None and arrays[k].dtype.kind == "O":
-        columns[k], others = seconds_of_dates(arrays[k].tolist())
+        columns[k], others = seconds_of_dates(_texts(arrays[k].tolist()).tolist())
         if others:
             raise DataError(f"expected times in {heads[k]!r}, got {next(iter(others.values()))!r}")
         dates_in = "s"
@@ -120,5 +137,6 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
 
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
     if _KINDS.get(values.dtype.kind) != "number":
-        raise DataError(f"expected numbers in the column {head!r}, got {values[0]!r}")
+        i, got = next(((i, one) for i, one in enumerate(values.tolist()) if not _is_number(one)), (0, values[0]))
+        raise DataError(f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, or say columns=")
     return values.astype(np.float64)

@@ -103,7 +103,7 @@ class Demonstrations(Sequence[Trajectory]):
 
         Parameters
         ----------
-        frames : DataFrame or sequence of DataFrame
+        frames : DataFrame, groups of one as ``groupby`` makes them, or sequence of DataFrame
             With the same coordinates in the same order.
         time, label : str or int, optional
             Columns by name, or counted from 0.
@@ -119,7 +119,7 @@ class Demonstrations(Sequence[Trajectory]):
             No column of times that is known by its name or given, several of them, no coordinates, or samples that
             are no movement; the message lists the columns.
         """
-        several = [frames] if is_data_frame(frames) else list(frames)
+        several = frames_of(frames) or list(frames)
         return cls.of_movements(collect_data_frames(several, Layout(time, columns, movement, label, units)))
 
     @classmethod
@@ -147,7 +147,8 @@ class Demonstrations(Sequence[Trajectory]):
         """
         if isinstance(movements, Demonstrations):
             return movements
-        if (held := getattr(movements, "demonstrations", None)) is not None:
+        held: Any = getattr(movements, "demonstrations", None)
+        if held is not None and held is not movements:
             return cls.of(held)
         if (frames := frames_of(movements)) is not None:
             return cls.from_dataframe(frames)
@@ -276,7 +277,7 @@ def require_labels(demonstrations: Demonstrations) -> NDArray[Any]:
     if demonstrations.labels is None:
         raise TrajectoryError(
             "expected labeled demonstrations, got none with a label; "
-            "pass labels= to Demonstrations.from_arrays or label= to each Trajectory"
+            "pass y to fit, labels= to Demonstrations.from_arrays, or label= to each Trajectory"
         )
     return demonstrations.labels
 

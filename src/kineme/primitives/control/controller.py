@@ -257,12 +257,16 @@ class Controller:
             velocities = velocities / self._rate
         influences = Influences(goal, ratio, push, self._obstacles, velocities)
         motion = self._advance(self._motion[:2], self._clock.u, du, influences)
-        if inputs.usable(motion):
+        if self._usable(motion):
             self._motion = motion
             self._clock.add_phase(du)
         else:
             self._motion = last
             self._events |= Status.STATE_KEPT
+
+    def _usable(self, motion: Array) -> bool:
+        """Whether the movement can go on from there."""
+        return inputs.usable(motion)
 
     def _follow(self, dt: float) -> tuple[Array, Array]:
         """Goal and ratio that act during dt."""

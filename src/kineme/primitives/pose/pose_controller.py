@@ -18,6 +18,9 @@ from kineme.primitives.pose.rates import angular_acceleration, angular_velocity,
 from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
+_MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors
+_FASTEST = 1e50  # rates of rotation vectors; the products in angular accelerations are finite
+
 
 class PoseState(State):
     """A pose at one moment: a `State` in the columns of the demonstrations.
@@ -44,7 +47,8 @@ class PoseController(Controller):
 
     It steps through position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
     the rollout. A goal that turns in flight moves in that chart. A step costs some tenths of a millisecond, most of it
-    on the way from rotation vectors to quaternions and angular velocities.
+    on the way from rotation vectors to quaternions and angular velocities. Where a step would turn further than a
+    million radians, the orientation stays and is at rest, and the status says so.
 
     Attributes
     ----------
@@ -133,7 +137,18 @@ class PoseController(Controller):
         if array is None:
             return None
         rates = np.concatenate((array[:-3], rotation_vector_rate(x[-3:], array[-3:])))
-        return rates if inputs.usable(rates) else None
+        return rates if inputs.usable(rates) and np.abs(rates[-3:]).max() <= _FASTEST else None
+
+    def _move(self, dt: float, push: Array, last: Array) -> None:
+        super()._move(dt, push, last)
+        if Status.STATE_KEPT in self._events:
+            motion = self._motion.copy()
+            motion[1:, -3:] = 0.0  # else it would be as fast, and kept, in all later steps
+            self._motion = motion
+
+    def _usable(self, motion: Array) -> bool:
+        turned = np.abs(motion[:, -3:]).max(axis=1)
+        return super()._usable(motion) and bool(turned[0] <= _MOST_TURNED and turned[1:].max() <= _FASTEST)
 
     def _derivatives(self) -> tuple[Array, Array]:
         rate, bend = super()._derivatives()
