@@ -15,7 +15,7 @@ from sklearn.svm import SVC
 
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
-from kineme.comparison import compared as module
+from kineme.comparison import scores as module
 from kineme.datasets.lasa import PAPER_LETTERS
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.perturbations import Perturbation

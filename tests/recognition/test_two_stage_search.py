@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer
-from kineme.comparison import stored
+from kineme.comparison import stored_references
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import feature_rows
 from kineme.comparison.stored_references import StoredReferences
@@ -161,7 +161,7 @@ def test_answers_do_not_depend_on_how_many_references_are_held(held, monkeypatch
     recognizer = Recognizer(classifier="nearest").fit(draw_shapes([6] * 12, 2, 3))
     asked = draw_shapes([2] * 12, 2, 3, spread=0.3)
     plain = _two_stages(recognizer)[0].recognize(asked)
-    monkeypatch.setattr(stored, "_HELD", held)
+    monkeypatch.setattr(stored_references, "_HELD", held)
     for a, b in zip(plain, _two_stages(recognizer)[0].recognize(asked), strict=True):
         assert (a.label, a.p_values, a.ranked, a.nearest) == (b.label, b.p_values, b.ranked, b.nearest)
         np.testing.assert_array_equal(a.transform.matrix, b.transform.matrix)
