@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from sklearn.base import clone
 
 import kineme
 from kineme.errors import SpecificationError, TrajectoryError
@@ -54,6 +55,14 @@ def test_a_stream_fed_whole_ends_with_the_batch_answer(recognizer, movement):
     batch = recognizer.recognize(movement)
     for answer in (live.finish(), again.finish()):
         assert (answer.label, answer.confidence) == (batch.label, batch.confidence)
+
+
+def test_a_stream_ends_with_the_fit_that_it_began_with(recognizer, movement):
+    fitted_again = clone(recognizer).fit(recognizer.demonstrations_)
+    live = fitted_again.stream()
+    fitted_again.fit(recognizer.demonstrations_, [f"another {label}" for label in recognizer.demonstrations_.labels])
+    live.update(movement.times, movement.positions)
+    assert live.finish().label == recognizer.recognize(movement).label
 
 
 def test_it_decides_before_the_end_and_never_flickers(recognizer, movement):

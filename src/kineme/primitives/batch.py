@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.labels import label_array
-from kineme.primitives.persistence import (
-    Arrays,
-    checked_rows,
-    header_of,
-    labels_and_names,
-    load_as,
-    save_as,
-    specification_from_dict,
-)
+
+if TYPE_CHECKING:
+    from kineme.primitives.persistence import Arrays
 
 
 class Batch:
@@ -127,6 +121,8 @@ class Batch:
             The file cannot be written; what was there before stays.
         """
         rows = {name: self._row(name) for name in self.ROWS}
+        from kineme.primitives.persistence import header_of, save_as  # files load when they are used
+
         return save_as(self.KIND, path, header_of(self.dmp, self.labels, self.names), rows)
 
     @classmethod
@@ -138,6 +134,8 @@ class Batch:
         DataError
             The file is foreign, truncated, damaged, of another kind or of a later version.
         """
+        from kineme.primitives.persistence import load_as
+
         return load_as(cls.KIND, path, cls._from_file)
 
     @classmethod
@@ -162,6 +160,8 @@ class Batch:
 
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> Self:
+        from kineme.primitives.persistence import checked_rows, labels_and_names, specification_from_dict
+
         dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
         rows = checked_rows(cls.ROWS, arrays, dmp.n_basis)
         return cls._of_rows(dmp, rows, *labels_and_names(header, len(next(iter(rows.values())))))

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
-from kineme.files.container import read_container, write_container
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
@@ -28,11 +27,15 @@ T = TypeVar("T")
 
 def save_as(kind: str, path: str | Path, header: dict[str, Any], arrays: Arrays) -> Path:
     """Write a header of plain data and arrays to one file, with the name of its content."""
+    from kineme.files.container import write_container  # files load when they are used
+
     return write_container(Path(path), kind, header, dict(arrays))
 
 
 def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays], T]) -> T:
     """Read a file with content of the given name and build it; a header or arrays that do not fit are a `DataError`."""
+    from kineme.files.container import read_container
+
     header, arrays = read_container(Path(path), kind)
     try:
         return build(header, arrays)

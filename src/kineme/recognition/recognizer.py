@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any, Self, overload
 from warnings import warn
 
@@ -327,7 +328,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
         comparison, references = self._fitted
         beginnings = self._beginnings(early)
-        return Live(comparison, references, beginnings, Decision(confidence, patience), self.recognize)
+        # A copy: the answer at the end is that of this fit, also if the recognizer is fitted again meanwhile.
+        return Live(comparison, references, beginnings, Decision(confidence, patience), copy(self).recognize)
 
     def look_at(self, X: MovementsLike) -> Described:
         """Deprecated name of `describe`."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from threading import Lock, active_count
@@ -54,6 +53,8 @@ def for_tiles(work: Callable[[int, int], object], n_rows: int, tile_rows: int) -
             for start, stop in tiles:
                 work(start, stop)
             return
+        from concurrent.futures import ThreadPoolExecutor  # not for small work
+
         with ThreadPoolExecutor(threads) as pool:
             for result in [pool.submit(work, *tile) for tile in tiles]:
                 result.result()

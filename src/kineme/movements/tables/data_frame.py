@@ -22,23 +22,6 @@ _KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}
 _NUMBERS = (Real, Decimal)
 
 
-def is_data_frame(value: Any) -> bool:
-    """Whether this is a data frame, of pandas, of polars, or of another package with their names."""
-    return hasattr(value, "columns") and hasattr(value, "to_numpy") and hasattr(value, "__getitem__")
-
-
-def frames_of(value: Any) -> list[Any] | None:
-    """The data frames of one, of its groups as ``groupby`` makes them, or of a list of (key, group); else None."""
-    if is_data_frame(value):
-        return [value]
-    if not hasattr(value, "get_group") and not isinstance(value, list):
-        return None
-    pairs = list(value)
-    if pairs and all(isinstance(one, tuple) and len(one) == 2 and is_data_frame(one[1]) for one in pairs):
-        return [frame for _, frame in pairs]
-    return None
-
-
 def parse_data_frame(frame: Any, layout: Layout) -> Parsed:
     """The movements of a data frame: one, or many that are told apart by columns.
 

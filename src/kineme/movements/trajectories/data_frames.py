@@ -4,14 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kineme.errors import DataError, TrajectoryError
-from kineme.movements.tables.data_frame import is_data_frame, parse_data_frame
-from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed
 from kineme.movements.trajectories.collect import collect_arrays
 from kineme.movements.trajectories.movements import Movements
+
+if TYPE_CHECKING:
+    from kineme.movements.tables.layout import Layout
+    from kineme.movements.tables.parsed import Parsed
+
+
+def is_data_frame(value: Any) -> bool:
+    """Whether this is a data frame, of pandas, of polars, or of another package with their names."""
+    return hasattr(value, "columns") and hasattr(value, "to_numpy") and hasattr(value, "__getitem__")
+
+
+def frames_of(value: Any) -> list[Any] | None:
+    """The data frames of one, of its groups as ``groupby`` makes them, or of a list of (key, group); else None."""
+    if is_data_frame(value):
+        return [value]
+    if not hasattr(value, "get_group") and not isinstance(value, list):
+        return None
+    pairs = list(value)
+    if pairs and all(isinstance(one, tuple) and len(one) == 2 and is_data_frame(one[1]) for one in pairs):
+        return [frame for _, frame in pairs]
+    return None
 
 
 def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
@@ -41,6 +59,8 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
 
 
 def _parse(frame: Any, i: int, layout: Layout) -> Parsed:
+    from kineme.movements.tables.data_frame import parse_data_frame  # what columns mean loads with the first frame
+
     if not is_data_frame(frame):
         raise TrajectoryError(f"expected data frames, got {type(frame).__name__} at index {i}; pass them one by one")
     try:

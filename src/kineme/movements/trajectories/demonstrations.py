@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.tables.data_frame import frames_of, is_data_frame
-from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
-from kineme.movements.trajectories.data_frames import collect_data_frames
+from kineme.movements.trajectories.data_frames import collect_data_frames, frames_of, is_data_frame
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array, describe
+
+if TYPE_CHECKING:
+    from kineme.movements.tables.layout import Column
 
 _SHOWN = 8  # names of dimensions
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
@@ -119,6 +120,8 @@ class Demonstrations(Sequence[Trajectory]):
             No column of times that is known by its name or given, several of them, no coordinates, or samples that
             are no movement; the message lists the columns.
         """
+        from kineme.movements.tables.layout import Layout
+
         several = frames_of(frames) or list(frames)
         return cls.of_movements(collect_data_frames(several, Layout(time, columns, movement, label, units)))
 

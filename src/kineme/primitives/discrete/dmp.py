@@ -15,13 +15,13 @@ from kineme.primitives.discrete.encode import encode
 from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import forcing_matrix
-from kineme.primitives.discrete.rollout import Rollout, rollout, samples_at_rate, settled_end
 from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
     from kineme.primitives.control.controller import Controller
     from kineme.primitives.control.obstacles import ObstacleAvoidance
+    from kineme.primitives.discrete.rollout import Rollout
 
 
 @dataclass(frozen=True)
@@ -209,6 +209,8 @@ class Primitives(Learned):
         DegenerateMovementError
             The original formulation asked to move a closed or flat demonstration to another goal.
         """
+        from kineme.primitives.discrete.rollout import rollout, samples_at_rate, settled_end
+
         movement = rollout(self, start, goal, duration, velocity)
         end = 1.0 if settle is None else settled_end(movement, settle)
         if rate is not None and n_samples is not None:
