@@ -214,3 +214,10 @@ def test_what_was_set_between_steps_still_can_be(learned, name, told, value):
     wrong = pytest.raises(SpecificationError, match=r"expected .* got 'wide'")
     with pytest.warns(DeprecationWarning, match="setting it is deprecated"), wrong:
         setattr(one, name, "wide")
+
+
+def test_goal_is_another_name_of_the_baseline(learned):
+    goal = learned[0].controller(0.01, goal=[3.0, -8.0]).step()
+    np.testing.assert_array_equal(goal.position, learned[0].controller(0.01, baseline=[3.0, -8.0]).step().position)
+    with pytest.raises(SpecificationError, match="got both"):
+        learned[0].controller(0.01, goal=[3.0, -8.0], baseline=[3.0, -8.0])

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
-from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.discrete.encode import encode
 from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import forcing_matrix
@@ -19,6 +17,7 @@ from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array, check_count, check_samples
 
 if TYPE_CHECKING:
+    from kineme.movements.trajectories.movements_like import MovementsLike
     from kineme.primitives.control.controller import Controller
     from kineme.primitives.control.obstacles import ObstacleAvoidance
     from kineme.primitives.discrete.rollout import Rollout
@@ -95,6 +94,8 @@ class DMP(Specification):
         TrajectoryError
             Movements that cannot be used: see `Demonstrations`; also a movement that does not move.
         """
+        from kineme.primitives.discrete.encode import encode  # movements load when there are some
+
         return Primitives(self, **encode(self, movements))
 
 
