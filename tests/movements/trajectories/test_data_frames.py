@@ -121,9 +121,9 @@ REFUSED = {
     "time that stands still": (_frame(time=0.0), "trajectory 0: expected strictly increasing times"),
     "other coordinates": ([_frame(), _frame().rename(columns={"y": "z"})], r"data frame 1: expected the coordinates \['x', 'y'\] as in data frame 0, got \['x', 'z'\]"),
     "frames beside arrays": ([_frame(), np.ones((9, 2))], "expected data frames, got ndarray at index 1"),
-    "numbers that are words": (_frame().astype(str), r"expected a column of times and .*; there are no numbers in \['x', 'y'\]"),
+    "numbers that are words": (_frame().astype(str), r"expected numbers in the column 'x', got '0.0' in row 0; repair it, as by frame.astype"),
     "one column alone": (_frame()["x"], r"expected movements as a list of .*, got Series; pass its numbers, series.to_numpy\(\)"),
-    "times that are words": (_frame(time="now"), "data frame 0: expected times in 'time', got 'now'"),
+    "times that are words": (_frame(time="now"), "expected numbers or dates in the column of times 'time', got the text 'now'"),
 }  # fmt: skip
 
 
@@ -190,3 +190,13 @@ def test_labels_that_are_fractions_stay_numbers():
     demos = Demonstrations.of(_frame(label=[0.5] * 25 + [2.0] * 25, trial=[1] * 25 + [2] * 25))
     assert demos.labels.tolist() == [0.5, 2.0]
     assert {type(label) for label in demos.labels.tolist()} == {float}
+
+
+def test_numbers_that_are_written_as_texts_are_refused_and_codes_are_not():
+    frame = pd.DataFrame({"time": np.arange(6.0), "x": [f"{k / 7:.3f}" for k in range(6)], "y": np.arange(6.0) ** 2})
+    with pytest.raises(TrajectoryError, match=r"expected numbers in the column 'x'.*astype"):
+        kineme.Demonstrations.of(frame)
+    with pytest.raises(TrajectoryError, match=r"column of times 'time'.*astype"):
+        kineme.Demonstrations.of(frame.astype({"time": str, "x": float}))
+    codes = frame.assign(x=range(6), subject="07")
+    assert kineme.Demonstrations.of(codes).dimensions == ("x", "y")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from decimal import Decimal
+from math import isfinite
 from numbers import Real
 from typing import Any
 
@@ -80,8 +81,17 @@ def _values(series: Any) -> NDArray[Any]:
 
 def _kind(values: NDArray[Any]) -> str:
     """What a column holds; one with a number among texts is one of numbers, and refused where it is a coordinate."""
-    mixed = values.dtype.kind == "c" or (values.dtype.kind == "O" and any(map(_is_number, values.tolist())))
-    return "number" if mixed else _KINDS.get(values.dtype.kind, "text")
+    mixed = values.dtype.kind == "O" and (any(map(_is_number, values.tolist())) or _are_decimals(values.tolist()))
+    return "number" if mixed or values.dtype.kind == "c" else _KINDS.get(values.dtype.kind, "text")
+
+
+def _are_decimals(texts: list[str]) -> bool:
+    """Whether texts are measured numbers, such as "0.25", and not codes, such as "07"."""
+    known = [text for text in texts if text]
+    try:
+        return any("." in text for text in known) and all(map(isfinite, map(float, known)))
+    except ValueError:
+        return False
 
 
 def _is_number(one: Any) -> bool:
@@ -111,7 +121,10 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
     elif k is not None and arrays[k].dtype.kind == "O":
         columns[k], others = seconds_of_dates(_texts(arrays[k].tolist()).tolist())
         if others:
-            raise DataError(f"expected times in {heads[k]!r}, got {next(iter(others.values()))!r}")
+            raise DataError(
+                f"expected numbers or dates in the column of times {heads[k]!r}, got the text "
+                f"{next(iter(others.values()))!r}; if it is a number, write frame.astype({{{heads[k]!r}: float}})"
+            )
         dates_in = "s"
     elif k is not None:
         columns[k] = _numbers(heads[k], arrays[k])
@@ -121,5 +134,8 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
 def _numbers(head: str, values: NDArray[Any]) -> NDArray[np.float64]:
     if _KINDS.get(values.dtype.kind) != "number":
         i, got = next(((i, one) for i, one in enumerate(values.tolist()) if not _is_number(one)), (0, values[0]))
-        raise DataError(f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, or say columns=")
+        raise DataError(
+            f"expected numbers in the column {head!r}, got {got!r} in row {i}; repair it, as by "
+            f"frame.astype({{{head!r}: float}}), or say columns="
+        )
     return values.astype(np.float64)
