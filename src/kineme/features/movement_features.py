@@ -161,7 +161,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
             this, fields_of_dmp = type(self).__name__, [_RENAMED.get(name, name) for name in old]
             made = f"kineme.{self._specification_type.__name__}({', '.join(f'{name}=...' for name in fields_of_dmp)})"
             warnings.warn(
-                f"{this} takes {', '.join(old)} by its dmp now: write {this}(dmp={made}), and "
+                f"{', '.join(old)} of {this} moved to its dmp: write {this}(dmp={made}), and "
                 f"{_NESTED}{fields_of_dmp[0]} in set_params and searches",
                 DeprecationWarning,
                 stacklevel=3,
