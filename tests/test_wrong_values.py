@@ -1,4 +1,4 @@
-"""Every parameter of the public specifications and wishes, with values that cannot be: a result or a KinemeError.
+"""Every parameter of the public specifications and options, with values that cannot be: a result or a KinemeError.
 
 No other exception, no warning, no number that is not finite, and no wait. What is passed is drawn from one table, so
 that a parameter that is added here is tried with all of it.
