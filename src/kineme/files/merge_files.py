@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.problem import Problem
@@ -16,8 +15,8 @@ from kineme.files.read_file import FileRead
 from kineme.movements.tables.parsed import Block, Detected
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movement_sequence import MovementSequence
 from kineme.movements.trajectories.movements import Movements
-from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.text import counted
 
 
@@ -48,7 +47,7 @@ class Source(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Recordings:
+class Recordings(MovementSequence):
     """Movements with their sources, and the problems of what could not be read.
 
     A sequence of `Trajectory`, taken wherever movements are expected.
@@ -72,17 +71,6 @@ class Recordings:
 
     def __len__(self) -> int:
         return len(self.sources)
-
-    def __iter__(self) -> Iterator[Trajectory]:
-        return iter(self.demonstrations)
-
-    @overload
-    def __getitem__(self, index: int) -> Trajectory: ...
-    @overload
-    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
-    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
-        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
-        return self.demonstrations[index]
 
     @property
     def labels(self) -> tuple[str | None, ...]:

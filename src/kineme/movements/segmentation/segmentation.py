@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, overload
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.table import Segmenter
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movement_sequence import MovementSequence
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Segmentation:
+class Segmentation(MovementSequence):
     """Movements cut from one recording, and where: a sequence of `Trajectory`, taken wherever movements are expected.
 
     Attributes
@@ -39,7 +38,7 @@ class Segmentation:
         """Time of the first and last sample of each movement, shape (n, 2) [s]."""
         return np.column_stack((self.recording.times[self.rows[:, 0]], self.recording.times[self.rows[:, 1] - 1]))
 
-    @property
+    @cached_property
     def demonstrations(self) -> Demonstrations:
         """The movements, as recorded: neither smoothed nor moved in time, named like ``recording[12.3-14.1 s]``."""
         return pieces_of(self.recording, self.rows)
@@ -51,17 +50,6 @@ class Segmentation:
 
     def __len__(self) -> int:
         return len(self.rows)
-
-    def __iter__(self) -> Iterator[Trajectory]:
-        return iter(self.demonstrations)
-
-    @overload
-    def __getitem__(self, index: int) -> Trajectory: ...
-    @overload
-    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
-    def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
-        """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
-        return self.demonstrations[index]
 
     def __repr__(self) -> str:
         return f"Segmentation({len(self)} movements in {self.recording.duration:.3g} s, {self.method!r})"
