@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.batch import Batch
@@ -103,11 +104,8 @@ class BaseRollout(ABC):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Self: ...
     def __getitem__(self, index: Any) -> Trajectory | Self:
         """One `Trajectory` for an integer; a rollout for a slice, a mask or a list of indices."""
-        if isinstance(index, np.integer):
-            index = int(index)
-        if isinstance(index, (int, np.bool_)):
-            return self.demonstrations[index]  # type: ignore[index] # a truth value is refused there
-        return self._take(np.arange(len(self))[index])
+        chosen = as_indices(index, len(self))
+        return self.demonstrations[int(chosen)] if chosen.ndim == 0 else self._take(chosen)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.positions, dtype=dtype, copy=copy)
