@@ -61,7 +61,7 @@ def _stub_of(module: str) -> str:
     spec = sys.modules[module].__spec__
     path = spec.origin.removesuffix("c") + "i"  # type: ignore[union-attr]
     try:
-        return spec.loader.get_data(path).decode()  # type: ignore[union-attr, no-any-return]
+        return spec.loader.get_data(path).decode()  # type: ignore[union-attr]
     except OSError as error:
         raise ImportError(
             f"expected the public names of {module} in {path}, found no such file; kineme needs its .pyi files when it "
