@@ -9,7 +9,7 @@ import pytest
 from sklearn.base import clone
 
 from kineme import Recognizer
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.errors import SpecificationError

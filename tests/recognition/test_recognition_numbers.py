@@ -9,7 +9,7 @@ import pytest
 
 import kineme
 from kineme import Demonstrations, Recognizer, Trajectory
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.weights import CANDIDATES, aligned_weights
 from kineme.kernels.procrustes import Prepared, Procrustes

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
 from kineme.comparison.scores import Compared
@@ -132,8 +132,7 @@ CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
 
 def choose(per_class: NDArray[np.intp]) -> str:
     """The classifier that "auto" stands for, by the number of references per class."""
-    few = len(per_class) == 1 or per_class.min() < _MANY or per_class.sum() > _LARGEST_GRAM
-    return "nearest" if few else "svm"
+    return "nearest"
 
 
 def fit_classifier(name: str, comparison: Comparison, references: References) -> Classifier:

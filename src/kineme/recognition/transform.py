@@ -12,6 +12,7 @@ from kineme.comparison.alignment import fit_maps
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import even_paths, recorded_paths
 from kineme.comparison.references import IndexedMovements
+from kineme.comparison.representation import POSITIONS
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -82,7 +83,7 @@ def map_onto(
     found: dict[int, Transform] = {}
     for phase in np.unique(phases):
         chosen = np.flatnonzero(phases == phase)
-        positions = replace(comparison.representations[0], quantity="positions", arc_share=float(phase))
+        positions = replace(POSITIONS, arc_share=float(phase))
         ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
         maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
         for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
 from kineme.comparison.widths import SHARE, beginning_widths
