@@ -82,7 +82,8 @@ def fit_to_references(
             values = given_weights(weights, len(representations))
     in_pairs = any(one.in_pairs and value > 0 for one, value in zip(representations, values, strict=True))
     # Where movements are compared pair by pair, their rotation comes from their positions, even with a weight of 0.
-    kept = np.flatnonzero([value > 0 or (in_pairs and one == POSITIONS) for one, value in zip(representations, values)])
+    needed = np.array([in_pairs and one == POSITIONS for one in representations])
+    kept = np.flatnonzero((values > 0) | needed)
     whole = Comparison(
         specification.representations,
         specification.normalization,

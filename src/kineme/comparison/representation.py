@@ -138,7 +138,8 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
             "expected representations to be a tuple of kineme.comparison.representation.Representation, one or more, "
             f"or None for the default ones, got {representations!r}"
         )
-    if any(one.in_pairs for one in given) and not any(one.quantity == "positions" and one.arc_share == 1 for one in given):
+    gives_rotation = any(one.quantity == "positions" and one.arc_share == 1 for one in given)
+    if any(one.in_pairs for one in given) and not gives_rotation:
         raise SpecificationError(
             "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
             "rotation it gives; add it"

@@ -110,8 +110,7 @@ def averaged(described: Described, widths: ArrayLike | None = None) -> AveragedS
     n = described.n_representations
     if sigma.shape != (n,) or not (sigma > 0).all():
         raise SpecificationError(
-            f"expected widths to be {n} numbers above 0, one for each representation, "
-            f"got {widths!r}"
+            f"expected widths to be {n} numbers above 0, one for each representation, got {widths!r}"
         )
     return AveragedSimilarity(described.procrustes, sigma, described.mean)
 

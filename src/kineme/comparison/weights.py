@@ -107,8 +107,8 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
         array = np.empty(0)
     if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise SpecificationError(
-            f"expected weights to be 'auto', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each representation, "
-            f"got {weights!r}"
+            f"expected weights to be 'auto', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each "
+            f"representation, got {weights!r}"
         )
     array = array / array.max()  # so that the sum does not overflow
     return np.asarray(array / array.sum())

@@ -76,7 +76,7 @@ def fill_soft_rotations(products, a, b, F, best, rotations):  # type: ignore[no-
 
 
 @jit
-def _load(products, a, b, F, lanes, first, width, n_columns):  # type: ignore[no-untyped-def]
+def _load(products, a, b, F, lanes, first, width, n_columns):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
     M = lanes.M
     for lane in range(_LANES):
         i, j = divmod(first + min(lane, width - 1), n_columns)
@@ -110,7 +110,9 @@ def _solve(lanes):  # type: ignore[no-untyped-def]
                 square[lane] += M[k, h, lane] * M[k, h, lane]
                 last[lane] += 4.0 * A[k, h, lane] * A[k, h, lane]
     for lane in range(_LANES):
-        determinant[lane] = M[0, 0, lane] * A[0, 0, lane] + M[0, 1, lane] * A[0, 1, lane] + M[0, 2, lane] * A[0, 2, lane]
+        determinant[lane] = (
+            M[0, 0, lane] * A[0, 0, lane] + M[0, 1, lane] * A[0, 1, lane] + M[0, 2, lane] * A[0, 2, lane]
+        )
         top[lane] = math.sqrt(square[lane] + math.sqrt(3.0 * last[lane]))
     for _ in range(STEPS):
         moving = 0.0

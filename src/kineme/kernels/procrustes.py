@@ -23,7 +23,6 @@ from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, check_number
 
-
 #: Writes of a block of products (3 n, 3 m), norms (n,), (m,): best products (n, m), and rotations (n, m, 3, 3).
 Filler = Callable[[NDArray[Any], Array, Array, Array, NDArray[Any]], None]
 
@@ -49,10 +48,11 @@ class Procrustes:
 
     ``d(A, B)^2 = min_R |A - R B|^2 = |A|^2 + |B|^2 - 2 max_R <A, R B>`` over rotations R (no mirror images) by
     at most `max_angle`. With a `prior`, any rotation is allowed and a large one costs: ``<A, R B>`` is replaced by
-    ``<A, R B> + |A| |B| (tr(R^T F) - tr F)``, see `kernels.soft_rotation`. In the plane, with ``z = x + i y``, ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``:
-    one complex matrix product for all pairs. In space, one real matrix product for all pairs, and a quadratic form of
-    unit quaternions for each, see `kernels.rotation`. In one dimension, and with ``max_angle = 0``, it is the Euclidean
-    distance.
+    ``<A, R B> + |A| |B| (tr(R^T F) - tr F)``, see `kernels.soft_rotation`. In the plane, with ``z = x + i y``,
+    ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``: one complex matrix product for all pairs. In space, one real
+    matrix product for all pairs, and a small problem for each: a quadratic form of unit quaternions with a limit, see
+    `kernels.rotation`, the root of a quartic with a prior. In one dimension, and with ``max_angle = 0``, it is the
+    Euclidean distance.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class Procrustes:
             parts = _products(A.rows, B.rows)
             if self.prior is None:
                 return _within(parts, self.max_angle)  # the angle's sign does not matter here
-            return soft_products_in_plane(*map(_double, parts), self._weights(A, B))[0]
+            return soft_products_in_plane(_double(parts[0]), _double(parts[1]), self._weights(A, B))[0]
         if self.prior is None:
             return _in_space(A, B, self._hard_filler(len(A) * len(B)))[0]
         return _in_space(A, B, self._soft_filler(len(A) * len(B)))[0]
@@ -127,12 +127,12 @@ class Procrustes:
         if self.max_angle == 0 or self.n_dims not in (2, 3):
             return self.alignment(A, B), None
         if self.n_dims == 2:
-            parts = tuple(map(_double, _products(A.rows, B.rows)))
+            re, im = map(_double, _products(A.rows, B.rows))
             if self.prior is None:
-                angle = np.clip(np.arctan2(-parts[1], parts[0]), -self.max_angle, self.max_angle)
+                angle = np.clip(np.arctan2(-im, re), -self.max_angle, self.max_angle)
                 c, s = np.cos(angle), np.sin(angle)
-                return c * parts[0] - s * parts[1], np.stack((c, s), -1).astype(np.float32)
-            best, c, s = soft_products_in_plane(*parts, self._weights(A, B))
+                return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
+            best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
             return best, np.stack((c, -s), -1).astype(np.float32)
         fill = self._soft_filler if self.prior is not None else self._hard_filler
         return _in_space(A, B, fill(len(A) * len(B), rotations=True), rotations=True)

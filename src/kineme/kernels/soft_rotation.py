@@ -38,9 +38,9 @@ class RotationPrior:
 
     Parameters
     ----------
-    concentration : float, default 0.05
-        k of ``F = k I``: a rotation by t costs ``2 k (1 - cos t)`` of the largest similarity, at 0.05 a tenth for a
-        right angle. 0 takes all rotations as equally likely.
+    concentration : float, default 0.03
+        k of ``F = k I``: a rotation by t costs ``2 k (1 - cos t)`` of |a| |b|, at 0.03 six hundredths for a right
+        angle. 0 takes all rotations as equally likely.
     vertical : tuple of 3 floats, optional
         The direction of gravity, either way, for movements in space that are turned about it more often than tilted.
     tilt : float, default 0.5
@@ -52,7 +52,7 @@ class RotationPrior:
         A negative number, or a vertical that is not a direction in space.
     """
 
-    concentration: float = 0.05
+    concentration: float = 0.03
     vertical: tuple[float, float, float] | None = None
     tilt: float = 0.5
 

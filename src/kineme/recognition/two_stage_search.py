@@ -38,9 +38,9 @@ class TwoStageSearch:
     Without representations that are compared pair by pair, the best-ranked class is that of an exhaustive search as
     long as no more than 4096 movements are in doubt, their bound above the similarity to the nearest one known. With
     them, as by default, it is the best among the most promising movements of all and of each class and some 256 more,
-    in the order of the bounds of the other representations. P-values are given for the 64 classes whose could be largest;
-    they are exact as long as no more than 256 others could be the nearest of their class, else not too small for
-    the nearest classes, and possibly too small for those far away.
+    in the order of the bounds of the other representations. P-values are given for the 64 classes whose could be
+    largest; they are exact as long as no more than 256 others could be the nearest of their class, else not too small
+    for the nearest classes, and possibly too small for those far away.
 
     On bent handwriting (bench/library.py; two busy cores), of 500 movements asked among 200,000 in the plane and of 40
     among 20,000 in space, all were ranked as by comparing all; an answer took 20 ms and 33 ms of processor time.
