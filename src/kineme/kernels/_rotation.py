@@ -124,7 +124,7 @@ def _is_diagonal(S):  # type: ignore[no-untyped-def]
     """Whether further sweeps would change no lane; false where there is NaN."""
     n_turned = 0.0
     for lane in range(_LANES):
-        left = max(abs(S[0, 1, lane]), abs(S[0, 2, lane]), abs(S[1, 2, lane]))
+        left = abs(S[0, 1, lane]) + abs(S[0, 2, lane]) + abs(S[1, 2, lane])
         n_turned += 0.0 if left <= _NOTHING else 1.0
     return n_turned == 0.0
 

@@ -29,7 +29,9 @@ def plain_block(arrays: list[Any]) -> tuple[Array, NDArray[np.intp]] | None:
     joined = _joined(arrays) if lengths.min() >= MIN_SAMPLES else None
     if joined is None:
         return None
-    n_dims = strides.pop()[0] // _FLOAT64.itemsize  # contiguous arrays of several rows with equal strides: of equal rows
+    n_dims = (
+        strides.pop()[0] // _FLOAT64.itemsize
+    )  # contiguous arrays of several rows with equal strides: of equal rows
     offsets = np.concatenate(([0], np.cumsum(lengths)))
     return (joined.reshape(-1, n_dims), offsets) if 0 < joined.size == offsets[-1] * n_dims else None
 
