@@ -157,7 +157,7 @@ def _count_short_steps(times: Array) -> int:
     found = 0
     for start in range(0, len(times), _STAMPS_AT_ONCE):
         some = times[start : start + _STAMPS_AT_ONCE + 1]
-        found += np.count_nonzero(some[1:] - some[:-1] < SHORTEST_STEP)
+        found += int(np.count_nonzero(some[1:] - some[:-1] < SHORTEST_STEP))
     return found
 
 
