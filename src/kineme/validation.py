@@ -154,11 +154,8 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
 
 def _count_short_steps(times: Array) -> int:
     """How many stamps (total,) follow the one before by less than `SHORTEST_STEP`."""
-    found = 0
-    for start in range(0, len(times), _STAMPS_AT_ONCE):
-        some = times[start : start + _STAMPS_AT_ONCE + 1]
-        found += int(np.count_nonzero(some[1:] - some[:-1] < SHORTEST_STEP))
-    return found
+    blocks = (times[i : i + _STAMPS_AT_ONCE + 1] for i in range(0, len(times), _STAMPS_AT_ONCE))
+    return sum(int(np.count_nonzero(np.diff(one) < SHORTEST_STEP)) for one in blocks)
 
 
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
