@@ -53,6 +53,17 @@ def test_chapters_are_attributes_before_anybody_imports_them(chapter):
     assert done.stdout.strip() == f"kineme.{chapter}"
 
 
+def test_a_package_without_its_stubs_says_what_it_lacks(tmp_path):
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / "__init__.py").write_text(
+        "from kineme._lazy import lazy_names\n__getattr__, __dir__, __all__ = lazy_names(__name__)\n"
+    )
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import half"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1].startswith("ImportError: expected the public names of half in ")
+    assert "kineme needs its .pyi files when it runs" in done.stderr
+
+
 def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(
         AttributeError, match=r"module 'kineme' has no attribute 'DPM' \(did you mean 'DMP'\?\); it has .*DMP, "

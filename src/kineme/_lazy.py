@@ -28,9 +28,13 @@ def lazy_names(
         Its ``__name__``.
     renamed : dict, optional
         Former name -> name of today, which former one stands for with a `DeprecationWarning`.
+
+    Raises
+    ------
+    ImportError
+        There is no stub beside the module: whoever packaged the installed files left it out.
     """
-    spec = sys.modules[module].__spec__
-    names = names_in(spec.loader.get_data(spec.origin.removesuffix("c") + "i").decode())  # type: ignore[union-attr]
+    names = names_in(_stub_of(module))
     former = dict(renamed or {})
 
     def load(name: str) -> object:
@@ -51,6 +55,18 @@ def lazy_names(
         return [*names, *(name for name in vars(sys.modules[module]) if name.startswith("__"))]
 
     return load, listed, list(names)
+
+
+def _stub_of(module: str) -> str:
+    spec = sys.modules[module].__spec__
+    path = spec.origin.removesuffix("c") + "i"  # type: ignore[union-attr]
+    try:
+        return spec.loader.get_data(path).decode()  # type: ignore[union-attr]
+    except OSError as error:
+        raise ImportError(
+            f"expected the public names of {module} in {path}, found no such file; kineme needs its .pyi files when it "
+            "runs, not for types alone: install it again, or put them into the package that you made of it"
+        ) from error
 
 
 def _module_below(package: str, name: str) -> object | None:

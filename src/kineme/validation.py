@@ -9,6 +9,7 @@ import math
 import operator
 from collections.abc import Sequence
 from numbers import Real
+from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -183,6 +184,15 @@ def as_times(times: ArrayLike, n_samples: int, who: str = "trajectory") -> Array
             f"{who}: expected one time stamp for each of the {n_samples} samples, got times of shape {t.shape}"
         )
     return t
+
+
+def as_path(path: Any, expected: str, instead: str = "") -> Path:
+    """A path as `Path`; anything else is refused as not what was `expected`, with what to do `instead`."""
+    try:
+        return Path(path)
+    except TypeError:
+        hint = f"; {instead}" if instead else ""
+        raise TypeError(f"expected {expected}, got {type(path).__name__}{hint}") from None
 
 
 def check_choice(name: str, value: str, choices: Sequence[str]) -> None:

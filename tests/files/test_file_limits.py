@@ -200,7 +200,7 @@ def as_json(**entries):
 )
 def test_labels_of_json_are_texts_each_by_itself(labels, expected):
     found = read(as_json(labels=labels), "a.json")
-    assert found.labels == expected
+    assert tuple(found.labels) == expected
     repr(found.labels).encode()
 
 

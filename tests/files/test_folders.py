@@ -40,7 +40,7 @@ def test_a_label_in_the_file_wins_over_the_folder(tmp_path):
     fill(tmp_path, "wave/a.csv")
     rows = "".join(f"point,{k},{k}\n" for k in range(4)) + "".join(f",{k},{k}\n" for k in range(4))
     (tmp_path / "wave" / "b.csv").write_text(f"label,time,x\n{rows}")
-    assert read_recordings(tmp_path).labels == ("wave", "point", "wave")
+    assert tuple(read_recordings(tmp_path).labels) == ("wave", "point", "wave")
 
 
 def test_hidden_files_and_folders_are_passed_over(tmp_path):

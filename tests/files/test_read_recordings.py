@@ -76,10 +76,14 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
         t, x = make_movement(1)
         write_movement(tmp_path / name, {"times": t, "positions": x})
     read = read_recordings(tmp_path)
-    assert read.labels == (None, "wave")
+    assert tuple(read.labels) == (None, "wave")
     assert read.demonstrations.labels is None
     bare = read_recordings(tmp_path / "wave").without_labels()
-    assert bare.labels == (None,)
+    assert tuple(bare.labels) == (None,)
+    assert isinstance(read.labels, np.ndarray)  # as those of demonstrations: a label compared with it chooses movements
+    assert [one.name for one in read[read.labels == "wave"]] == ["wave/a.csv"]
+    with pytest.raises(ValueError, match="read-only"):
+        read.labels[0] = "nod"
     assert bare.demonstrations.labels is None
     assert repr(read).endswith(" samples each), 2 files, 0 problems)")
 

@@ -106,3 +106,39 @@ def test_numbers_that_are_no_movement_name_the_file(tmp_path):
 def test_writing_to_an_unknown_ending_is_refused(tmp_path):
     with pytest.raises(kineme.DataError, match=r"\.csv, \.npz, \.json, got '\.xls'"):
         write_movement(tmp_path / "a.xls", {"times": TIMES, "positions": PATH})
+
+
+@pytest.mark.parametrize(
+    ("movement", "words"),
+    [
+        ({}, r"a dict of times, positions and, if you like, velocities, accelerations, got \[\]"),
+        ({"times": TIMES, "positions": PATH, "speeds": PATH}, r"got \['times', 'positions', 'speeds'\]"),
+        (
+            {"times": TIMES, "positions": PATH[:-1]},
+            r"times of shape \(T,\) .* got times of shape \(5,\) with positions of shape",
+        ),
+        (
+            {"times": TIMES, "positions": TIMES},
+            r"others of shape \(T, d\), got times of shape \(5,\) with positions of shape \(5,\)",
+        ),
+        ({"times": TIMES, "positions": PATH, "velocities": PATH[:, :1]}, r"got velocities of shape \(5, 1\) with"),
+        ({"times": TIMES, "positions": "none"}, "positions: expected an array of numbers"),
+    ],
+)
+def test_a_dict_that_is_no_movement_is_not_written(tmp_path, movement, words):
+    with pytest.raises(kineme.TrajectoryError, match=words):
+        kineme.write_movement(tmp_path / "a.csv", movement)
+    assert not list(tmp_path.iterdir())
+
+
+def test_arguments_in_the_other_order_are_said_to_be():
+    for movement in (PATH, kineme.Trajectory(TIMES, PATH)):
+        with pytest.raises(
+            TypeError, match=r"the path of a file to write, got .*; write write_movement\(path, movement"
+        ):
+            kineme.write_movement(movement, "a.csv")
+
+
+def test_lists_are_written_as_arrays_are(tmp_path):
+    path = kineme.write_movement(tmp_path / "a.json", {"times": TIMES.tolist(), "positions": PATH.tolist()})
+    np.testing.assert_array_equal(kineme.read_recording(path).positions, PATH)

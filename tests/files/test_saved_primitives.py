@@ -125,8 +125,12 @@ def test_headers_that_do_not_fit_are_refused(tmp_path, change, words):
 
 
 def test_a_missing_file_is_file_not_found(tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(FileNotFoundError, match=r"a file of primitives at '.*nothing', found nothing there; save"):
         kineme.Primitives.load(tmp_path / "nothing")
+    with pytest.raises(kineme.DataError, match=r"expected a file of primitives at .*, found a folder there"):
+        kineme.Primitives.load(tmp_path)
+    with pytest.raises(TypeError, match="expected the path of a file of primitives, got int"):
+        kineme.Primitives.load(5)
 
 
 def test_a_missing_folder_is_named(tmp_path):

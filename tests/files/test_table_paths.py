@@ -136,7 +136,7 @@ def table_of(rows, heads="label,t,x"):
 
 
 def labels_of(data):
-    return read_recordings_from_bytes(data, "a.csv", Layout()).labels
+    return tuple(read_recordings_from_bytes(data, "a.csv", Layout()).labels)
 
 
 @pytest.mark.parametrize("bad", [False, True])

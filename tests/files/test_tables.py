@@ -11,6 +11,7 @@ import kineme
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import distinct
 
 SIX = [(k, 10.0 + k, 20.0 - k * k) for k in range(6)]
 
@@ -181,7 +182,7 @@ def test_roles_that_are_given_win():
     text = lines([("n", *row) for row in SIX], "note,clock,x,y")
     found = read(text, time="clock", columns=("y", "x"), label="note")
     np.testing.assert_array_equal(found.demonstrations.positions, np.array(SIX)[:, [2, 1]])
-    assert found.labels == ("n",)
+    assert tuple(found.labels) == ("n",)
     by_number = read(text, time=1, columns=(3, "2"), label=0)
     np.testing.assert_array_equal(by_number.demonstrations.positions, found.demonstrations.positions)
     assert read(text, time="clock").detected[0][0].ignored == ("note",)
@@ -221,7 +222,7 @@ def test_labels_alone_begin_a_movement_where_they_change_or_time_begins_anew():
     rows = [(label, *row) for label in ("wave", "wave", "rest", "wave") for row in SIX]
     rows += [("nod", 100 + row[0], *row[1:]) for row in SIX]
     found = read(lines(rows, "label,time,x,y"))
-    assert found.labels == ("wave", "wave", "rest", "wave", "nod")
+    assert tuple(found.labels) == ("wave", "wave", "rest", "wave", "nod")
     assert [one.place for one in found.sources] == ["0", "1", "2", "3", "4"]
     assert found.demonstrations.lengths.tolist() == [6] * 5
 
@@ -231,7 +232,7 @@ def test_names_are_text_whatever_they_look_like():
     text = "\n".join(["id\tlabel\ttime\tx\ty", *("\t".join(map(str, row)) for row in rows)])
     found = read(text)
     assert [one.place for one in found.sources] == ["001", "1", "a, b; c"]
-    assert found.labels == ("1e3", "nan", None)
+    assert tuple(found.labels) == ("1e3", "nan", None)
 
 
 FAULTS = [
@@ -361,3 +362,28 @@ def test_a_line_that_numbers_the_columns_is_no_sample():
     np.testing.assert_array_equal(read(lines(rows, "0,1,2")).demonstrations.times, np.arange(5) / 10)
     whole = [(k, k + 1, k + 2) for k in range(5)]
     assert read("\n".join(",".join(map(str, row)) for row in whole)).demonstrations.lengths.tolist() == [5]
+
+
+def test_columns_of_one_name_are_numbered_as_pandas_does_and_not_chosen_by_it():
+    rows = "\n".join(f"{k},{k * k},{k + 1},{k - 1}" for k in range(5))
+    data = f"t,x,y,x\n{rows}\n".encode()
+    read = read_recordings_from_bytes(data, "a.csv", Layout())
+    assert read.demonstrations.dimensions == ("x", "y", "x.1")
+    np.testing.assert_array_equal(read.demonstrations.positions[:, 2], np.arange(5) - 1)
+    with pytest.raises(kineme.DataError, match=r"expected one column 'x', got the columns \[1, 3\] of that name; say"):
+        read_recordings_from_bytes(data, "a.csv", Layout(columns=["x"]))
+    chosen = read_recordings_from_bytes(data, "a.csv", Layout(columns=[3, 2]))
+    assert chosen.demonstrations.dimensions == ("x", "y")
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["x", "x", "x"], ("x", "x.1", "x.2")),
+        (["x", "x.1", "x"], ("x", "x.1", "x.2")),
+        (["x", "x", "x.1", "x.1"], ("x", "x.2", "x.1", "x.1.1")),
+        ([], ()),
+    ],
+)
+def test_numbered_names_are_all_different(names, expected):
+    assert distinct(names) == expected

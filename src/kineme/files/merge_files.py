@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.problem import Problem
@@ -72,10 +74,13 @@ class Recordings(MovementSequence):
     def __len__(self) -> int:
         return len(self.sources)
 
-    @property
-    def labels(self) -> tuple[str | None, ...]:
-        """The label of each movement, also where others have none."""
-        return tuple(source.label for source in self.sources)
+    @cached_property
+    def labels(self) -> NDArray[Any]:
+        """The label of each movement or None, shape (n,), objects, also where some have none; read-only."""
+        labels = np.empty(len(self.sources), dtype=object)
+        labels[:] = [source.label for source in self.sources]
+        labels.setflags(write=False)
+        return labels
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kineme.errors import DataError
+from kineme.errors import DataError, TrajectoryError
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
-from kineme.validation import Array
+from kineme.validation import Array, as_numbers, as_path
 
 _DERIVATIVES = ("velocities", "accelerations")
+_NAMES = ("times", "positions", *_DERIVATIVES)
 
 Columns = dict[str, Array]  # times (T,), positions, velocities and accelerations (T, d)
 
@@ -56,10 +58,32 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
     DataError
         An ending that no writer has, or a file that cannot be written.
     TrajectoryError
-        Several movements, or what is none.
+        Several movements, or what is none; a dict without times or positions, or with arrays that do not fit them.
+    TypeError
+        A path that is none, as where the arguments are in the other order.
     """
-    path, columns = Path(path), movement if isinstance(movement, dict) else _columns_of(movement)
+    path = as_path(path, "the path of a file to write", "write write_movement(path, movement)")
+    columns = _checked(movement) if isinstance(movement, dict) else _columns_of(movement)
     return write_atomically(path, encode_movement(columns, path.suffix.lower()))
+
+
+def _checked(columns: Mapping[str, ArrayLike]) -> Columns:
+    """A dict of columns as arrays, refused unless all belong to one movement."""
+    if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
+        raise TrajectoryError(
+            f"expected a dict of {', '.join(_NAMES[:2])} and, if you like, {', '.join(_DERIVATIVES)}, got "
+            f"{list(columns)}"
+        )
+    arrays = {name: as_numbers(values, name) for name, values in columns.items()}
+    shape = arrays["positions"].shape
+    for name, array in arrays.items():
+        expected = shape[:1] if name == "times" else shape
+        if len(shape) != 2 or array.shape != expected:
+            raise TrajectoryError(
+                f"expected times of shape (T,) and the others of shape (T, d), got {name} of shape {array.shape} with "
+                f"positions of shape {shape}"
+            )
+    return arrays
 
 
 def _columns_of(movement: MovementsLike) -> Columns:

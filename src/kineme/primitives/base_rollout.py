@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.batch import Batch
 from kineme.validation import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -103,29 +105,48 @@ class BaseRollout(ABC):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Self: ...
     def __getitem__(self, index: Any) -> Trajectory | Self:
         """One `Trajectory` for an integer; a rollout for a slice, a mask or a list of indices."""
-        if isinstance(index, np.integer):
-            index = int(index)
-        if isinstance(index, (int, np.bool_)):
-            return self.demonstrations[index]  # type: ignore[index] # a truth value is refused there
-        return self._take(np.arange(len(self))[index])
+        chosen = as_indices(index, len(self))
+        return self.demonstrations[int(chosen)] if chosen.ndim == 0 else self._take(chosen)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.positions, dtype=dtype, copy=copy)
 
-    def plot(self) -> Figure:
+    @overload
+    def plot(self, ax: None = None) -> Figure: ...
+    @overload
+    def plot(self, ax: Axes) -> Axes: ...
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
         """A picture: each dimension over time, and the path where it has two or three dimensions.
 
-        Of more than 50 movements, some are drawn; the title says how many.
+        A circle is where a path starts, a star where it ends. Of more than 50 movements, some are drawn; the title says
+        how many.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw into these axes: the path of movements of two dimensions, of three if they are axes of projection
+            "3d", or the only dimension over time.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Shown at once in a notebook; ``figure.savefig("movements.png")`` writes it to a file. It does not belong to
-            `matplotlib.pyplot`, whose ``show`` and ``savefig`` know nothing of it.
-        """
-        from kineme.primitives.rollout_figure import draw_rollout
+        matplotlib.figure.Figure or matplotlib.axes.Axes
+            `ax` if it was given; else a new figure, ``figure.savefig("movements.png")`` writes it to a file. If
+            `matplotlib.pyplot` has been imported, the figure belongs to it: ``plt.show()`` and notebooks show it, and
+            ``plt.close(figure)`` frees it.
 
-        return draw_rollout(self.times, self.positions, self.axis_names, self.labels)
+        Raises
+        ------
+        SpecificationError
+            Something else than axes, axes in the plane for movements in space or the reverse, or axes for movements
+            of more than three dimensions.
+        """
+        from kineme.primitives.rollout_figure import draw_rollout, draw_rollout_into
+
+        what = (self.times, self.positions, self.axis_names, self.labels)
+        if ax is None:
+            return draw_rollout(*what)
+        draw_rollout_into(ax, *what)
+        return ax
 
     def to_dataframe(self) -> Any:
         """All samples in one long table.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.labels import label_array
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Batch:
 
     def __getitem__(self, index: Any) -> Self:
         """The chosen primitives as a batch; an integer gives a batch of one."""
-        chosen = np.atleast_1d(np.arange(len(self))[index])
+        chosen = np.atleast_1d(as_indices(index, len(self)))
         return self._with(
             {name: self._row(name)[chosen] for name in self.ROWS},
             None if self.labels is None else self.labels[chosen],
@@ -132,7 +133,9 @@ class Batch:
         Raises
         ------
         DataError
-            The file is foreign, truncated, damaged, of another kind or of a later version.
+            The file is foreign, truncated, damaged, of another kind or of a later version; or it is a folder.
+        FileNotFoundError
+            There is no such file.
         """
         from kineme.primitives.persistence import load_as
 

@@ -15,6 +15,7 @@ from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import label_array
+from kineme.validation import as_path
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
@@ -36,7 +37,12 @@ def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays
     """Read a file with content of the given name and build it; a header or arrays that do not fit are a `DataError`."""
     from kineme.files.container import read_container
 
-    header, arrays = read_container(Path(path), kind)
+    path = as_path(path, f"the path of a file of {kind}")
+    if path.is_dir() or not path.exists():
+        there = "a folder" if path.is_dir() else "nothing"
+        missing = DataError if path.is_dir() else FileNotFoundError
+        raise missing(f"expected a file of {kind} at {str(path)!r}, found {there} there; save(path) writes one")
+    header, arrays = read_container(path, kind)
     try:
         return build(header, arrays)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:

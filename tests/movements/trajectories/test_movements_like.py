@@ -54,6 +54,50 @@ def test_a_list_may_hold_arrays_beside_trajectories():
         Demonstrations.of([Trajectory(T, X), X[:2].repeat(40, 1)])
 
 
+class Endless:
+    """A stand-in, as mocks are, that has every attribute."""
+
+    def __getattr__(self, name):
+        return Endless()
+
+
+def test_a_stand_in_that_has_every_attribute_holds_no_movements():
+    circle = SimpleNamespace()
+    circle.demonstrations = SimpleNamespace(demonstrations=circle)
+    for odd in (Endless(), circle):
+        with pytest.raises(kineme.TrajectoryError, match=rf"expected movements, got {type(odd).__name__}, whose demo"):
+            kineme.DMP().learn(odd)
+
+
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [
+        (3, "an index below 3, got 3; there are 3 movements"),
+        (-4, "an index below 3, got -4"),
+        ([0, 3], "indices below 3, got 3; there are 3 movements"),
+        ([-4], "indices below 3, got -4"),
+        ([True, False], "a mask with an entry for each of the 3 movements, got 2"),
+        ("a", "a mask with an entry per movement, got 'a'"),
+        (1.5, "a mask with an entry per movement, got 1.5"),
+        (None, "a mask with an entry per movement, got None"),
+        ((0, 1), r"a mask with an entry per movement, got \(0, 1\)"),
+        ([[0, 1]], r"a mask with an entry per movement, got \[\[0, 1\]\]"),
+        ([0.0], r"a mask with an entry per movement, got \[0.0\]"),
+        (True, "a mask with an entry per movement, got True"),
+    ],
+)
+def test_an_index_that_chooses_nothing_is_refused_alike_everywhere(index, words):
+    demos = Demonstrations.of([X, X, X])
+    primitives = kineme.DMP(n_basis=10).learn(demos)
+    for several in (demos, primitives, primitives.rollout(), kineme.orientation.PoseDMP().learn(_poses())):
+        with pytest.raises(IndexError, match=f"^expected .*{words}"):
+            several[index]
+
+
+def _poses():
+    return np.stack([np.column_stack([np.cos(T), np.sin(T), 0 * T, 0 * T])] * 3)
+
+
 @pytest.mark.parametrize("index", [("a", "b") == "a", np.bool_(True)])
 def test_a_truth_value_is_no_index(index):
     demos = Demonstrations.of([X, X])

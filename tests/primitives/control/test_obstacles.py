@@ -75,6 +75,17 @@ def test_where_there_is_no_side_one_is_chosen(d):
     assert not term(GENTLE, x, v, ahead, v[None]).any()  # it goes along with the obstacle
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_rounding_leaves_of_a_distance_has_no_direction(d):
+    x, v = np.full(d, 0.1), np.eye(d)[0]
+    state, still = np.array([x, v]), np.zeros((1, d))
+    at = steering(GENTLE, state, x[None], still)
+    for noise in np.random.default_rng(0).normal(scale=1e-16, size=(20, d)):
+        np.testing.assert_allclose(steering(GENTLE, state, x + noise[None], still, 1e-15), at, rtol=1e-9, atol=1e-15)
+        behind = (x - v + noise[1] * np.eye(d)[1])[None]
+        assert np.abs(steering(ObstacleAvoidance(beta=0.0), state, behind, still, 1e-15)).max() < 1e-10
+
+
 def rotation(d, seed):
     q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(d, d)))
     return q if np.linalg.det(q) > 0 else q[:, ::-1]

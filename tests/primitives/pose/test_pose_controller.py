@@ -102,7 +102,8 @@ def test_nothing_raises_in_mid_motion(name, value):
 def test_one_primitive_at_a_time():
     both = PoseDMP().learn([tumble(0), tumble(1)])
     with pytest.raises(
-        kineme.SpecificationError, match=r"to control, got 2; choose one: primitives\[0\].controller\(dt\)"
+        kineme.SpecificationError,
+        match=r"expected one primitive to control, got 2; choose one: primitives\[0\].controller\(dt\)",
     ):
         both.controller(0.02)
     with pytest.raises(kineme.SpecificationError, match="got 3"):

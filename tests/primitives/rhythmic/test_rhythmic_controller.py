@@ -221,3 +221,17 @@ def test_goal_is_another_name_of_the_baseline(learned):
     np.testing.assert_array_equal(goal.position, learned[0].controller(0.01, baseline=[3.0, -8.0]).step().position)
     with pytest.raises(SpecificationError, match="got both"):
         learned[0].controller(0.01, goal=[3.0, -8.0], baseline=[3.0, -8.0])
+
+
+@pytest.mark.parametrize("n_steps", [0, 7])
+def test_an_obstacle_at_its_own_position_turns_it_little_and_the_same_way_wherever_it_is(learned, twin, agree, n_steps):
+    """Not by the rounding that is left of the difference of two equal positions."""
+    turned = []
+    for baseline in ([0.0, 0.0], [0.1, -0.3], [1000.3, 7.7], [-3e5, 1e5 / 3]):
+        controller, free = (learned[0].controller(1e-3, phase=0.3, baseline=baseline) for _ in range(2))
+        for one in (controller, free):
+            _run(one, n_steps)
+        with_it, without = controller.step(obstacles=[controller.state.position]), free.step()
+        turned.append(with_it.velocity - without.velocity)
+    for one in turned[1:]:
+        agree(one, turned[0], 1e-3)

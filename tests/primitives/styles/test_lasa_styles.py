@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from kineme import DMP, TrajectoryError, load_lasa
 from kineme.output.figures import render
-from kineme.primitives.styles.figure import draw_morph, two_kinds
+from kineme.primitives.styles.figure import above_widest_gap, draw_morph
 from kineme.styles import average, learn_styles
 
-MIXED = {"Multi_Models_2": 4, "Multi_Models_3": 4, "Multi_Models_4": 4}  # name -> movements of its first kind
+MIXED = {"Multi_Models_2": 4, "Multi_Models_3": 4, "Multi_Models_4": 4}  # name -> movements of its first style
 
 
 def reconstruction_error(learned, n_styles):
@@ -31,12 +31,12 @@ def test_few_styles_reconstruct_many_movements(shape):
 
 
 @pytest.mark.parametrize("shape", MIXED)
-def test_the_first_style_tells_the_two_kinds_apart(shape):
+def test_the_first_style_tells_the_two_styles_apart(shape):
     model = learn_styles(DMP().learn(load_lasa([shape])), 1)
-    kind = two_kinds(model.styles[:, 0])
+    second = above_widest_gap(model.styles[:, 0])
     assert model.explained_variance[0] > 0.95
-    assert len(set(kind[: MIXED[shape]])) == len(set(kind[MIXED[shape] :])) == 1
-    assert kind[0] != kind[-1]
+    assert len(set(second[: MIXED[shape]])) == len(set(second[MIXED[shape] :])) == 1
+    assert second[0] != second[-1]
 
 
 def test_a_held_out_letter_lies_in_the_band_of_the_others():
@@ -57,6 +57,9 @@ def test_the_picture_is_drawn_the_same_each_time():
     assert isinstance(figure, Figure)
     assert [axes.get_title()[:3] for axes in figure.axes] == ["(a)", "(b)", "(c)"]
     assert len(figure.axes[1].lines) == 5 * 3
+    assert [text.get_text() for text in figure.legends[0].get_texts()][2:] == [
+        "demonstrated, first style", "demonstrated, second style",
+    ]  # fmt: skip
     assert render(figure, 40)["png"] == render(draw_morph(learned, steps=5), 40)["png"]
 
 

@@ -119,9 +119,9 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
     said = {} if description is None else {"description": description}
     changes.assign(store, members, name, "anchored")
     if new and proposal.medoid in members:
-        changes.describe(store, name, **said, prototype=proposal.medoid)
+        changes.annotate(store, name, **said, prototype=proposal.medoid)
     elif said:
-        changes.describe(store, name, **said)
+        changes.annotate(store, name, **said)
 
 
 def reject(store: Store, proposal: Proposal) -> None:

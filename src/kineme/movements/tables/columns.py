@@ -94,8 +94,12 @@ def _places(heads: Iterable[str]) -> dict[str, list[int]]:
 
 def _place(heads: Sequence[str], column: Column, exact: dict[str, list[int]], plain: dict[str, list[int]]) -> int:
     if isinstance(column, str):
-        if column in exact:
-            return exact[column][0]
+        if len(same := exact.get(column, [])) > 1:
+            raise DataError(
+                f"expected one column {column!r}, got the columns {same} of that name; say which by its number"
+            )
+        if same:
+            return same[0]
         if len(alike := plain.get(_plain(column), [])) == 1:
             return alike[0]
     if isinstance(column, int) or column.isdecimal():

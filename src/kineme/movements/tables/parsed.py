@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class Detected(NamedTuple):
     layout : str
         ``"wide"``, one movement; ``"long"``, told apart by columns; or the layout of arrays.
     columns : tuple of str
-        The coordinates.
+        The coordinates; of several columns of one name the later ones are numbered, x, x.1, x.2.
     time : str or None
         The column of the time stamps.
     units : str or float
@@ -91,6 +91,20 @@ class Parsed(NamedTuple):
 
     detected: Detected
     block: Block
+
+
+def distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """Names with a number after those that came before, as pandas numbers them: x, y, x becomes x, y, x.1."""
+    taken, numbers, result = set(names), dict.fromkeys(names, 0), []
+    for name in names:
+        new = name
+        while numbers[name] and new in taken:
+            new = f"{name}.{numbers[name]}"
+            numbers[name] += new in taken
+        numbers[name] = max(numbers[name], 1)
+        taken.add(new)
+        result.append(new)
+    return tuple(result)
 
 
 def listed(names: Iterable[str]) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected, Parsed
+from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct
 from kineme.movements.tables.time_stamps import in_seconds, unit_by_size, unit_in_head
 from kineme.validation import Array
 
@@ -64,7 +64,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     detected = Detected(
         kind,
         "long" if roles.movement or roles.label is not None else "wide",
-        tuple(heads[k] for k in roles.positions),
+        distinct([heads[k] for k in roles.positions]),
         None if roles.time is None else heads[roles.time],
         units,
         units_from,

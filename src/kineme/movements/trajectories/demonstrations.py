@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.data_frames import collect_data_frames, frames_of, is_data_frame
+from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from kineme.movements.tables.layout import Column
 
 _SHOWN = 8  # names of dimensions
+_NESTED = 8  # records around movements; more are a mistake, such as a stand-in that has every attribute
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
 
@@ -150,8 +152,7 @@ class Demonstrations(Sequence[Trajectory]):
         """
         if isinstance(movements, Demonstrations):
             return movements
-        held: Any = getattr(movements, "demonstrations", None)
-        if held is not None and held is not movements:
+        if (held := _held_by(movements)) is not movements:
             return cls.of(held)
         if (frames := frames_of(movements)) is not None:
             return cls.from_dataframe(frames)
@@ -159,8 +160,8 @@ class Demonstrations(Sequence[Trajectory]):
         if isinstance(several, Sequence) and not set(map(type, several)) <= _ARRAYS:
             if any(map(is_data_frame, several)):
                 return cls.from_dataframe(several)
-            if (held := _held_by_each(several)) is not None:
-                return cls(held)
+            if (each := _held_by_each(several)) is not None:
+                return cls(each)
         return cls.from_arrays(several, copy=False)
 
     @classmethod
@@ -225,16 +226,12 @@ class Demonstrations(Sequence[Trajectory]):
     def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Demonstrations: ...
     def __getitem__(self, index: Any) -> Trajectory | Demonstrations:
         """One `Trajectory` for an integer; `Demonstrations` for a slice, a mask or a list of indices."""
-        if isinstance(index, (bool, np.bool_)):  # as ("a", "b") == "a" is
-            raise IndexError(
-                f"expected an index, a slice, a list of indices or a mask with an entry per movement, got {index}; "
-                "compare an array, numpy.array(labels) == label"
-            )
-        if isinstance(index, (int, np.integer)):
-            if not -len(self) <= index < len(self):
-                raise IndexError(f"expected an index below {len(self)}, got {index}")
-            return self._trajectory(int(index) % len(self))
-        return self.of_movements(self.movements.take(np.arange(len(self))[index]), self.steps)
+        chosen = as_indices(index, len(self))
+        return (
+            self._trajectory(int(chosen))
+            if chosen.ndim == 0
+            else self.of_movements(self.movements.take(chosen), self.steps)
+        )
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self._trajectory(i) for i in range(len(self)))
@@ -260,6 +257,20 @@ class Demonstrations(Sequence[Trajectory]):
 def _listed(names: tuple[str, ...] | None) -> str:
     """Names in brackets, of many the first ones."""
     return f" ({', '.join(names[:_SHOWN])}{', ...' if len(names) > _SHOWN else ''})" if names else ""
+
+
+def _held_by(movements: Any) -> Any:
+    """What holds movements, without the records around it; anything else as it is."""
+    inner = movements
+    for _ in range(_NESTED):
+        held = getattr(inner, "demonstrations", None)
+        if held is None or held is inner:
+            return inner
+        inner = held
+    raise TrajectoryError(
+        f"expected movements, got {type(movements).__name__}, whose demonstrations have demonstrations without end; "
+        "pass Demonstrations, a list of Trajectory, or arrays"
+    )
 
 
 def _held_by_each(several: Sequence[Any]) -> list[Any] | None:

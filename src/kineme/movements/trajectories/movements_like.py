@@ -24,5 +24,6 @@ class HasDemonstrations(Protocol):
 MovementLike = Trajectory | ArrayLike
 
 #: Whatever `Demonstrations.of` takes: Demonstrations, recordings that were read, a segmentation, a rollout; one
-#: movement; one array of shape (n, T, d); a data frame; or a list of any of these.
-MovementsLike = HasDemonstrations | MovementLike | Sequence[Trajectory | HasDemonstrations | ArrayLike]
+#: movement; one array of shape (n, T, d); a data frame; or a list of any of these. A list is typed as one of objects:
+#: to a type checker that is what a list of a rollout and recordings holds.
+MovementsLike = HasDemonstrations | MovementLike | Sequence[object]

@@ -17,7 +17,7 @@ _transition = jit(transition)
 def advance(spring, table, avoidance, state, u, du, influences, motion):  # type: ignore[no-untyped-def]
     """Write position, dx/du and x'' at u + du into `motion` (3, d); see `advance.advance`.
 
-    `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading).
+    `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading, rounding).
     """
     K, D, _ = spring
     goal, ratio, push, obstacles, velocities = influences
@@ -100,7 +100,7 @@ def _look_up(table, u, shape):  # type: ignore[no-untyped-def]
 @jit
 def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: ignore[no-untyped-def]
     """Add the terms of all obstacles to `push`; twin of `obstacles.steering`, with the obstacles `passed` later."""
-    gamma, beta, fading = avoidance
+    gamma, beta, fading, rounding = avoidance
     d = obstacles.shape[1]  # the leading dimensions
     r, heading = np.empty(d), np.empty(d)
     for i in range(len(obstacles)):
@@ -123,12 +123,12 @@ def _steer(avoidance, state, obstacles, velocities, passed, push):  # type: igno
             offset += r[k] ** 2
         offset = math.sqrt(offset)
         phi = math.atan2(offset, along)
-        if phi < AHEAD or distance == 0:
+        if phi < AHEAD or distance <= rounding:
             phi, offset = AHEAD, 1.0
             _write_side(heading, r)
         strength = gamma * speed * phi * math.exp(-beta * phi - fading * distance)
         for k in range(d):
-            push[k] -= strength * r[k] / (offset if offset > 0 else 1.0)
+            push[k] -= strength * r[k] / (offset if offset > rounding else 1.0)
 
 
 @jit

@@ -35,20 +35,21 @@ def advance(
         push = influences.push
         if not len(influences.obstacles):
             return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)
-        turn = _turn(avoidance, state, 0.0, influences)
+        turn = _turn(plan, avoidance, state, 0.0, influences)
         middle = _carry(plan, state, u, 0.5 * du, influences, push + turn)
-        turn = _turn(avoidance, middle, 0.5 * du, influences)
+        turn = _turn(plan, avoidance, middle, 0.5 * du, influences)
         end = _carry(plan, state, u, du, influences, push + turn)
-        return _with_acceleration(plan, end, u + du, influences, push + _turn(avoidance, end, du, influences))
+        turn = _turn(plan, avoidance, end, du, influences)
+        return _with_acceleration(plan, end, u + du, influences, push + turn)
 
 
-def _turn(avoidance: ObstacleAvoidance, state: Array, passed: float, influences: Influences) -> Array:
+def _turn(plan: Plan, avoidance: ObstacleAvoidance, state: Array, passed: float, influences: Influences) -> Array:
     """The terms of the obstacles (d,) when `passed` of the step is over."""
     velocities = influences.obstacle_velocities
     n_positions = velocities.shape[1]
     turn = np.zeros(state.shape[1])
     obstacles = influences.obstacles + passed * velocities
-    turn[:n_positions] = steering(avoidance, state[:, :n_positions], obstacles, velocities)
+    turn[:n_positions] = steering(avoidance, state[:, :n_positions], obstacles, velocities, plan.rounding)
     return turn
 
 

@@ -65,7 +65,9 @@ class ObstacleAvoidance:
         return 0.0 if self.reach is None else 1.0 / float(self.reach)
 
 
-def steering(avoidance: ObstacleAvoidance, state: Array, obstacles: Array, velocities: Array) -> Array:
+def steering(
+    avoidance: ObstacleAvoidance, state: Array, obstacles: Array, velocities: Array, rounding: float = 0.0
+) -> Array:
     """The sum of all obstacles' terms (d,).
 
     Parameters
@@ -74,6 +76,8 @@ def steering(avoidance: ObstacleAvoidance, state: Array, obstacles: Array, veloc
         Position and dx/du.
     obstacles, velocities : ndarray of shape (m, d)
         Positions and their derivatives with respect to u.
+    rounding : float, default 0.0
+        An obstacle within this distance is at the position; one so little beside the line behind it has no effect.
     """
     r, v = obstacles - state[0], state[1] - velocities  # (m, d)
     speed, distance = np.linalg.norm(v, axis=1), np.linalg.norm(r, axis=1)
@@ -83,9 +87,9 @@ def steering(avoidance: ObstacleAvoidance, state: Array, obstacles: Array, veloc
     across = r - along[:, None] * heading
     offset = np.linalg.norm(across, axis=1)
     phi = np.arctan2(offset, along)
-    ahead = (phi < AHEAD) | (distance == 0)
+    ahead = (phi < AHEAD) | (distance <= rounding)
     phi = np.where(ahead, AHEAD, phi)
-    away = np.where(ahead[:, None], _side(heading), -across / np.where(offset > 0, offset, 1.0)[:, None])
+    away = np.where(ahead[:, None], _side(heading), -across / np.where(offset > rounding, offset, 1.0)[:, None])
     strength = avoidance.gamma * speed * phi * np.exp(-avoidance.beta * phi - avoidance.fading * distance)
     return np.asarray(np.where(moving, strength, 0.0) @ away)
 

@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
+
 from kineme.validation import Array
+
+_ROUNDING = 64 * np.finfo(np.float64).eps
 
 
 class Influences(NamedTuple):
@@ -78,6 +82,11 @@ class Plan:
     def n_dims(self) -> int:
         """Number of dimensions d."""
         return len(self.origin)
+
+    @cached_property
+    def rounding(self) -> float:
+        """Distance that rounding leaves between equal positions, once the origin is subtracted from them."""
+        return float(_ROUNDING * max(np.abs(one).max() for one in (self.origin, self.goal, self.state[0])))
 
     @cached_property
     def intervals(self) -> float:

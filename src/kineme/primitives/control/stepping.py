@@ -32,7 +32,7 @@ def _compiled(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:
     compiled = compiled_module("kineme.primitives.control._compiled")
     table, d = tuple(shape_table(plan)), plan.n_dims
     spring = (plan.K, plan.D, plan.intervals)
-    steering = (float(avoidance.gamma), float(avoidance.beta), avoidance.fading)
+    steering = (float(avoidance.gamma), float(avoidance.beta), avoidance.fading, plan.rounding)
 
     def advance(state: Array, u: float, du: float, influences: Influences) -> Array:
         motion = np.empty((3, d))

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import TrajectoryError
 from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
-from kineme.primitives.control.options import Options
+from kineme.primitives.control.options import Options, check_one
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
@@ -192,11 +192,7 @@ class PosePrimitives(Batch):
             More than one primitive; an option out of its range; a start or goal that is no pose.
         """
         starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
-        if len(starts) != 1:
-            raise SpecificationError(
-                f"expected one primitive, start and goal to control, got {len(starts)}; choose one: "
-                "primitives[0].controller(dt)"
-            )
+        check_one(len(starts))
         v = None if velocities is None else velocities[0]
         plan = replace(plan_of(self.tangent, starts[0], goals[0], duration, v), n_positions=self.n_columns - 4)
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)

@@ -20,7 +20,7 @@ from kineme.validation import Array, check_count
 def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figure:
     """Demonstrations of two styles under one name, the morph between the styles' centers, and the style plane.
 
-    The two kinds are told apart at the widest gap of the first style parameter.
+    The two styles are told apart at the widest gap of the first style parameter.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figu
             f"got {len(primitives)} of {primitives.n_dims} dimensions"
         )
     model = learn_styles(primitives, 2)
-    second = two_kinds(model.styles[:, 0])
+    second = above_widest_gap(model.styles[:, 0])
     route = np.linspace(model.styles[~second].mean(axis=0), model.styles[second].mean(axis=0), steps)
     shown = (primitives.rollout().positions, model.primitive(route).rollout().positions)
     colors = _between(np.linspace(0, 1, steps))
     figure = new_figure(6.9, 2.7)
     left, middle, right = figure.subplots(1, 3)
-    _paths(left, shown[0], [BLUE if not kind else ORANGE for kind in second])
+    _paths(left, shown[0], [ORANGE if is_second else BLUE for is_second in second])
     _paths(middle, shown[1], colors)
     corners = np.concatenate([x.reshape(-1, 2) for x in shown])
     for axes, title in ((left, "(a) demonstrated"), (middle, "(b) from one style to the other")):
@@ -61,7 +61,7 @@ def draw_morph(primitives: Primitives, steps: int = 9, unit: str = "mm") -> Figu
     return figure
 
 
-def two_kinds(values: Array) -> NDArray[np.bool_]:
+def above_widest_gap(values: Array) -> NDArray[np.bool_]:
     """Whether each number (n,) lies above the widest gap between neighbors."""
     ordered = np.sort(values)
     k = int(np.argmax(np.diff(ordered)))
@@ -69,7 +69,7 @@ def two_kinds(values: Array) -> NDArray[np.bool_]:
 
 
 def _between(shares: Array) -> list[Any]:
-    """Colors from one kind's to the other's."""
+    """Colors from one style's to the other's."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return list(LinearSegmentedColormap.from_list("styles", (BLUE, "#B8B8B8", ORANGE))(shares))
@@ -86,8 +86,8 @@ def _plane(axes: Any, model: StyleModel, second: NDArray[np.bool_], route: Array
     """Styles of the demonstrations and the way that the morph takes between them."""
     axes.plot(*route.T, color=GRAY, linewidth=0.8, zorder=1)
     axes.scatter(*route.T, c=colors, s=14, zorder=2)
-    for kind, color, marker in ((False, BLUE, "o"), (True, ORANGE, "s")):
-        styles = model.styles[second == kind]
+    for is_second, color, marker in ((False, BLUE, "o"), (True, ORANGE, "s")):
+        styles = model.styles[second == is_second]
         axes.scatter(*styles.T, facecolors="none", edgecolors=color, marker=marker, s=36, linewidths=1.2, zorder=3)
     share = 100 * model.explained_variance
     axes.set(title="(c) style space", xlabel=f"style 1 ({share[0]:.1f} %)", ylabel=f"style 2 ({share[1]:.1f} %)")
@@ -104,6 +104,6 @@ def _key() -> list[Any]:
     return [
         marker("o", "start, or generated style", 4, color=GRAY),
         marker("*", "goal", 7, color="black"),
-        marker("o", "demonstrated, first kind", 6, color=BLUE, markerfacecolor="none"),
-        marker("s", "demonstrated, second kind", 6, color=ORANGE, markerfacecolor="none"),
+        marker("o", "demonstrated, first style", 6, color=BLUE, markerfacecolor="none"),
+        marker("s", "demonstrated, second style", 6, color=ORANGE, markerfacecolor="none"),
     ]
