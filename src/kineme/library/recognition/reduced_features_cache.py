@@ -157,9 +157,9 @@ def _write(store: Store, path: Path, ids: Ids) -> None:
 def _validity_key(store: Store, version: int) -> dict[str, Any]:
     """Cache validity key: the library, its specification, and its history, since a copy may have changed."""
     with store.reading() as connection:
-        found = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
+        row = connection.execute("SELECT at FROM version WHERE id = ?", (version,)).fetchone()
     described = zlib.crc32(json.dumps(store.specification.to_json()).encode())
-    at = found[0] if found else None
+    at = row[0] if row else None
     return {
         "format": _FORMAT,
         "library": store.id,
