@@ -199,19 +199,19 @@ def bit(_context, position):  # type: ignore[no-untyped-def]
 
 @intrinsic  # type: ignore[untyped-decorator]
 def plus(_context, a, b):  # type: ignore[no-untyped-def]
-    """a + b."""
+    """A + b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fadd(v[0], v[1])
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def minus(_context, a, b):  # type: ignore[no-untyped-def]
-    """a - b."""
+    """A - b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fsub(v[0], v[1])
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def times(_context, a, b):  # type: ignore[no-untyped-def]
-    """a b."""
+    """A b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fmul(v[0], v[1])
 
 

@@ -57,13 +57,14 @@ class _Work(NamedTuple):
 
 
 @_jit
-def fill_grid(dims, A, B, weights, sizes, rotations, squares):  # type: ignore[no-untyped-def]
+def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
     """``squares[:, i, j]``, the three squared distances of every movement of A with every one of B.
 
-    `A` and `B` are the arrays of shapes in their order, `weights` the roots by which rows of a block are multiplied,
+    `A` and `B` hold tangents, midpoints, turning angles, points, their tangents and turning angles, `weights` the roots by which rows of a block are multiplied,
     `sizes` the numbers of segments, of the band, and of points, and `rotations` (n, m, r) the entries of matrices,
     r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
     """
+    (A, B), (weights, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
     work = _work(dims, sizes)
     for start in range(0, m, LANES):
@@ -81,8 +82,9 @@ def fill_grid(dims, A, B, weights, sizes, rotations, squares):  # type: ignore[n
 
 
 @_jit
-def fill_listed(dims, A, B, first, second, weights, sizes, rotations, squares):  # type: ignore[no-untyped-def]
-    """``squares[:, k]`` of the pairs ``(first[k], second[k])``; rotations (n_pairs, 1, r)."""
+def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignore[no-untyped-def]
+    """``squares[:, k]`` of listed pairs, two arrays of indices; rotations (n_pairs, 1, r)."""
+    (A, B), (first, second), (weights, sizes) = sides, pairs, numbers
     n_pairs = len(first)
     work = _work(dims, sizes)
     for start in range(0, n_pairs, LANES):
@@ -268,3 +270,24 @@ def _sum_up(n_points, matched, work):  # type: ignore[no-untyped-def]
     mean = times(least(forth, back), every(np.float32(1) / np.float32(n_points)))
     store(work.squares, 2, times(mean, mean))
 
+
+@jit
+def fill_turning_bounds(A, B, slack, bounds):  # type: ignore[no-untyped-def]
+    """The larger sum of squares of what is outside the other's envelope; A and B hold values, low and high ends."""
+    a, a_low, a_high = A
+    b, b_low, b_high = B
+    zero = np.float32(0)
+    for i in range(bounds.shape[0]):
+        for j in range(bounds.shape[1]):
+            forth, back = zero, zero
+            for p in range(a.shape[1]):
+                x, y = a[i, p], b[j, p]
+                above, below = x - b_high[j, p], b_low[j, p] - x
+                excess = (above if above > below else below) - slack
+                excess = excess if excess > zero else zero
+                forth += excess * excess
+                above, below = y - a_high[i, p], a_low[i, p] - y
+                excess = (above if above > below else below) - slack
+                excess = excess if excess > zero else zero
+                back += excess * excess
+            bounds[i, j] = forth if forth > back else back
