@@ -24,7 +24,7 @@ _FLOAT, _INT = ir.VectorType(ir.FloatType(), LANES), ir.VectorType(ir.IntType(32
 
 class _Lanes(types.Type):
     def __init__(self, name: str, vector: ir.VectorType) -> None:
-        super().__init__(name=name)  # type: ignore[no-untyped-call]
+        super().__init__(name=name)
         self.vector = vector
 
 
@@ -37,7 +37,7 @@ _floats, _integers = _Lanes("16 x float32", _FLOAT), _Integers("16 x int32", _IN
 
 class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, lanes: _Lanes) -> None:
-        super().__init__(manager, lanes, lanes.vector)
+        super().__init__(manager, lanes, lanes.vector)  # type: ignore[no-untyped-call]
 
 
 register_model(_Lanes)(_Model)
