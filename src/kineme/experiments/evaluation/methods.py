@@ -8,11 +8,15 @@ from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import NDArray
 
+from kineme.anchoring import propose
+from kineme.experiments.evaluation.clouds import PlusCloud, PointCloud, QuickCloud
 from kineme.experiments.evaluation.generative import HiddenMarkov
 from kineme.experiments.evaluation.linear_classifiers import AlignmentSVM, MiniRocket
-from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures, PointCloud
+from kineme.experiments.evaluation.measures import Stretch
+from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures
 from kineme.experiments.evaluation.optional import why_missing
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
@@ -48,22 +52,14 @@ class Method:
         Options -> contender.
     needs : str
         Optional module that the method imports; "" for none.
-    only_dims : int or None
-        The only number of dimensions that it works in.
-    slow : bool
-        Runs only at the reference strength of protocols that have several strengths.
     """
 
     title: str
     make: Callable[[Options], Contender]
     needs: str = ""
-    only_dims: int | None = None
-    slow: bool = False
 
-    def unavailable(self, n_dims: int) -> str:
+    def unavailable(self) -> str:
         """Why the method cannot take part, or ""."""
-        if self.only_dims not in (None, n_dims):
-            return f"works in {self.only_dims} dimensions only"
         return why_missing(self.needs) if self.needs else ""
 
 
@@ -85,6 +81,14 @@ class DefaultRecognizer:
         """Class of each movement of which only the beginning is given."""
         return self.recognizer.predict_partial(demonstrations)
 
+    def spot(self, recording: Trajectory) -> list[Stretch]:
+        """The stretches of known classes in a recording."""
+        return [Stretch(*one[:3]) for one in self.recognizer.spot(recording) if one.label is not None]
+
+    def cluster(self, demonstrations: Demonstrations, n_clusters: int | None) -> NDArray[Any]:
+        """Cluster of each movement, -1 for none."""
+        return propose(demonstrations, n_clusters=n_clusters, like=self.recognizer).clusters
+
 
 OURS = "kineme"
 
@@ -95,10 +99,13 @@ METHODS: dict[str, Method] = {
     "paper-bio": Method("paper, bio-inspired form", lambda _: PaperFeatures("bio-inspired", "forcing")),
     "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor()),
     "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim"),
+    "dtw-path": Method("DTW 1-NN, arc length", lambda _: DTWNeighbor(along_path=True), needs="dtaidistance.dtw_ndim"),
     "gak-svm": Method("GAK-SVM", lambda options: AlignmentSVM(options.seed), needs="tslearn.metrics"),
     "minirocket": Method(
         "MiniRocket + ridge", lambda options: MiniRocket(options.seed), needs="aeon.classification.convolution_based"
     ),
-    "point-cloud": Method("$P point cloud", lambda _: PointCloud(), needs="dollarpy", only_dims=2, slow=True),
+    "point-cloud": Method("$P (our code)", lambda _: PointCloud()),
+    "plus-cloud": Method("$P+ (our code)", lambda _: PlusCloud()),
+    "quick-cloud": Method("$Q (our code)", lambda _: QuickCloud()),
     "hmm": Method("HMM", lambda options: HiddenMarkov(options.seed), needs="hmmlearn.hmm"),
 }
