@@ -69,8 +69,7 @@ class Procrustes:
         The products run in the rows' own precision, float64 or float32; the norms are float64.
         """
         in_plane = self.n_dims == 2 and self.max_angle > 0
-        squares = np.einsum("ij,ij->i", rows, rows, dtype=np.float64)
-        return Prepared(as_complex(rows) if in_plane else rows, squares)
+        return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
 
     def squared_distances(self, A: Prepared, B: Prepared) -> Array:
         """Squared distances (n, m) between prepared rows."""
@@ -102,13 +101,26 @@ class Procrustes:
         return best_rotations(C, self.max_angle)
 
 
+_ROWS_AT_ONCE = 256
 _MANY = 16  # rows from which on a product by BLAS is faster
+
+
+def _squares(rows: NDArray[Any]) -> Array:
+    """Squared norms (n,), in double precision."""
+    squares = np.empty(len(rows))
+    for start in range(0, len(rows), _ROWS_AT_ONCE):  # converted rows stay in the cache
+        some = rows[start : start + _ROWS_AT_ONCE].astype(np.float64, copy=False)
+        np.einsum("ij,ij->i", some, some, out=squares[start : start + _ROWS_AT_ONCE])
+    return squares
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     """Rows x_1 ... x_S, y_1 ... y_S as complex rows x + i y."""
     half = rows.shape[1] // 2
     pairs = np.empty((len(rows), half), np.result_type(rows, np.complex64))
+    if use_compiled(rows.size):
+        compiled_module("kineme.kernels._compiled").fill_pairs(rows, _as_real(pairs))
+        return pairs
     pairs.real, pairs.imag = rows[:, :half], rows[:, half:]
     return pairs
 

@@ -1,0 +1,186 @@
+"""Compiled distances of pairs, twins of those in ``elastic.py`` and ``point_cloud.py``: 16 pairs at once."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from kineme.kernels._blocks import new_work, pack, pack_everywhere, rotate, take_rotation
+from kineme.kernels._lanes import (
+    LANES,
+    bit,
+    every,
+    if_less,
+    largest,
+    least,
+    load,
+    load_vector,
+    minus,
+    plus,
+    plus_squares,
+    product,
+    root,
+    store,
+    times,
+    union,
+    unless,
+)
+from kineme.runtime.compiled import jit
+
+_FAR = np.float32(3e38)
+_jit = partial(jit, reorder=False)
+
+
+@_jit
+def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
+    """``squares[:, i, j]``, the three squared distances of every movement of A with every one of B.
+
+    `sides` are A and B, each with its tangents, midpoints, turning angles, points, their tangents and turning angles;
+    `numbers` the roots of weights, by which rows of a block are multiplied, and the sizes: segments, band and points;
+    `rotations` (n, m, r) the entries of matrices, r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
+    """
+    (A, B), (weights, sizes) = sides, numbers
+    n, m = squares.shape[1], squares.shape[2]
+    work = new_work(dims, sizes)
+    for start in range(0, m, LANES):
+        width = min(LANES, m - start)
+        for lane in range(LANES):
+            pack(dims, B, start + min(lane, width - 1), weights, work.b, lane)
+        for i in range(n):
+            pack_everywhere(dims, A, i, weights, work.a)
+            for lane in range(LANES):
+                take_rotation(dims, rotations, i, start + min(lane, width - 1), work.rotation, lane)
+            _compare(dims, sizes, work)
+            for k in range(3):
+                for lane in range(width):
+                    squares[k, i, start + lane] = work.squares[k, lane]
+
+
+@_jit
+def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignore[no-untyped-def]
+    """``squares[:, k]`` of listed pairs, two arrays of indices; rotations (n_pairs, 1, r)."""
+    (A, B), (first, second), (weights, sizes) = sides, pairs, numbers
+    n_pairs = len(first)
+    work = new_work(dims, sizes)
+    for start in range(0, n_pairs, LANES):
+        width = min(LANES, n_pairs - start)
+        for lane in range(LANES):
+            k = start + min(lane, width - 1)
+            pack(dims, A, first[k], weights, work.a, lane)
+            pack(dims, B, second[k], weights, work.b, lane)
+            take_rotation(dims, rotations, k, 0, work.rotation, lane)
+        _compare(dims, sizes, work)
+        for k in range(3):
+            for lane in range(width):
+                squares[k, start + lane] = work.squares[k, lane]
+
+
+@_jit
+def _compare(dims, sizes, work):  # type: ignore[no-untyped-def]
+    n_segments, band, n_points = sizes
+    rotate(dims, n_segments, n_points, work)
+    _warp(dims, n_segments, band, work)
+    _match(dims, n_segments * (2 * len(dims) + 1), n_points, work)
+
+
+@_jit
+def _warp(dims, n_segments, band, work):  # type: ignore[no-untyped-def]
+    """Dynamic time warping of both costs, row by row of their tables; column q is kept in row q + 1 of an array."""
+    a, b, elastic, turning = work.a, work.turned, work.elastic, work.turning
+    d, far = len(dims), every(_FAR)
+    for q in range(n_segments + 1):
+        store(elastic, q, far)
+        store(turning, q, far)
+    store(elastic, 0, every(np.float32(0)))
+    store(turning, 0, every(np.float32(0)))
+    for p in range(n_segments):
+        row = p * (2 * d + 1)
+        tangent, midpoint, turn = load_vector(a, row, dims), load_vector(a, row + d, dims), load(a, row + 2 * d)
+        first, end = max(0, p - band), min(n_segments, p + band + 1)
+        corner, corner_turning = load(elastic, first), load(turning, first)
+        left, left_turning = far, far
+        store(elastic, first, far)
+        store(turning, first, far)
+        for q in range(first, end):
+            other = q * (2 * d + 1)
+            difference = minus(turn, load(b, other + 2 * d))
+            cost = times(difference, difference)
+            above, above_turning = load(elastic, q + 1), load(turning, q + 1)
+            left_turning = plus(cost, least(least(above_turning, corner_turning), left_turning))
+            cost = plus_squares(plus_squares(cost, tangent, b, other), midpoint, b, other + d)
+            left = plus(cost, least(least(above, corner), left))
+            store(elastic, q + 1, left)
+            store(turning, q + 1, left_turning)
+            corner, corner_turning = above, above_turning
+    share = every(np.float32(1) / np.float32(n_segments))
+    store(work.squares, 0, times(share, load(elastic, n_segments)))
+    store(work.squares, 1, times(share, load(turning, n_segments)))
+
+
+@_jit
+def _match(dims, begin, n_points, work):  # type: ignore[no-untyped-def]
+    """Distances of the points of each movement to their nearest, and of those that nobody matched."""
+    a, b, columns, nearest = work.a, work.turned, work.columns, work.nearest
+    d, zero, far = len(dims), every(np.float32(0)), every(_FAR)
+    for q in range(n_points):
+        store(columns, q, far)
+    matched = bit(0)
+    for p in range(n_points):
+        row = begin + p * (2 * d + 2)
+        point, tangent = load_vector(a, row, dims), load_vector(a, row + d + 1, dims)
+        turn, half = load(a, row + d), load(a, row + 2 * d + 1)
+        smallest, at, own = far, bit(0), bit(p)
+        for q in range(n_points):
+            other = begin + q * (2 * d + 2)
+            difference = minus(turn, load(b, other + d))
+            both = product(tangent, b, other + d + 1)
+            cost = plus_squares(plus(half, load(b, other + 2 * d + 1)), point, b, other)
+            cost = minus(plus(cost, times(difference, difference)), times(both, both))
+            at = if_less(cost, smallest, bit(q), at)
+            smallest = least(cost, smallest)
+            column = load(columns, q)
+            store(nearest, q, if_less(cost, column, own, load(nearest, q)))
+            store(columns, q, least(cost, column))
+        matched = union(matched, at) if p > 0 else at
+        store(work.rows, p, root(largest(smallest, zero)))
+    _sum_up(n_points, matched, work)
+
+
+@_jit
+def _sum_up(n_points, matched, work):  # type: ignore[no-untyped-def]
+    """The smaller of the two directed sums: of all points of one movement, and the other's that these left out."""
+    forth, back, matched_back = every(np.float32(0)), every(np.float32(0)), load(work.nearest, 0)
+    for q in range(n_points):
+        distance = root(largest(load(work.columns, q), every(np.float32(0))))
+        back = plus(back, distance)
+        forth = plus(forth, unless(matched, bit(q), distance))
+        matched_back = union(matched_back, load(work.nearest, q))
+    for p in range(n_points):
+        distance = load(work.rows, p)
+        forth = plus(forth, distance)
+        back = plus(back, unless(matched_back, bit(p), distance))
+    mean = times(least(forth, back), every(np.float32(1) / np.float32(n_points)))
+    store(work.squares, 2, times(mean, mean))
+
+
+@jit
+def fill_turning_bounds(A, B, slack, bounds):  # type: ignore[no-untyped-def]
+    """The larger sum of squares of what is outside the other's envelope; A and B hold values, low and high ends."""
+    a, a_low, a_high = A
+    b, b_low, b_high = B
+    zero = np.float32(0)
+    for i in range(bounds.shape[0]):
+        for j in range(bounds.shape[1]):
+            forth, back = zero, zero
+            for p in range(a.shape[1]):
+                x, y = a[i, p], b[j, p]
+                above, below = x - b_high[j, p], b_low[j, p] - x
+                excess = (above if above > below else below) - slack
+                excess = excess if excess > zero else zero
+                forth += excess * excess
+                above, below = y - a_high[i, p], a_low[i, p] - y
+                excess = (above if above > below else below) - slack
+                excess = excess if excess > zero else zero
+                back += excess * excess
+            bounds[i, j] = forth if forth > back else back

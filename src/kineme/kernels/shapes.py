@@ -1,0 +1,212 @@
+"""What two movements are compared by pair by pair: segments and points of their paths along arc length.
+
+A *path* (d, S) holds positions at even steps along arc length, centered at their mean, with a root mean square distance
+of 1 from it. Its *segments* are the pieces between ``n_segments + 1`` even values along it; its *points* are
+``n_points`` even values. Values between two positions are interpolated linearly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import SpecificationError
+from kineme.validation import Array
+
+Floats = NDArray[np.float32]
+
+MOST_POINTS = 32  # of a cloud: the matched ones are bits of an integer
+
+
+@dataclass(frozen=True)
+class ElasticSpec:
+    """How segments are compared by dynamic time warping; see `kineme.kernels.elastic`.
+
+    Attributes
+    ----------
+    n_segments : int
+        Segments of a path, at least 3.
+    band : int
+        A segment is matched with segments at most so many numbers away (Sakoe & Chiba 1978).
+    position_weight, turning_weight : float
+        Weights of the squared differences of midpoints and of turning angles / pi; that of tangents is 1.
+    """
+
+    n_segments: int = 33
+    band: int = 6
+    position_weight: float = 0.5
+    turning_weight: float = 8.0
+
+    def __post_init__(self) -> None:
+        _at_least("n_segments", self.n_segments, 3)
+        _at_least("band", self.band, 0)
+        _at_least("position_weight", self.position_weight, 0)
+        _at_least("turning_weight", self.turning_weight, 0)
+
+
+@dataclass(frozen=True)
+class CloudSpec:
+    """How points are compared as a cloud; see `kineme.kernels.point_cloud`.
+
+    Attributes
+    ----------
+    n_points : int
+        Points of a path, 3 to 32.
+    turning_weight, line_weight : float
+        Weights of the squared difference of turning angles / pi and of the squared sine between the tangents' lines;
+        that of positions is 1.
+    """
+
+    n_points: int = 20
+    turning_weight: float = 16.0
+    line_weight: float = 0.75
+
+    def __post_init__(self) -> None:
+        _at_least("n_points", self.n_points, 3)
+        if self.n_points > MOST_POINTS:
+            raise SpecificationError(f"expected n_points of at most {MOST_POINTS}, got {self.n_points}; take fewer")
+        _at_least("turning_weight", self.turning_weight, 0)
+        _at_least("line_weight", self.line_weight, 0)
+
+
+def _at_least(name: str, value: float, least: int) -> None:
+    if not least <= value < np.inf:
+        raise SpecificationError(f"expected {name} of at least {least}, got {value!r}")
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """n movements in d dimensions as segments and points: C-contiguous arrays of float32, made by `shapes_of`.
+
+    Attributes
+    ----------
+    tangents, midpoints : arrays (n, n_segments, d)
+        Unit vectors along the segments, zero for a segment of length zero, and their midpoints.
+    turning : array (n, n_segments)
+        Angle between the tangents before and after a segment, divided by pi; 0 at both ends, and wherever one of the
+        three has no direction.
+    turning_low, turning_high : arrays (n, n_segments)
+        Smallest and largest turning angle of the segments within the band around each.
+    points, point_tangents : arrays (n, n_points, d)
+        Points, and unit vectors along the central differences there (one-sided at the ends), zero for a difference of
+        zero.
+    point_turning : array (n, n_points)
+        Angle between the steps to and from a point, divided by pi; 0 at both ends, and where one has length zero.
+    elastic : ElasticSpec
+    cloud : CloudSpec
+    """
+
+    tangents: Floats
+    midpoints: Floats
+    turning: Floats
+    turning_low: Floats
+    turning_high: Floats
+    points: Floats
+    point_tangents: Floats
+    point_turning: Floats
+    elastic: ElasticSpec
+    cloud: CloudSpec
+
+    def __len__(self) -> int:
+        return len(self.turning)
+
+    @property
+    def n_dims(self) -> int:
+        """Dimensions d of the movements."""
+        return int(self.tangents.shape[2])
+
+    def take(self, chosen: NDArray[np.integer] | NDArray[np.bool_] | slice) -> Shapes:
+        """The movements that an index array, a mask or a slice chooses, in its order."""
+        return Shapes(
+            **{name: np.ascontiguousarray(array[chosen]) for name, array in self.arrays().items()},
+            elastic=self.elastic,
+            cloud=self.cloud,
+        )
+
+    def empty(self, n: int) -> Shapes:
+        """Uninitialized arrays for n movements with the same dimensions and specifications, to be filled."""
+        return Shapes(
+            **{name: np.empty((n, *array.shape[1:]), np.float32) for name, array in self.arrays().items()},
+            elastic=self.elastic,
+            cloud=self.cloud,
+        )
+
+    def arrays(self) -> dict[str, Floats]:
+        """The arrays by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("elastic", "cloud")}
+
+
+def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
+    """Segments and points of paths (n, d, S).
+
+    Parameters
+    ----------
+    paths : array (n, d, S)
+        Positions at even steps along arc length, centered, with a root mean square distance of 1 from the mean; zeros
+        for a movement without extent. At least two positions.
+    elastic : ElasticSpec, optional
+    cloud : CloudSpec, optional
+    """
+    elastic, cloud = elastic or ElasticSpec(), cloud or CloudSpec()
+    ends = _even(paths, elastic.n_segments + 1)
+    tangents = _unit(np.diff(ends, axis=1))
+    turning = np.zeros(tangents.shape[:2])
+    turning[:, 1:-1] = _angles(tangents[:, :-2], tangents[:, 2:]) * (tangents[:, 1:-1] != 0).any(axis=2)
+    low, high = _envelope(turning, elastic.band)
+    points = _even(paths, cloud.n_points)
+    steps = _unit(np.diff(points, axis=1))
+    point_turning = np.zeros(points.shape[:2])
+    point_turning[:, 1:-1] = _angles(steps[:, :-1], steps[:, 1:])
+    return Shapes(
+        tangents=_single(tangents),
+        midpoints=_single(0.5 * (ends[:, 1:] + ends[:, :-1])),
+        turning=_single(turning),
+        turning_low=_single(low),
+        turning_high=_single(high),
+        points=_single(points),
+        point_tangents=_single(_unit(np.gradient(points, axis=1))),
+        point_turning=_single(point_turning),
+        elastic=elastic,
+        cloud=cloud,
+    )
+
+
+def _single(array: Array) -> Floats:
+    return np.ascontiguousarray(array, np.float32)
+
+
+def _even(paths: Array, n: int) -> Array:
+    """Positions (N, n, d) at n even values along paths (N, d, S), interpolated linearly."""
+    last = paths.shape[2] - 1
+    at = np.arange(n) * last / (n - 1)
+    before = np.minimum(at.astype(int), last - 1)
+    share = at - before
+    x = paths.transpose(0, 2, 1)
+    return np.asarray(x[:, before] * (1 - share)[:, None] + x[:, before + 1] * share[:, None])
+
+
+def _envelope(values: Array, band: int) -> tuple[Array, Array]:
+    """Smallest and largest of the values (n, k) at most `band` columns away."""
+    low, high = values.copy(), values.copy()
+    for shift in range(1, min(band, values.shape[1] - 1) + 1):
+        for smaller, larger in ((slice(None, -shift), slice(shift, None)), (slice(shift, None), slice(None, -shift))):
+            np.minimum(low[:, smaller], values[:, larger], out=low[:, smaller])
+            np.maximum(high[:, smaller], values[:, larger], out=high[:, smaller])
+    return low, high
+
+
+_NO_LENGTH = 1e-9  # of a movement of size 1: a shorter vector is the rounding error of positions
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors (..., d) divided by their lengths; zero where they have none."""
+    lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    return np.where(lengths > _NO_LENGTH, vectors / np.where(lengths > _NO_LENGTH, lengths, 1.0), 0.0)
+
+
+def _angles(a: Array, b: Array) -> Array:
+    """Angles between unit vectors (..., d), divided by pi; 0 where one of them is zero."""
+    both = (a != 0).any(axis=-1) & (b != 0).any(axis=-1)
+    return np.where(both, np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)) / np.pi, 0.0)
