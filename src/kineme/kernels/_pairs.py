@@ -1,36 +1,27 @@
-"""Compiled distances of pairs, twins of those in ``elastic.py`` and ``point_cloud.py``: 16 pairs at once.
-
-A block holds 16 movements, one in each lane. Its rows are, for each segment, tangent, midpoint and turning angle, and
-for each point, position, turning angle, tangent and half its squared length, each times the root of its weight. The
-tuple `dims` is as long as a movement has dimensions: its type tells the compiler that number.
-"""
+"""Compiled distances of pairs, twins of those in ``elastic.py`` and ``point_cloud.py``: 16 pairs at once."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
+from kineme.kernels._blocks import new_work, pack, pack_everywhere, rotate, take_rotation
 from kineme.kernels._lanes import (
     LANES,
-    aligned,
     bit,
     every,
     if_less,
     largest,
     least,
     load,
-    load_matrix,
     load_vector,
     minus,
     plus,
     plus_squares,
     product,
     root,
-    rotated,
     store,
-    store_vector,
     times,
     union,
     unless,
@@ -41,40 +32,25 @@ _FAR = np.float32(3e38)
 _jit = partial(jit, reorder=False)
 
 
-class _Work(NamedTuple):
-    """Blocks and rows of vectors that one call uses again and again."""
-
-    a: Any  # block of the one movements
-    b: Any  # and of the others
-    turned: Any  # the others, rotated
-    rotation: Any  # (d^2, 16)
-    elastic: Any  # (n_segments + 1, 16): the row of the elastic distance's table
-    turning: Any  # the same of turning alone
-    rows: Any  # (n_points, 16): distance of each point of a to its nearest
-    columns: Any  # and of b
-    nearest: Any  # (n_points, 16), integers: the bit of the point of a that is nearest to each of b
-    squares: Any  # (3, 16): the result
-
-
 @_jit
 def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
     """``squares[:, i, j]``, the three squared distances of every movement of A with every one of B.
 
-    `A` and `B` hold tangents, midpoints, turning angles, points, their tangents and turning angles, `weights` the roots by which rows of a block are multiplied,
-    `sizes` the numbers of segments, of the band, and of points, and `rotations` (n, m, r) the entries of matrices,
-    r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
+    `sides` are A and B, each with its tangents, midpoints, turning angles, points, their tangents and turning angles;
+    `numbers` the roots of weights, by which rows of a block are multiplied, and the sizes: segments, band and points;
+    `rotations` (n, m, r) the entries of matrices, r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
     """
     (A, B), (weights, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
-    work = _work(dims, sizes)
+    work = new_work(dims, sizes)
     for start in range(0, m, LANES):
         width = min(LANES, m - start)
         for lane in range(LANES):
-            _pack(dims, B, start + min(lane, width - 1), weights, work.b, lane)
+            pack(dims, B, start + min(lane, width - 1), weights, work.b, lane)
         for i in range(n):
-            _pack_everywhere(dims, A, i, weights, work.a)
+            pack_everywhere(dims, A, i, weights, work.a)
             for lane in range(LANES):
-                _take_rotation(dims, rotations, i, start + min(lane, width - 1), work.rotation, lane)
+                take_rotation(dims, rotations, i, start + min(lane, width - 1), work.rotation, lane)
             _compare(dims, sizes, work)
             for k in range(3):
                 for lane in range(width):
@@ -86,14 +62,14 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
     """``squares[:, k]`` of listed pairs, two arrays of indices; rotations (n_pairs, 1, r)."""
     (A, B), (first, second), (weights, sizes) = sides, pairs, numbers
     n_pairs = len(first)
-    work = _work(dims, sizes)
+    work = new_work(dims, sizes)
     for start in range(0, n_pairs, LANES):
         width = min(LANES, n_pairs - start)
         for lane in range(LANES):
             k = start + min(lane, width - 1)
-            _pack(dims, A, first[k], weights, work.a, lane)
-            _pack(dims, B, second[k], weights, work.b, lane)
-            _take_rotation(dims, rotations, k, 0, work.rotation, lane)
+            pack(dims, A, first[k], weights, work.a, lane)
+            pack(dims, B, second[k], weights, work.b, lane)
+            take_rotation(dims, rotations, k, 0, work.rotation, lane)
         _compare(dims, sizes, work)
         for k in range(3):
             for lane in range(width):
@@ -101,94 +77,11 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 
 @_jit
-def _work(dims, sizes):  # type: ignore[no-untyped-def]
-    d = len(dims)
-    n_segments, _, n_points = sizes
-    n_rows = n_segments * (2 * d + 1) + n_points * (2 * d + 2)
-    return _Work(
-        aligned(n_rows),
-        aligned(n_rows),
-        aligned(n_rows),
-        aligned(d * d),
-        aligned(n_segments + 1),
-        aligned(n_segments + 1),
-        aligned(n_points),
-        aligned(n_points),
-        np.zeros((n_points, LANES), np.int32),
-        aligned(3),
-    )
-
-
-@_jit
-def _pack(dims, shapes, i, weights, block, lane):  # type: ignore[no-untyped-def]
-    """Put movement i into a lane of a block."""
-    tangents, midpoints, turning, points, point_tangents, point_turning = shapes
-    position, turn, cloud_turn, line = weights
-    d, row = len(dims), 0
-    for p in range(tangents.shape[1]):
-        for k in range(d):
-            block[row + k, lane] = tangents[i, p, k]
-            block[row + d + k, lane] = midpoints[i, p, k] * position
-        block[row + 2 * d, lane] = turning[i, p] * turn
-        row += 2 * d + 1
-    for p in range(points.shape[1]):
-        half = np.float32(0)
-        for k in range(d):
-            block[row + k, lane] = points[i, p, k]
-            t = point_tangents[i, p, k] * line
-            block[row + d + 1 + k, lane] = t
-            half += t * t
-        block[row + d, lane] = point_turning[i, p] * cloud_turn
-        block[row + 2 * d + 1, lane] = np.float32(0.5) * line * line * half
-        row += 2 * d + 2
-
-
-@_jit
-def _pack_everywhere(dims, shapes, i, weights, block):  # type: ignore[no-untyped-def]
-    """Put movement i into every lane of a block."""
-    _pack(dims, shapes, i, weights, block, 0)
-    for row in range(len(block)):
-        store(block, row, every(block[row, 0]))
-
-
-@_jit
-def _take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untyped-def]
-    d = len(dims)
-    if rotations.shape[2] == 0:
-        for k in range(d * d):
-            block[k, lane] = k % (d + 1) == 0
-    elif rotations.shape[2] == d * d:
-        for k in range(d * d):
-            block[k, lane] = rotations[i, j, k]
-    else:
-        c, s = rotations[i, j, 0], rotations[i, j, 1]
-        block[0, lane], block[1, lane] = c, -s
-        block[2, lane], block[3, lane] = s, c
-
-
-@_jit
 def _compare(dims, sizes, work):  # type: ignore[no-untyped-def]
     n_segments, band, n_points = sizes
-    _rotate(dims, n_segments, n_points, work)
+    rotate(dims, n_segments, n_points, work)
     _warp(dims, n_segments, band, work)
     _match(dims, n_segments * (2 * len(dims) + 1), n_points, work)
-
-
-@_jit
-def _rotate(dims, n_segments, n_points, work):  # type: ignore[no-untyped-def]
-    d, row = len(dims), 0
-    matrix, b, turned = load_matrix(work.rotation, 0, dims), work.b, work.turned
-    for _ in range(n_segments):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d, rotated(matrix, load_vector(b, row + d, dims)))
-        store(turned, row + 2 * d, load(b, row + 2 * d))
-        row += 2 * d + 1
-    for _ in range(n_points):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d + 1, rotated(matrix, load_vector(b, row + d + 1, dims)))
-        store(turned, row + d, load(b, row + d))
-        store(turned, row + 2 * d + 1, load(b, row + 2 * d + 1))
-        row += 2 * d + 2
 
 
 @_jit
