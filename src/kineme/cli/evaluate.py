@@ -20,7 +20,7 @@ METHOD_NAMES = (
     "kineme", "paper", "paper-bio", "euclidean", "dtw", "dtw-path", "gak-svm", "minirocket", "point-cloud",
     "plus-cloud", "quick-cloud", "hmm",
 )  # fmt: skip
-_QUICK_SPLITS, _QUICK_SHOTS = 2, (1, 3)
+_QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm"}
 
 
 @click.command(short_help="Compare recognizers on data sets.")
@@ -43,7 +43,7 @@ _QUICK_SPLITS, _QUICK_SHOTS = 2, (1, 3)
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for evaluation.html and evaluation.json of each data set, and results.csv, results.json and "
               "ranks.png of all.")  # fmt: skip
-@click.option("--quick", is_flag=True, help="At most two splits; one and three shots.")
+@click.option("--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm and hmm.")
 def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
     """Evaluate recognition on DATA: lasa, lasa-letters, a folder of recordings, or a file.
 
@@ -62,30 +62,28 @@ def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[s
     from kineme.runtime.parallel import n_threads
 
     quick, out = options["quick"], options["out"]
-    contenders = methods or tuple(METHODS)
+    contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
     splits = min(options["splits"], _QUICK_SPLITS) if quick else options["splits"]
     settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
-    sets = [load_data(one) for one in data]
+    sets = _numbered([load_data(one) for one in data])
     for name, reason in ((name, reason) for one in sets for name, reason in one.left_out.items()):
         write(f"left out {name}: {reason}", err=True)
     runner = Runner(options["jobs"] or n_threads(), _progress)
-    folders = [out] if len(sets) == 1 else _folders(out, [one.name for one in sets])
     evaluations = []
-    for one, folder in zip(sets, folders, strict=True):
+    for one in sets:
         asked = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(one))
-        evaluations.append(run(one, (asked, contenders), settings, folder, runner))
+        evaluations.append(run(one, (asked, contenders), settings, out / one.name if len(sets) > 1 else out, runner))
         _print(one.name if len(sets) > 1 else "", evaluations[-1])
-    _print_summary(summarize([folder.name for folder in folders], evaluations, out), evaluations[0].files[0])
+    _print_summary(summarize([one.name for one in sets], evaluations, out), evaluations[0].files[0])
 
 
-def _folders(out: Path, names: list[str]) -> list[Path]:
-    """A folder for each data set, by its name; data sets of one name are numbered."""
-    counts = dict.fromkeys(names, 0)
-    folders = []
-    for name in names:
-        counts[name] += 1
-        folders.append(out / (name if names.count(name) == 1 else f"{name}-{counts[name]}"))
-    return folders
+def _numbered(sets: list[Any]) -> list[Any]:
+    """Data sets with names of their own: those of one name are numbered."""
+    names = [one.name for one in sets]
+    return [
+        one._replace(name=f"{one.name}-{names[: k + 1].count(one.name)}") if names.count(one.name) > 1 else one
+        for k, one in enumerate(sets)
+    ]
 
 
 def _print(name: str, evaluation: Any) -> None:

@@ -149,6 +149,16 @@ def test_beginnings_end_where_that_share_of_the_path_does(small):
     np.testing.assert_array_equal(cut(small, 0.5).labels, small.labels)
 
 
-def test_rivals_do_not_answer_early():
-    assert not any(does(name, "classify partial") for name in METHODS if name != "kineme")
+def test_who_answers_early():
     assert all(does("kineme", task) for task in TASKS)
+    early = {name for name in AVAILABLE if does(name, "classify partial")}
+    assert {"kineme", "euclidean", "plus-cloud"} <= early
+    assert not early & {"paper", "paper-bio", "gak-svm", "hmm"}
+
+
+@pytest.mark.parametrize("method", ["euclidean", "plus-cloud"])
+def test_rivals_learn_the_beginnings_to_answer_early(small, method):
+    contender = METHODS[method].contender(Options(), "classify partial")
+    contender.fit(small[::4])
+    for share in (0.5, 0.7):
+        assert contender.classify_partial(cut(small[::4], share)).tolist() == small.labels[::4].tolist()

@@ -117,7 +117,7 @@ def test_the_group_to_install_is_named():
 
 
 def test_a_protocol_that_nobody_can_answer_is_reported(data, tmp_path):
-    result = run(data, tmp_path, (["few-shot", "earliness"], ["euclidean"]))
+    result = run(data, tmp_path, (["few-shot", "earliness"], ["paper"]))
     assert result.results.skipped == {"earliness": "none of the methods can classify movements before their end"}
 
 

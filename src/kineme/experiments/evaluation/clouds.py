@@ -9,21 +9,18 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from kineme.experiments.evaluation.neighbors import average_linkage
-from kineme.movements.preparation.arc_length import arc_length_phase, resample_by_phase
-from kineme.movements.preparation.resample import relative_rows
+from kineme.experiments.evaluation.paths import smooth_paths
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
-_N_SAMPLES = 200  # before arc length is taken
 _IN_PLANE, _IN_SPACE = 32, 16  # points of $P+: those of the paper, and those that do best beyond the plane
 _MATCHED = 32  # points of $P and $Q
 
 
 def clouds(demonstrations: Demonstrations, n_points: int) -> Array:
-    """Points at even arc length, divided by the largest extent, with their mean in the origin: (n, n_points, d)."""
-    paths = relative_rows(demonstrations, 0, len(demonstrations), _N_SAMPLES)
-    points = resample_by_phase(paths, arc_length_phase(paths), n_points)
+    """Points of the smoothed path at even arc length, divided by its largest extent, centered: (n, n_points, d)."""
+    points = smooth_paths(demonstrations, n_points)
     extent = np.ptp(points, axis=2).max(axis=1)[:, None, None]
     points = points / np.where(extent > 0, extent, 1.0)
     return np.ascontiguousarray((points - points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))

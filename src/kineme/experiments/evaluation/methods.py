@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring import propose
@@ -15,8 +16,9 @@ from kineme.experiments.evaluation.linear_classifiers import AlignmentSVM, MiniR
 from kineme.experiments.evaluation.measures import Stretch
 from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures
 from kineme.experiments.evaluation.optional import why_missing
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.early.early import cut
 from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
@@ -52,15 +54,45 @@ class Method:
         Options -> contender.
     needs : str
         Optional module that the method imports; "" for none.
+    learns_beginnings : bool
+        Whether it is given the beginnings of the training movements too where beginnings are to be classified.
     """
 
     title: str
     make: Callable[[Options], Contender]
     needs: str = ""
+    learns_beginnings: bool = False
+
+    def contender(self, options: Options, task: str = "classify") -> Contender:
+        """A contender for a trial of that task."""
+        made = self.make(options)
+        return LearnsBeginnings(made) if self.learns_beginnings and task == "classify partial" else made
 
     def unavailable(self) -> str:
         """Why the method cannot take part, or ""."""
         return why_missing(self.needs) if self.needs else ""
+
+
+class LearnsBeginnings:
+    """A contender that also learns the beginnings of its training movements, so that it can classify beginnings."""
+
+    def __init__(self, contender: Contender) -> None:
+        self.contender = contender
+
+    def fit(self, demonstrations: Demonstrations) -> None:
+        """Learn from labeled movements and their beginnings."""
+        parts = [one for share in _SHARES for one in cut(demonstrations, share)]
+        labels = np.tile(require_labels(demonstrations), len(_SHARES))
+        arrays, times = [one.positions for one in parts], [one.times for one in parts]
+        self.contender.fit(Demonstrations.from_arrays(arrays, labels, times))
+
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+        """The class of each movement, and its familiarity."""
+        return self.contender.classify(demonstrations)
+
+    def classify_partial(self, demonstrations: Demonstrations) -> NDArray[Any]:
+        """Class of each movement of which only the beginning is given."""
+        return self.contender.classify(demonstrations)[0]
 
 
 class DefaultRecognizer:
@@ -91,21 +123,30 @@ class DefaultRecognizer:
 
 
 OURS = "kineme"
+_SHARES = np.arange(3, 11) / 10  # of the path, of the beginnings that are learned
 
 #: The paper's configuration is 1-NN on the shape-attractor of the original, or on f of the bio-inspired formulation.
 METHODS: dict[str, Method] = {
     OURS: Method("kineme, defaults", lambda options: DefaultRecognizer(options.max_angle)),
     "paper": Method("paper, original form", lambda _: PaperFeatures("original", "shape-attractor")),
     "paper-bio": Method("paper, bio-inspired form", lambda _: PaperFeatures("bio-inspired", "forcing")),
-    "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor()),
-    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim"),
-    "dtw-path": Method("DTW 1-NN, arc length", lambda _: DTWNeighbor(along_path=True), needs="dtaidistance.dtw_ndim"),
+    "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor(), learns_beginnings=True),
+    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim", learns_beginnings=True),
+    "dtw-path": Method(
+        "DTW 1-NN, arc length",
+        lambda _: DTWNeighbor(along_path=True),
+        needs="dtaidistance.dtw_ndim",
+        learns_beginnings=True,
+    ),
     "gak-svm": Method("GAK-SVM", lambda options: AlignmentSVM(options.seed), needs="tslearn.metrics"),
     "minirocket": Method(
-        "MiniRocket + ridge", lambda options: MiniRocket(options.seed), needs="aeon.classification.convolution_based"
+        "MiniRocket + ridge",
+        lambda options: MiniRocket(options.seed),
+        needs="aeon.classification.convolution_based",
+        learns_beginnings=True,
     ),
-    "point-cloud": Method("$P (our code)", lambda _: PointCloud()),
-    "plus-cloud": Method("$P+ (our code)", lambda _: PlusCloud()),
-    "quick-cloud": Method("$Q (our code)", lambda _: QuickCloud()),
+    "point-cloud": Method("$P (our code)", lambda _: PointCloud(), learns_beginnings=True),
+    "plus-cloud": Method("$P+ (our code)", lambda _: PlusCloud(), learns_beginnings=True),
+    "quick-cloud": Method("$Q (our code)", lambda _: QuickCloud(), learns_beginnings=True),
     "hmm": Method("HMM", lambda options: HiddenMarkov(options.seed), needs="hmmlearn.hmm"),
-}
+}  # fmt: skip

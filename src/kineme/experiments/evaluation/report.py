@@ -81,5 +81,6 @@ def _lead(data: DataSet) -> str:
     return (
         f"{len(data.demonstrations)} movements of {len(labels)} classes in {data.demonstrations.n_dims} dimensions. "
         "All methods see the same splits and the same perturbed movements. Numbers are means over splits, with their "
-        "range where there is room. Rivals get positions that are centered and scaled."
+        "range where there is room. Rivals get positions that are centered, scaled, smoothed and even along the path; "
+        "plain DTW gets them even in time."
     )

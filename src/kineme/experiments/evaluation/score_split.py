@@ -34,7 +34,7 @@ def score_split(data: DataSet, protocol: str, method: str, index: int, settings:
     if not does(method, PROTOCOLS[protocol].task):
         return scores
     for trial in PROTOCOLS[protocol].trials(data, settings, index):
-        contender = METHODS[method].make(Options(trial.max_angle, settings.seed))
+        contender = METHODS[method].contender(Options(trial.max_angle, settings.seed), trial.task)
         if trial.task == "spot":
             scores += _spot(contender, trial, [settings.seed, index])
         else:
@@ -44,7 +44,7 @@ def score_split(data: DataSet, protocol: str, method: str, index: int, settings:
 
 def does(method: str, task: str) -> bool:
     """Whether a method can do a task of `TASKS`."""
-    return callable(getattr(METHODS[method].make(Options()), TASKS[task].method, None))
+    return callable(getattr(METHODS[method].contender(Options(), task), TASKS[task].method, None))
 
 
 def _whole(contender: Contender, trial: Trial) -> Iterator[Scores]:
