@@ -1,8 +1,8 @@
 """Blocks of 16 movements for compiled distances of pairs: one movement in each lane. Importing this imports Numba.
 
-The rows of a block are, for each segment, tangent, midpoint and turning angle, and for each point, position, turning
-angle, tangent and half its squared length, each times the root of its weight. The tuple `dims` is as long as a movement
-has dimensions: its type tells the compiler that number.
+The rows of a block are the numbers of a movement's shape, one array after the other, as `begins_of` says, each times
+the root of its weight. The tuple `dims` is as long as a movement has dimensions: its type tells the compiler that
+number.
 """
 
 from __future__ import annotations
@@ -12,7 +12,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.kernels._lanes import LANES, aligned, every, load, load_matrix, load_vector, rotated, store, store_vector
+from kineme.kernels._lanes import (
+    LANES,
+    aligned,
+    every,
+    load_matrix,
+    load_vector,
+    product,
+    rotated,
+    store,
+    store_vector,
+    times,
+    transpose,
+)
 from kineme.runtime.compiled import jit
 
 _jit = partial(jit, reorder=False)
@@ -53,35 +65,57 @@ def new_work(dims, sizes):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def pack(dims, shapes, i, weights, block, lane):  # type: ignore[no-untyped-def]
-    """Put movement i into a lane of a block."""
-    tangents, midpoints, turning, points, point_tangents, point_turning = shapes
-    position, turn, cloud_turn, line = weights
-    d, row = len(dims), 0
-    for p in range(tangents.shape[1]):
-        for k in range(d):
-            block[row + k, lane] = tangents[i, p, k]
-            block[row + d + k, lane] = midpoints[i, p, k] * position
-        block[row + 2 * d, lane] = turning[i, p] * turn
-        row += 2 * d + 1
-    for p in range(points.shape[1]):
-        half = np.float32(0)
-        for k in range(d):
-            block[row + k, lane] = points[i, p, k]
-            t = point_tangents[i, p, k] * line
-            block[row + d + 1 + k, lane] = t
-            half += t * t
-        block[row + d, lane] = point_turning[i, p] * cloud_turn
-        block[row + 2 * d + 1, lane] = np.float32(0.5) * line * line * half
-        row += 2 * d + 2
+def begins_of(dims, sizes):  # type: ignore[no-untyped-def]
+    """First rows of tangents, midpoints, turning angles; points, their tangents, turning angles, half squared lengths.
+
+    The length is that of the weighted tangent of a point.
+    """
+    n_segments, _, n_points = sizes
+    t, points = n_segments * len(dims), n_segments * (2 * len(dims) + 1)
+    x = n_points * len(dims)
+    return 0, t, 2 * t, points, points + x, points + 2 * x, points + 2 * x + n_points
 
 
 @_jit
-def pack_everywhere(dims, shapes, i, weights, block):  # type: ignore[no-untyped-def]
+def pack(dims, shapes, chosen, numbers, block):  # type: ignore[no-untyped-def]
+    """Put the movement ``chosen[lane]`` into each lane of a block."""
+    weights, sizes = numbers
+    begins = begins_of(dims, sizes)
+    for part in range(6):
+        rows, weight, begin = shapes[part], weights[part], begins[part]
+        length = rows.shape[1]
+        if length < LANES:
+            for lane in range(LANES):
+                for k in range(length):
+                    block[begin + k, lane] = rows[chosen[lane], k] * weight
+        else:
+            for k in range(0, length - LANES, LANES):
+                transpose(rows, chosen, k, weight, block, begin + k)
+            transpose(rows, chosen, length - LANES, weight, block, begin + length - LANES)
+    _add_halves(dims, numbers, block)
+
+
+@_jit
+def pack_everywhere(dims, shapes, i, numbers, block):  # type: ignore[no-untyped-def]
     """Put movement i into every lane of a block."""
-    pack(dims, shapes, i, weights, block, 0)
-    for row in range(len(block)):
-        store(block, row, every(block[row, 0]))
+    weights, sizes = numbers
+    begins = begins_of(dims, sizes)
+    for part in range(6):
+        row = shapes[part][i]
+        for k in range(len(row)):
+            store(block, begins[part] + k, every(row[k] * weights[part]))
+    _add_halves(dims, numbers, block)
+
+
+@_jit
+def _add_halves(dims, numbers, block):  # type: ignore[no-untyped-def]
+    weights, sizes = numbers
+    begins = begins_of(dims, sizes)
+    factor = every(np.float32(0.5) * weights[4] * weights[4])
+    for p in range(sizes[2]):
+        row = begins[4] + p * len(dims)
+        squared = product(load_vector(block, row, dims), block, row)
+        store(block, begins[6] + p, times(factor, squared))
 
 
 @_jit
@@ -100,17 +134,10 @@ def take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untype
 
 
 @_jit
-def rotate(dims, n_segments, n_points, work):  # type: ignore[no-untyped-def]
-    d, row = len(dims), 0
+def rotate(dims, sizes, work):  # type: ignore[no-untyped-def]
+    """Rotate the tangents, midpoints and points of b; nothing else is written to `turned`."""
+    begins = begins_of(dims, sizes)
     matrix, b, turned = load_matrix(work.rotation, 0, dims), work.b, work.turned
-    for _ in range(n_segments):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d, rotated(matrix, load_vector(b, row + d, dims)))
-        store(turned, row + 2 * d, load(b, row + 2 * d))
-        row += 2 * d + 1
-    for _ in range(n_points):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d + 1, rotated(matrix, load_vector(b, row + d + 1, dims)))
-        store(turned, row + d, load(b, row + d))
-        store(turned, row + 2 * d + 1, load(b, row + 2 * d + 1))
-        row += 2 * d + 2
+    for first, end in ((begins[0], begins[2]), (begins[3], begins[5])):
+        for row in range(first, end, len(dims)):
+            store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))

@@ -88,6 +88,48 @@ def store(_context, array, row, lanes):  # type: ignore[no-untyped-def]
 
 
 @_operation
+def transpose(_context, rows, chosen, column, factor, array, row):  # type: ignore[no-untyped-def]
+    """``array[row + k, lane] = factor rows[chosen[lane], column + k]`` for 16 k and 16 lanes.
+
+    `rows` (n, length) is C-contiguous, float32, `chosen` an array of 16 indices.
+    """
+
+    def code(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        source = context.make_array(signature.args[0])(context, builder, values[0])
+        picked = context.make_array(signature.args[1])(context, builder, values[1]).data
+        length = builder.extract_value(source.shape, 1)
+        lanes = []
+        for lane in range(LANES):
+            index = builder.load(builder.gep(picked, [ir.Constant(ir.IntType(64), lane)]))
+            at = builder.gep(source.data, [builder.add(builder.mul(index, length), values[2])])
+            lanes.append(builder.load(builder.bitcast(at, _FLOAT.as_pointer()), align=4))
+        first, each = (
+            _row(context, builder, (signature.args[4], values[4]), values[5]),
+            _splat(builder, values[3], _FLOAT),
+        )
+        for k, vector in enumerate(_transposed(builder, lanes)):
+            at = builder.gep(first, [ir.Constant(ir.IntType(64), k)])
+            builder.store(builder.fmul(vector, each), at, align=4)
+        return context.get_dummy_value()
+
+    return types.void(rows, chosen, types.intp, types.float32, array, types.intp), code
+
+
+def _transposed(builder: Any, vectors: list[Any]) -> list[Any]:
+    """Blocks of 1, 2, 4, 8 lanes change places with those of the vector so many further on."""
+    vectors = list(vectors)
+    for size in (1, 2, 4, 8):
+        low = [lane if not lane & size else LANES + lane - size for lane in range(LANES)]
+        high = [lane + size if not lane & size else LANES + lane for lane in range(LANES)]
+        masks = [ir.Constant(_INT, mask) for mask in (low, high)]
+        for i in range(LANES):
+            if not i & size:
+                pair = vectors[i], vectors[i + size]
+                vectors[i], vectors[i + size] = (builder.shuffle_vector(*pair, mask) for mask in masks)
+    return vectors
+
+
+@_operation
 def load_vector(_context, array, row, dims):  # type: ignore[no-untyped-def]
     """As many rows of an array (n, 16), from `row` on, as the tuple `dims` is long, as a tuple."""
     return _load_tuple(array, dims, len(dims))
