@@ -52,7 +52,7 @@ def test_every_result_is_a_rotation_and_none_is_better(seed):
         assert (np.linalg.det(R) > 0).all()
         reached = np.einsum("nij,nij->n", R, M)
         np.testing.assert_allclose(reached, soft_products(M), atol=5e-3)  # ties are broken by as much
-        np.testing.assert_allclose(soft_products(M), _by_decomposition(M)[0], atol=1e-6)
+        np.testing.assert_allclose(soft_products(M), _by_decomposition(M)[0], atol=2e-5)  # of -I three roots meet
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -93,10 +93,10 @@ def test_what_a_rotation_costs():
         rows = [procrustes.prepare(one.reshape(1, -1)) for one in (x, R @ x)]
         return float(procrustes.squared_distances(*rows)[0, 0]) / (2 * norm)
 
-    for axis in np.eye(3):
-        assert cost(RotationPrior(0.05), axis, 0.6) == pytest.approx(2 * 0.05 * (1 - math.cos(0.6)), rel=0.02)
-    upright = RotationPrior(0.01, vertical=(0, 0, 2.0), tilt=0.2)
-    assert cost(upright, (0, 0, 1), 0.6) == pytest.approx(2 * 0.01 * (1 - math.cos(0.6)), rel=0.05)
+    for axis in np.eye(3):  # a strong prior would rotate less than the movement was rotated
+        assert cost(RotationPrior(0.001), axis, 0.6) == pytest.approx(2 * 0.001 * (1 - math.cos(0.6)), rel=0.02)
+    upright = RotationPrior(0.001, vertical=(0, 0, 2.0), tilt=0.02)
+    assert cost(upright, (0, 0, 1), 0.6) == pytest.approx(2 * 0.001 * (1 - math.cos(0.6)), rel=0.02)
     assert cost(upright, (1, 0, 0), 0.6) > 5 * cost(upright, (0, 0, 1), 0.6)
 
 

@@ -25,7 +25,7 @@ def test_the_transform_is_found_again(d, seed):
     answer = Recognizer().fit(demos).recognize(moved)
     assert answer.nearest[0].index == i
     assert answer.nearest[0].name == f"no {i}"
-    assert answer.nearest[0].similarity == pytest.approx(1, abs=3e-2)  # a rotation costs a little
+    assert answer.nearest[0].similarity == pytest.approx(1, abs=6e-2)  # a rotation costs a little
     np.testing.assert_allclose(answer.transform.rotation, R, atol=1e-6)
     np.testing.assert_allclose(answer.transform.scale, scale, rtol=1e-6)
     np.testing.assert_allclose(answer.transform.shift, shift, atol=1e-5)

@@ -83,7 +83,7 @@ def test_representations_keep_half_of_their_own_weight():
 
 def test_shares_that_say_less_than_a_fiftieth_are_left_out_and_larger_ones_kept():
     shares = []
-    for seed in range(15):
+    for seed in range(40):
         recognizer = Recognizer((*DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS[1]), weights="equal").fit(
             draw_shapes([8] * 4, seed=seed, spread=0.8)
         )
