@@ -95,8 +95,7 @@ class Procrustes:
         The products run in the rows' own precision, float64 or float32; the norms are float64.
         """
         in_plane = self.n_dims == 2 and self.max_angle > 0
-        squares = np.einsum("ij,ij->i", rows, rows, dtype=np.float64)
-        return Prepared(as_complex(rows) if in_plane else rows, squares)
+        return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
 
     def squared_distances(self, A: Prepared, B: Prepared) -> Array:
         """Squared distances (n, m) between prepared rows."""
@@ -141,21 +140,17 @@ class Procrustes:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
+        A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
             return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
-        norms = np.sqrt(np.einsum("ij,ij->i", A, A)) * np.sqrt(np.einsum("ij,ij->i", B, B))
         if d == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
-            if self.prior is not None:
-                product = product + norms * np.trace(self.prior.matrix(2))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        if self.prior is not None:
-            return soft_rotations(turned(C, norms, self.prior.matrix(3)))
         return best_rotations(C, self.max_angle)
 
     def _weights(self, A: Prepared, B: Prepared) -> Array:
@@ -197,13 +192,26 @@ class Procrustes:
         return fill
 
 
+_ROWS_AT_ONCE = 256
 _MANY = 16  # rows from which on a product by BLAS is faster
+
+
+def _squares(rows: NDArray[Any]) -> Array:
+    """Squared norms (n,), in double precision."""
+    squares = np.empty(len(rows))
+    for start in range(0, len(rows), _ROWS_AT_ONCE):  # converted rows stay in the cache
+        some = rows[start : start + _ROWS_AT_ONCE].astype(np.float64, copy=False)
+        np.einsum("ij,ij->i", some, some, out=squares[start : start + _ROWS_AT_ONCE])
+    return squares
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     """Rows x_1 ... x_S, y_1 ... y_S as complex rows x + i y."""
     half = rows.shape[1] // 2
     pairs = np.empty((len(rows), half), np.result_type(rows, np.complex64))
+    if use_compiled(rows.size):
+        compiled_module("kineme.kernels._compiled").fill_pairs(rows, _as_real(pairs))
+        return pairs
     pairs.real, pairs.imag = rows[:, :half], rows[:, half:]
     return pairs
 
