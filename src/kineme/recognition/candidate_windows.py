@@ -24,7 +24,7 @@ _RESOLUTION = 0.04  # share of the peak speed that must be distinguished from re
 _SHARE = 0.16  # distance of boundaries, in durations of the shortest windows between them
 _DEPTH = 0.2  # prominence, in the logarithm of speed, of a minimum that is a boundary
 _FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
-_SLOW = 0.1  # share of the peak speed below which a sample counts as at rest
+_SLOW = 0.02  # share of the peak speed below which a sample counts as at rest
 _MOST_REST = 0.6  # share of a window at rest
 _DRIFT = 0.2  # share of the peak speed: a drift that covers less path between boundaries gets none
 
@@ -46,25 +46,16 @@ class Windows:
         Of the whole recording.
     bouts : ndarray of shape (b, 2)
         Stretches of motion between rests: first sample, and one past the last.
-    boundaries : ndarray of shape (k,)
-        Samples at which windows start and end, increasing.
-    first, last : ndarray of shape (n,)
-        Of each window, the indices of its boundaries; both samples belong to it.
+    rows : ndarray of shape (n, 2)
+        First and last sample of each window.
     """
 
     motion: Motion
     bouts: Rows
-    boundaries: Rows
-    first: Rows
-    last: Rows
+    rows: Rows
 
     def __len__(self) -> int:
-        return len(self.first)
-
-    @property
-    def rows(self) -> Rows:
-        """First and last sample of each window, (n, 2)."""
-        return np.column_stack((self.boundaries[self.first], self.boundaries[self.last]))
+        return len(self.rows)
 
 
 class Surroundings(NamedTuple):
@@ -80,12 +71,16 @@ class Surroundings(NamedTuple):
         Share of the duration.
     rests_inside : ndarray
         How many rests a window spans.
+    before, after : ndarray
+        How long it has been moving since a rest when the window starts, and until a rest when it ends [s].
     """
 
     edge_speeds: Array
     far_from_rest: Array
     at_rest: Array
     rests_inside: Array
+    before: Array
+    after: Array
 
 
 def candidate_windows(recording: Trajectory, durations: Durations | None, most_bouts: int) -> Windows:
@@ -116,12 +111,8 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
         at = _boundaries(motion, bouts, _SHARE * shortest)
         rows.append(_between(at, t, shortest, min(2.0 * shortest, most * (1 + 1e-9))))
     found = np.unique(np.concatenate(rows), axis=0)
-    boundaries = np.unique(np.concatenate((found.ravel(), [0, len(t) - 1])))
-    first, last = np.searchsorted(boundaries, found).T
-    windows = Windows(motion, bouts, boundaries, first, last)
-    around = surroundings(windows)
-    kept = (around.at_rest <= _MOST_REST) & (around.rests_inside < most_bouts)
-    return Windows(motion, bouts, boundaries, first[kept], last[kept])
+    around = surroundings(motion, bouts, found)
+    return Windows(motion, bouts, found[(around.at_rest <= _MOST_REST) & (around.rests_inside < most_bouts)])
 
 
 def _unknown_durations(motion: Motion, bouts: Rows) -> Durations:
@@ -177,23 +168,31 @@ def _between(boundaries: Rows, t: Array, shortest: float, longest: float) -> Row
     return rows[rows[:, 1] - rows[:, 0] >= MIN_SAMPLES - 1]
 
 
-def surroundings(windows: Windows, reach: float = 0.15) -> Surroundings:
+def surroundings(motion: Motion, bouts: Rows, rows: Rows, reach: float = 0.15) -> Surroundings:
     """What is at the ends of windows, and between them; ends are far from a rest by `reach` of the duration."""
-    motion, rows = windows.motion, windows.rows
     t = motion.times
     speeds = np.minimum(motion.speed / motion.peak, 1.0)
     still = np.append(0.0, np.cumsum(np.diff(t) * (speeds[1:] <= _SLOW)))
     lasting = t[rows[:, 1]] - t[rows[:, 0]]
-    ends = np.sort(np.concatenate((t[windows.bouts[:, 0]], t[windows.bouts[:, 1] - 1], [-np.inf, np.inf])))
+    starts, stops = t[bouts[:, 0]], t[bouts[:, 1] - 1]
+    ends = np.sort(np.concatenate((t[bouts[:, 0]], t[bouts[:, 1] - 1], [-np.inf, np.inf])))
     times = t[rows]
     after = np.searchsorted(ends, times)
     distance = np.minimum(ends[after] - times, times - ends[after - 1])
-    spanned = np.searchsorted(windows.bouts[:, 0], rows[:, 1]) - np.searchsorted(windows.bouts[:, 1], rows[:, 0] + 1)
+    into = np.searchsorted(starts, times[:, 0], side="right") - 1  # the bout that a window starts in or after
+    out = np.searchsorted(stops, times[:, 1])  # the bout that it ends in or before
+    before = times[:, 0] - np.append(starts, np.inf)[into]
+    before[(into < 0) | (times[:, 0] >= np.append(stops, np.inf)[into])] = 0.0
+    until = np.append(stops, np.inf)[out] - times[:, 1]
+    until[(out >= len(stops)) | (times[:, 1] <= np.append(starts, np.inf)[out])] = 0.0
+    spanned = np.searchsorted(bouts[:, 0], rows[:, 1]) - np.searchsorted(bouts[:, 1], rows[:, 0] + 1)
     return Surroundings(
         speeds[rows].sum(axis=1),
         np.minimum(distance / (reach * lasting[:, None]), 1.0).sum(axis=1),
         (still[rows[:, 1]] - still[rows[:, 0]]) / lasting,
         np.maximum(spanned - 1, 0).astype(np.float64),
+        before,
+        until,
     )
 
 
@@ -207,3 +206,15 @@ def resampled(motion: Motion, start: Array, end: Array) -> Movements:
     positions = x[below] * (1.0 - weight) + x[below + 1] * weight
     offsets: NDArray[np.intp] = np.arange(len(start) + 1) * N_POINTS
     return Movements(np.ascontiguousarray(positions), offsets, np.asarray(end - start))
+
+
+def moved(motion: Motion, rows: Rows, share: float) -> Rows:
+    """Windows with one end earlier or later by a share of the duration, (4, n, 2); one that gets too short stays."""
+    t = motion.times
+    step = share * (t[rows[:, 1]] - t[rows[:, 0]])
+    found = np.repeat(rows[None], 4, axis=0)
+    for i, (end, sign) in enumerate(((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0))):
+        found[i, :, end] = np.clip(np.searchsorted(t, t[rows[:, end]] + sign * step), 0, len(t) - 1)
+    short = found[:, :, 1] - found[:, :, 0] < MIN_SAMPLES - 1
+    found[short] = np.broadcast_to(rows, found.shape)[short]
+    return found

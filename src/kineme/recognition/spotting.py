@@ -19,6 +19,7 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
+    Known,
     Manner,
     Scored,
     compare_windows,
@@ -26,6 +27,7 @@ from kineme.recognition.window_scores import (
     expected,
     manner_of,
     score_windows,
+    with_moved_ends,
 )
 from kineme.validation import Array, check_count
 
@@ -74,7 +76,7 @@ def spot(
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
         return []
-    known, best = _chosen(comparison, references, calibration, windows, error_rate)
+    known, best = _chosen(Known(comparison, references, calibration), windows, error_rate)
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(known, windows.bouts, whole.times, least)
     rows = np.concatenate((known, unknown))
@@ -92,20 +94,35 @@ def spot(
     ]
 
 
-def _chosen(
-    comparison: Comparison, references: References, calibration: Calibration, windows: Windows, error_rate: float
-) -> tuple[Rows, NDArray[np.intp]]:
-    """Samples of the movements that are known, rows (n, 2), first and one past the last, and the class of each."""
+def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:
+    """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
-    compared = compare_windows(comparison, references, windows.motion, windows.rows, surroundings(windows))
-    typical, manner = expected(references), Manner()
-    scored, chosen = Scored(np.empty(0, dtype=np.intp), np.empty(0)), list[int]()
-    for _ in range(_PASSES):
-        scored = score_windows(compared, calibration, typical, manner, error_rate)
-        chosen = best_chain(windows.first, windows.last, scored.score, len(windows.boundaries))
-        manner = manner_of(compared, typical, chosen, scored.best)
-    return windows.rows[chosen] + [0, 1], scored.best[chosen]
+    motion = windows.motion
+    motion, typical = windows.motion, expected(known.references)
+    compared = compare_windows(known, motion, windows.rows)
+    around = surroundings(motion, windows.bouts, compared.rows)
+    manner = Manner()
+    for _ in range(_PASSES - 1):
+        scored = score_windows(compared, typical, around, manner, error_rate)
+        chosen = _best_windows(compared.rows, scored)
+        manner = manner_of(compared, typical, around, chosen, scored)
+    scored = score_windows(compared, typical, around, manner, error_rate)
+    chosen = _best_windows(compared.rows, scored)
+    if chosen:
+        compared = with_moved_ends(known, motion, compared, chosen, scored.best)
+        around = surroundings(motion, windows.bouts, compared.rows)
+        scored = score_windows(compared, typical, around, manner, error_rate)
+        chosen = _best_windows(compared.rows, scored)
+    rows = compared.rows[chosen]
+    return np.column_stack((rows[:, 0], rows[:, 1] + 1)), scored.best[chosen]
+
+
+def _best_windows(rows: Rows, scored: Scored) -> list[int]:
+    """The chain of windows of largest summed score."""
+    boundaries = np.unique(np.append(0, rows))
+    first, last = np.searchsorted(boundaries, rows).T
+    return best_chain(first, last, scored.score, len(boundaries))
 
 
 def best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n: int) -> list[int]:
@@ -134,13 +151,12 @@ def best_chain(first: NDArray[np.intp], last: NDArray[np.intp], score: Array, n:
 
 def _left_over(known: Rows, bouts: Rows, times: Array, least: float) -> Rows:
     """Stretches of motion that no known movement holds, rows (n, 2), each at least `least` seconds long."""
-    free = np.zeros(len(times) + 2, dtype=np.intp)
-    for start, stop in bouts.tolist():
-        free[start + 1 : stop + 1] = 1
+    stretch = np.zeros(len(times) + 2, dtype=np.intp)  # 0 where there is none, also before and after all samples
+    for i, (start, stop) in enumerate(bouts.tolist()):
+        stretch[start + 1 : stop + 1] = i + 1
     for start, stop in known.tolist():
-        free[start + 1 : stop + 1] = 0
-    free[bouts[1:, 0][bouts[1:, 0] == bouts[:-1, 1]] + 1] = 0
-    edges = np.diff(free)
-    rows = np.column_stack((np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))
+        stretch[start + 1 : stop + 1] = 0
+    edges = np.flatnonzero(np.diff(stretch))
+    rows = np.column_stack((edges[:-1], edges[1:]))[stretch[edges[:-1] + 1] > 0]
     rows = rows[rows[:, 1] - rows[:, 0] >= MIN_SAMPLES]
     return rows[times[rows[:, 1] - 1] - times[rows[:, 0]] >= least]

@@ -3,56 +3,98 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import describe
 from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, score
+from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.motion import Motion
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.candidate_windows import N_POINTS, Surroundings, resampled
+from kineme.recognition.candidate_windows import N_POINTS, Surroundings, moved, resampled
 from kineme.recognition.conformal import Calibration
 from kineme.validation import Array
 
 _TILE = 4096  # windows described at a time
-_NEAR = 1.0  # share of windows, those nearest by their positions, that are compared in every representation
-_FAR = -1e3  # log similarity of the others
-_REACH = 1.115  # nonconformity at which a window counts as far, in that which members exceed at the error rate
-_TEMPO, _SIZE = 0.36, 0.14  # cost of a duration, or a size, e times what is expected
+_MOVES = (0.06, 0.03)  # by which shares of its duration the ends of a window are moved
+_REACH = 0.975  # nonconformity at which a window counts as far, in that which members exceed at the error rate
+_TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
-_EDGE, _FAR_FROM_REST, _AT_REST, _SPANNED = 0.1, 0.05, 0.5, 0.02  # costs of what surrounds a window
-_PER_MOVEMENT = 0.18  # cost of one more movement, in typical durations
+_EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
+_REMAINDER = 0.2  # cost of motion left over before or after a window, where movements begin and end at rests
+_BOUNDED = 0.88, 0.98  # how many must do so for it to count not at all, and in full
+_LONG = 0.5  # typical durations from which a remainder counts in full
+_REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
+_SLOW = 0.2  # share of the mean speed of a window below which it rests
+_PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
+
+
+class Known(NamedTuple):
+    """What windows are compared with."""
+
+    comparison: Comparison
+    references: References
+    calibration: Calibration
 
 
 class Expected(NamedTuple):
-    """Logarithms of the typical durations and sizes of C classes, (C,); None where no time stamps were given."""
+    """Typical movements of C classes, each of shape (C,).
+
+    Attributes
+    ----------
+    log_durations : ndarray or None
+        None where no time stamps were given.
+    log_sizes : ndarray
+    slowness : ndarray
+        Share of the duration that is slow.
+    """
 
     log_durations: Array | None
     log_sizes: Array
+    slowness: Array
 
 
 @dataclass(frozen=True)
 class Manner:
-    """How a recording differs from the demonstrations as a whole: logarithms of ratios; None while unknown."""
+    """How a recording differs from the demonstrations as a whole.
+
+    Attributes
+    ----------
+    tempo, size : float or None
+        Logarithms of the ratios of durations and sizes; None while unknown.
+    bounded : float
+        How much of what is known begins and ends at rests, from 0 to 1.
+    """
 
     tempo: float | None = None
     size: float | None = None
+    bounded: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """n windows, compared with C classes: similarities (n, C), durations [s], sizes, and what surrounds them."""
+    """n windows, compared with C classes.
 
-    similarities: Array
+    Attributes
+    ----------
+    rows : ndarray of shape (n, 2)
+        First and last sample.
+    scores : ndarray of shape (n, C)
+        Nonconformity to each class.
+    log_durations, log_sizes, slowness : ndarray of shape (n,)
+        Slowness is the share of the duration that is slow.
+    """
+
+    rows: Rows
+    scores: Array
     log_durations: Array
     log_sizes: Array
-    around: Surroundings
+    slowness: Array
 
 
 class Scored(NamedTuple):
@@ -71,48 +113,58 @@ def durations_of(references: References) -> Array | None:
 def expected(references: References) -> Expected:
     """Medians over the references of each class."""
     demos = references.all_movements()
-    sizes = np.log(np.maximum([np.sqrt(one.positions.var(axis=0).sum()) for one in demos], np.finfo(float).tiny))
+    sizes, slowness = _size_and_slowness(relative_rows(demos, 0, len(demos), N_POINTS))
     lasting = durations_of(references)
     known = None if lasting is None else np.log(lasting)
 
     def medians(values: Array) -> Array:
         return np.array([np.median(values[one]) for one in references.slices()])
 
-    return Expected(None if known is None else medians(known), medians(sizes))
+    return Expected(None if known is None else medians(known), medians(sizes), medians(slowness))
 
 
-def compare_windows(
-    comparison: Comparison, references: References, motion: Motion, rows: Rows, around: Surroundings
-) -> Compared:
+def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
+    """Logarithm of the size of each path (n, d, T), and the share of its steps that are far below the mean step."""
+    size = np.sqrt(paths.var(axis=2).sum(axis=1))
+    steps = np.linalg.norm(np.diff(paths, axis=2), axis=1)
+    slow = (steps <= _SLOW * steps.mean(axis=1, keepdims=True)).mean(axis=1)
+    return np.log(np.maximum(size, np.finfo(float).tiny)), slow
+
+
+def compare_windows(known: Known, motion: Motion, rows: Rows) -> Compared:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
     start, end = motion.times[rows].T
-    similarities = np.empty((len(rows), len(references.classes)))
-    sizes = np.empty(len(rows))
+    scores = np.empty((len(rows), len(known.references.classes)))
+    sizes, slowness = np.empty((2, len(rows)))
     for first in range(0, len(rows), _TILE):
         tile = slice(first, first + _TILE)
         demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
-        points = demos.positions.reshape(len(demos), N_POINTS, -1)
-        sizes[tile] = np.sqrt(points.var(axis=1).sum(axis=1))
-        similarities[tile] = _similarities(comparison, references, demos)
-    logs = np.log(np.maximum(sizes, np.finfo(float).tiny))
-    return Compared(similarities, np.log(end - start), logs, around)
+        paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
+        sizes[tile], slowness[tile] = _size_and_slowness(paths)
+        scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, nearest)[0])
+    return Compared(rows, scores, np.log(end - start), sizes, slowness)
 
 
-def _similarities(comparison: Comparison, references: References, demos: Demonstrations) -> Array:
-    """Log similarities (n, C) to the nearest reference of each class; of those that are far by their positions, low."""
-    described = describe(demos, comparison)
-    stored = references.described
-    if described.pairs is None or stored.pairs is None or _NEAR >= 1:
-        return score(comparison, references, described, nearest)[0]
-    away = comparison.procrustes.squared_distances(described.pairs.positions, stored.pairs.positions).min(axis=1)
-    near = np.flatnonzero(away <= np.quantile(away, _NEAR))
-    found = np.full((len(described), len(references.classes)), _FAR)
-    (found[near],) = score(comparison, references, described.take(near), nearest)
-    return found
+def with_moved_ends(
+    known: Known, motion: Motion, compared: Compared, chosen: list[int], best: NDArray[np.intp]
+) -> Compared:
+    """The same windows, and those chosen with their ends moved to where the nonconformity to their class is least."""
+    rows, classes, here = compared.rows[chosen], best[chosen], np.arange(len(chosen))
+    least = compared.scores[chosen, classes]
+    several = [compared]
+    for share in _MOVES:
+        candidates = moved(motion, rows, share)
+        several.append(compare_windows(known, motion, candidates.reshape(-1, 2)))
+        scores = several[-1].scores.reshape(4, len(chosen), -1)[:, here, classes]
+        which = scores.argmin(axis=0)
+        better = scores[which, here] < least
+        rows = np.where(better[:, None], candidates[which, here], rows)
+        least = np.minimum(least, scores[which, here])
+    return Compared(*(np.concatenate([getattr(one, field.name) for one in several]) for field in fields(Compared)))
 
 
 def score_windows(
-    compared: Compared, calibration: Calibration, typical: Expected, manner: Manner, error_rate: float
+    compared: Compared, typical: Expected, around: Surroundings, manner: Manner, error_rate: float
 ) -> Scored:
     """Scores of windows, such that a chain of windows is better the larger its sum.
 
@@ -122,7 +174,7 @@ def score_windows(
     a whole movement is preferred to its parts, and no part of it is a movement by chance.
     """
     reach = _REACH * math.sqrt(-4.0 / math.pi * math.log(error_rate))
-    costs = calibration.scores(compared.similarities) / reach
+    costs = compared.scores / reach
     lasting = compared.log_durations
     usual = float(np.median(lasting)) if typical.log_durations is None else float(np.median(typical.log_durations))
     if typical.log_durations is not None:
@@ -134,20 +186,32 @@ def score_windows(
             usual += manner.tempo
     if manner.size is not None:
         costs += _SIZE * (compared.log_sizes[:, None] - typical.log_sizes - manner.size) ** 2
+    costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
     best = costs.argmin(axis=1)
-    around = compared.around
     closeness = 1.0 - costs[np.arange(len(best)), best]
     closeness -= _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest
-    closeness -= _AT_REST * around.at_rest + _SPANNED * around.rests_inside
+    closeness -= _SPANNED * around.rests_inside
+    certain = min(max((manner.bounded - _BOUNDED[0]) / (_BOUNDED[1] - _BOUNDED[0]), 0.0), 1.0)
+    closeness -= _REMAINDER * certain * remainders(around, usual)
     return Scored(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
 
 
-def manner_of(compared: Compared, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
-    """Tempo and size of a recording by the windows that are chosen; the tempo is shrunk towards that demonstrated."""
+def remainders(around: Surroundings, log_duration: float) -> Array:
+    """Motion from the last rest to each window and from it to the next, each at most 1, (n,)."""
+    long = _LONG * math.exp(log_duration)
+    return np.asarray(np.minimum(around.before / long, 1.0) + np.minimum(around.after / long, 1.0))
+
+
+def manner_of(
+    compared: Compared, typical: Expected, around: Surroundings, chosen: list[int], scored: Scored
+) -> Manner:
+    """The manner of a recording by the windows that are chosen; its tempo is shrunk towards that demonstrated."""
     if not chosen:
         return Manner()
-    classes = best[chosen]
-    manner = Manner(size=float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])))
+    classes, weights = scored.best[chosen], scored.score[chosen]
+    usual = float(np.median(compared.log_durations[chosen]))
+    bounded = 1.0 - 0.5 * float(np.average(remainders(around, usual)[chosen], weights=weights))
+    manner = Manner(None, float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])), bounded)
     if typical.log_durations is None:
         return manner
     ratio = float(np.median(compared.log_durations[chosen] - typical.log_durations[classes]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -31,10 +31,19 @@ class Stretch(NamedTuple):
 
 
 class Concatenated(NamedTuple):
-    """One recording, and the movements of which it was made, in order."""
+    """One recording, and the movements of which it was made, in order.
+
+    Attributes
+    ----------
+    recording : Trajectory
+    truth : tuple of Stretch
+    transits : tuple of Stretch
+        Motion from one rest to the next that is no movement of the given ones.
+    """
 
     recording: Trajectory
     truth: tuple[Stretch, ...]
+    transits: tuple[Stretch, ...]
 
 
 @dataclass(frozen=True)
@@ -81,15 +90,19 @@ def concatenate(
     extent = float(np.median([np.linalg.norm(np.ptp(x, axis=0)) for x in paths]))
     paths = [x + _OFFSET * extent * rng.normal(size=x.shape[1]) / np.sqrt(x.shape[1]) for x in paths]
     rest = _rest(paths[0][0], rng, step, extent) if rests else paths[0][:0]
-    samples, stamps, truth, now = [rest], [np.arange(len(rest)) * step], [], len(rest) * step
+    samples, stamps, now = [rest], [np.arange(len(rest)) * step], len(rest) * step
+    truth, transits = list[Stretch](), list[Stretch]()
     for i, (x, t, label) in enumerate(zip(paths, times, labels, strict=True)):
         truth.append(Stretch(now, now + float(t[-1]), label))
-        between = _between(x, paths[i + 1] if i + 1 < len(paths) else None, rng, step, extent, rests)
+        between, moving = _between(x, paths[i + 1] if i + 1 < len(paths) else None, rng, step, extent, rests)
         samples += [x, between]
         stamps += [now + t, now + t[-1] + step * np.arange(1, len(between) + 1)]
-        now += float(t[-1]) + step * (len(between) + 1)
+        now += float(t[-1])
+        if rests and moving.stop > moving.start:
+            transits.append(Stretch(now + moving.start * step, now + (moving.stop + 1) * step, None))
+        now += step * (len(between) + 1)
     recording = Trajectory(np.concatenate(stamps), np.concatenate(samples), name="concatenated")
-    return Concatenated(recording, tuple(truth))
+    return Concatenated(recording, tuple(truth), tuple(transits))
 
 
 def _rest(position: Array, rng: np.random.Generator, step: float, extent: float) -> Array:
@@ -101,17 +114,19 @@ def _rest(position: Array, rng: np.random.Generator, step: float, extent: float)
 
 def _between(
     ending: Array, following: Array | None, rng: np.random.Generator, step: float, extent: float, rests: bool
-) -> Array:
-    """What lies between two movements."""
+) -> tuple[Array, slice]:
+    """What lies between two movements, and which of its samples are in transit."""
     if not rests:
-        return ending[:0] if following is None else _link(ending, following, rng, step)
+        link = ending[:0] if following is None else _link(ending, following, rng, step)
+        return link, slice(0, len(link))
     rest = _rest(ending[-1], rng, step, extent)
     if following is None:
-        return rest
+        return rest, slice(0, 0)
     second = following[:0] if rng.random() < _NO_REST_BEFORE else _rest(following[0], rng, step, extent)[::-1]
     goal = second[0] if len(second) else following[0]
     u = np.linspace(0.0, 1.0, max(3, round(rng.uniform(*_TRANSITS) / step)))[1:-1, None]
-    return np.concatenate((rest, rest[-1] + u**3 * (10 - 15 * u + 6 * u**2) * (goal - rest[-1]), second))
+    transit = rest[-1] + u**3 * (10 - 15 * u + 6 * u**2) * (goal - rest[-1])
+    return np.concatenate((rest, transit, second)), slice(len(rest), len(rest) + len(transit))
 
 
 def _link(ending: Array, following: Array, rng: np.random.Generator, step: float) -> Array:
