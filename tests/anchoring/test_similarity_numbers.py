@@ -8,7 +8,7 @@ from sklearn.utils import Bunch
 
 from kineme.anchoring.proposals.assign import agreement
 from kineme.anchoring.proposals.merge_split import suggest_merges
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.widths import SHARE, gap_widths

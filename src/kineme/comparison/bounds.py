@@ -87,8 +87,11 @@ def log_bounds(
     With ``x = P y + e``, and R a rotation within the limit, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
     ``d^2 >= |x_a|^2 + |x_b|^2 - 2 (max_R <y_a, R y_b> + |e_a| |e_b|)``, and an A-average grows with each kernel.
     In space the maximum is taken over all rotations, see `_over_rotations`.
+
+    Of an average with representations that are compared pair by pair, these are bounds of the average over the others.
     """
     n, m = len(asked[0].values), len(stored[0].values)
+    similarity = similarity.by_rows(len(stored))
     bounds = np.empty((n, m), dtype=np.float32)
     average: Any = LOG_MEANS[similarity.mean]  # Any keeps single precision
     log_weights = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
@@ -102,7 +105,10 @@ def log_bounds(
         logs = np.empty((len(stored), stop - start, n), dtype=np.float32)
         for r, block in enumerate(stored):
             half = np.float32(0.5 * (1.0 - _ROUNDING) / similarity.widths[r] ** 2)
-            most = _alignments(similarity.procrustes, scaled[r].values, block.values[start:stop])
+            # |a| is divided by sigma^2 as a whole, like every other factor of the side that is asked.
+            ours = np.asarray(np.sqrt(scaled[r].squares) / similarity.widths[r], dtype=np.float32)
+            norms = np.sqrt(block.squares[start:stop, None]) * ours
+            most = _alignments(similarity.procrustes, scaled[r].values, block.values[start:stop], norms)
             most += block.residual_norms[start:stop, None] * scaled[r].residual_norms
             most -= half * block.squares[start:stop, None]
             most -= np.float32(0.5 * (1.0 - _ROUNDING)) * scaled[r].squares - np.float32(log_weights[r])
@@ -113,17 +119,30 @@ def log_bounds(
     return bounds
 
 
-def _alignments(procrustes: Procrustes, A: Single, B: Single) -> Single:
-    """Largest inner products (m, n) of reduced features after rotation; in space, upper bounds of them."""
+def _alignments(procrustes: Procrustes, A: Single, B: Single, norms: Single) -> Single:
+    """Largest inner products (m, n) of reduced features after rotation; in space, upper bounds of them.
+
+    `norms` (m, n) are ``|a| |b|`` of the whole rows, on which the costs of rotations depend.
+    """
     d, n = procrustes.n_dims, len(A)
     if procrustes.max_angle == 0 or d == 1:
         return np.asarray(B @ A.T)
     if d == 2:
         x, y = np.split(A, 2, axis=1)  # with a = x + i y: real and imaginary part of sum_t a_t conj(b_t)
-        return _within(B @ A.T, B @ np.concatenate((y, -x), axis=1).T, procrustes.max_angle)
+        re, im = B @ A.T, B @ np.concatenate((y, -x), axis=1).T
+        if procrustes.prior is None:
+            return _within(re, im, procrustes.max_angle)
+        weights = np.float32(np.trace(procrustes.prior.matrix(2))) * norms
+        re += weights
+        return np.asarray(np.sqrt(re * re + im * im) - weights)
     k = A.shape[1] // 3
-    C = (B.reshape(-1, k) @ A.reshape(-1, k).T).reshape(len(B), 3, n, 3)
-    return _over_rotations(C.transpose(1, 3, 0, 2), np.linalg.norm(A, axis=1) * np.linalg.norm(B, axis=1)[:, None])
+    C = (B.reshape(-1, k) @ A.reshape(-1, k).T).reshape(len(B), 3, n, 3).transpose(1, 3, 0, 2)
+    most = np.linalg.norm(A, axis=1) * np.linalg.norm(B, axis=1)[:, None]
+    if procrustes.prior is None:
+        return _over_rotations(C, most)
+    F = procrustes.prior.matrix(3).astype(np.float32)
+    trace = np.float32(np.trace(F))
+    return _over_rotations(C + F[:, :, None, None] * norms, most + trace * norms) - trace * norms
 
 
 def _within(re: Single, im: Single, max_angle: float) -> Single:

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import Described, prepare
+from kineme.comparison.describe import prepare
+from kineme.comparison.described import Described
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import Representation
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 
@@ -57,8 +59,11 @@ class Comparison:
     @property
     def specification(self) -> ComparisonSpecification:
         """The same without widths and weights, so for other movements."""
-        angle = self.procrustes.max_angle
-        return ComparisonSpecification(self.representations, self.normalization, self.cutoff, angle, self.mean)
+        prior = self.procrustes.prior
+        angle = self.procrustes.max_angle if prior is None else None
+        return ComparisonSpecification(
+            self.representations, self.normalization, self.cutoff, angle, self.mean, prior or RotationPrior()
+        )
 
     def checked(self, movements: MovementsLike) -> Demonstrations:
         """The movements as `Demonstrations`.

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from kineme.comparison.described import Described, Pairs
+from kineme.comparison.representation import PAIR_QUANTITIES
 from kineme.comparison.specification import Compares, ComparisonSpecification, specification_of
 from kineme.errors import TrajectoryError
-from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.shapes import shapes_of
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -21,46 +23,6 @@ from kineme.validation import Array
 
 _TILE_SAMPLES = 200_000  # numbers in one tile of paths: with smaller ones, threads wait for each other
 N_POINTS = 199  # even samples from which the phases are computed; every second one is one of 100
-
-
-@dataclass(frozen=True, eq=False)
-class Described:
-    """n movements in each of R representations, ready for comparison.
-
-    Attributes
-    ----------
-    blocks : tuple of R Prepared
-        One block of n rows for each representation.
-    procrustes : Procrustes
-        The distance between rows.
-    mean : str
-        The A-average over representations.
-    """
-
-    blocks: tuple[Prepared, ...]
-    procrustes: Procrustes
-    mean: str = "arithmetic"
-
-    def __len__(self) -> int:
-        return len(self.blocks[0].rows)
-
-    @property
-    def n_dims(self) -> int:
-        """Number of dimensions d."""
-        return self.procrustes.n_dims
-
-    def take(self, chosen: Any) -> Described:
-        """The chosen movements: a slice, a mask or indices."""
-        return Described(tuple(block.take(chosen) for block in self.blocks), self.procrustes, self.mean)
-
-    def empty(self, n: int) -> Described:
-        """Room for n movements that are described in the same way."""
-        blocks = tuple(Prepared(*(np.empty((n, *one.shape[1:]), one.dtype) for one in block)) for block in self.blocks)
-        return Described(blocks, self.procrustes, self.mean)
-
-    def select(self, representations: Iterable[int]) -> Described:
-        """The same movements in some of the representations."""
-        return Described(tuple(self.blocks[r] for r in representations), self.procrustes, self.mean)
 
 
 def describe(movements: Described | MovementsLike, like: Compares | None = None) -> Described:
@@ -103,7 +65,7 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
     """
     how = specification_of(like)
     rows = np.asarray(rows)
-    widths = [n_dims * one.n_points for one in how.representations]
+    widths = [n_dims * one.n_points for one in how.by_rows]
     if rows.ndim != 2 or rows.shape[1] != sum(widths) or not len(rows):
         raise TrajectoryError(
             f"expected feature rows of shape (n, {sum(widths)}) for {n_dims} dimensions and {len(widths)} "
@@ -113,18 +75,28 @@ def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None)
 
 
 def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes) -> Described:
-    """Rows (n, d * S), one block per representation, ready for comparison.
+    """Rows (n, d * S), one block per representation that is compared sample by sample, ready for comparison.
 
     In single precision: comparing with many stored movements is bound by memory, and widths are far above its error.
+    What is compared pair by pair is made from the positions over arc length.
     """
+    how, rows = like.specification, tuple(rows)
     blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
-    return Described(blocks, procrustes, like.specification.mean)
+    if not how.by_pairs:
+        return Described(blocks, procrustes, how.mean)
+    r = next(r for r, one in enumerate(how.by_rows) if one.quantity == "positions" and one.arc_share == 1)
+    shapes = shapes_of(rows[r].reshape(len(rows[r]), procrustes.n_dims, -1))
+    measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
+    return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures))
 
 
 def feature_rows(movements: MovementsLike, specification: ComparisonSpecification) -> tuple[Array, ...]:
-    """Smooth movements and describe them: rows (n, d * S) per representation, in double precision."""
+    """Smooth movements and describe them, in double precision.
+
+    Rows (n, d * S) for each representation that is compared sample by sample.
+    """
     demos = Demonstrations.of(movements)
-    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.representations)
+    rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.by_rows)
 
     def fill(start: int, stop: int) -> None:
         for block, tile in zip(rows, _tile_rows(demos, start, stop, specification, np.float64)[1], strict=True):
@@ -191,7 +163,7 @@ def _tile_rows(
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
     normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
-    for one in how.representations:
+    for one in how.by_rows:
         phase = (one.arc_share, one.n_points)
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(one.along(paths), dtype)

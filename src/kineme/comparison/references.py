@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
 

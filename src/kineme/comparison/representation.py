@@ -1,4 +1,4 @@
-"""Representations of movements: a quantity along a phase."""
+"""Representations of movements: a quantity along a phase, compared sample by sample or as a whole."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.normalization import Normalization
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.spline import spline_matrix
@@ -18,7 +19,14 @@ from kineme.primitives.discrete.operators import encoder, forcing_matrix
 from kineme.primitives.discrete.specification import MOST_POINTS
 from kineme.validation import Array, check_choice, check_count, check_number
 
-QUANTITIES = ("positions", "forcing")
+#: Compared sample by sample: a movement is a row of numbers.
+ROW_QUANTITIES = ("positions", "forcing")
+#: Compared pair by pair, see `kineme.kernels.pair_distances`.
+PAIR_QUANTITIES = ("elastic", "turning", "cloud")
+QUANTITIES = ROW_QUANTITIES + PAIR_QUANTITIES
+
+
+PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "point cloud"}
 
 
 @dataclass(frozen=True)
@@ -35,19 +43,22 @@ class Representation:
         DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
     arc_share : float
         The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
-        timing; time distinguishes movements that differ in timing only.
+        timing; time distinguishes movements that differ in timing only. What is compared pair by pair takes arc length.
     n_points : int, default 100
         Samples along the phase.
     n_basis, stiffness, ridge
         Of the DMP.
+    weight : float, default 1.0
+        Share in the average where no weights are given or fitted, relative to those of the others.
     """
 
     quantity: str
-    arc_share: float
+    arc_share: float = 1.0
     n_points: int = 100
     n_basis: int = 40
     stiffness: float = 100.0
     ridge: float = 1e-3
+    weight: float = 1.0
 
     def __post_init__(self) -> None:
         check_choice("quantity", self.quantity, QUANTITIES)
@@ -58,10 +69,20 @@ class Representation:
         check_count("n_basis", self.n_basis, 3, most=MOST_BASIS)
         check_number("stiffness", self.stiffness, above=0.0)
         check_number("ridge", self.ridge, least=0.0)
+        check_number("weight", self.weight, above=0.0)
+        if self.in_pairs and self.arc_share != 1:
+            raise SpecificationError(f"expected arc_share=1 with quantity={self.quantity!r}, got {self.arc_share!r}")
+
+    @property
+    def in_pairs(self) -> bool:
+        """Whether movements are compared pair by pair, and not sample by sample."""
+        return self.quantity in PAIR_QUANTITIES
 
     @property
     def name(self) -> str:
         """As in "forcing over arc length"."""
+        if self.in_pairs:
+            return PAIR_NAMES[self.quantity]
         phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
         return f"{self.quantity} over {phase}"
 
@@ -87,12 +108,29 @@ class Representation:
         return described.reshape(len(paths), -1)
 
 
-#: Three representations that fail on different movements; in an average of kernels one that succeeds suffices.
+#: What gives the rotation of a pair, and the points of which elastic paths and point clouds consist.
+POSITIONS = Representation("positions", arc_share=1.0, weight=2.0)
+#: Representations that fail on different movements; in an average of kernels one that succeeds suffices. Those of the
+#: whole shape count twice. `python -m bench --only default_representations` tells what each is worth.
 DEFAULT_REPRESENTATIONS = (
+    POSITIONS,
+    Representation("forcing", arc_share=0.0),
+    Representation("elastic", weight=2.0),
+    Representation("turning"),
+    Representation("cloud", weight=2.0),
+)
+#: Where position or size distinguishes movements: none of these takes it out by itself.
+ROW_REPRESENTATIONS = (
     Representation("positions", arc_share=1.0),
     Representation("forcing", arc_share=1.0),
     Representation("forcing", arc_share=0.0),
 )
+
+
+def default_representations(normalization: Normalization) -> tuple[Representation, ...]:
+    """Those of a recognizer: of the whole shape, unless position or size distinguishes movements."""
+    shape_alone = normalization.translation and normalization.scale != "none"
+    return DEFAULT_REPRESENTATIONS if shape_alone else ROW_REPRESENTATIONS
 
 
 def check_representations(representations: Any) -> tuple[Representation, ...]:
@@ -106,7 +144,13 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
             "expected representations to be a tuple of kineme.comparison.representation.Representation, one or more, "
             f"or None for the default ones, got {representations!r}"
         )
-    return given
+    gives_rotation = any(one.quantity == "positions" and one.arc_share == 1 for one in given)
+    if any(one.in_pairs for one in given) and not gives_rotation:
+        raise SpecificationError(
+            "expected Representation('positions', arc_share=1.0) beside those that are compared pair by pair, whose "
+            "rotation it gives; add it"
+        )
+    return tuple(sorted(given, key=lambda one: one.in_pairs))  # the order within each sort stays
 
 
 @lru_cache(maxsize=32)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described, Tile, for_described
+from kineme.comparison.describe import Tile, for_described
+from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS, SHARES
 from kineme.comparison.references import References
 from kineme.movements.trajectories.demonstrations import Demonstrations

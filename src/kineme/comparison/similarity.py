@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
+from kineme.comparison.distances import squared_distances
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import gap_widths
@@ -47,15 +49,15 @@ class AveragedSimilarity:
     weights: Array | None = None
 
     def squared_distances(self, A: Described, B: Described) -> Array:
-        """Squared Procrustes distances in each representation, shape (R, n, m)."""
-        pairs = zip(A.blocks, B.blocks, strict=True)
-        return np.stack([self.procrustes.squared_distances(a, b) for a, b in pairs])
+        """Squared distances in each representation, shape (R, n, m)."""
+        return squared_distances(A, B)
 
     def logs_at(self, squares: Array) -> Array:
         """Logarithms of each representation's kernel times R times its weight, of squared distances (R, n, m)."""
         logs = np.asarray(squares / (-2.0 * self.widths**2)[:, None, None])
         if self.weights is not None and (self.weights != self.weights[0]).any():
-            logs += np.log(len(logs) * self.weights)[:, None, None]
+            with np.errstate(divide="ignore"):  # positions of weight 0, which give the rotation
+                logs += np.log(len(logs) * self.weights)[:, None, None]
         return logs
 
     def logs(self, A: Described, B: Described) -> Array:
@@ -65,6 +67,11 @@ class AveragedSimilarity:
     def log_average(self, A: Described, B: Described) -> Array:
         """Logarithms of the averaged kernel, shape (n, m)."""
         return LOG_MEANS[self.mean](self.logs(A, B))
+
+    def by_rows(self, n: int) -> AveragedSimilarity:
+        """The average over the first n representations alone."""
+        weights = None if self.weights is None else self.weights[:n] / self.weights[:n].sum()
+        return self if n == len(self.widths) else replace(self, widths=self.widths[:n], weights=weights)
 
     def widened(self, factor: float) -> AveragedSimilarity:
         """The same average of kernels `factor` times as wide."""
@@ -100,10 +107,10 @@ def averaged(described: Described, widths: ArrayLike | None = None) -> AveragedS
         Not one positive width for each representation.
     """
     sigma = gap_widths(described) if widths is None else np.asarray(widths, dtype=np.float64)
-    if sigma.shape != (len(described.blocks),) or not (np.isfinite(sigma).all() and (sigma > 0).all()):
+    n = described.n_representations
+    if sigma.shape != (n,) or not (sigma > 0).all():
         raise SpecificationError(
-            f"expected widths to be {len(described.blocks)} numbers above 0, one for each representation, "
-            f"got {widths!r}"
+            f"expected widths to be {n} numbers above 0, one for each representation, got {widths!r}"
         )
     return AveragedSimilarity(described.procrustes, sigma, described.mean)
 

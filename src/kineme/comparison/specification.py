@@ -11,6 +11,7 @@ from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation, check_representations
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.smooth import Smooth
 from kineme.validation import check_choice, check_number
 
@@ -24,15 +25,19 @@ class ComparisonSpecification:
     Parameters
     ----------
     representations : tuple of R Representation
-        By default positions over arc length, forcing term over arc length, forcing term over time.
+        Those compared sample by sample first. By default positions over arc length, forcing term over time, elastic
+        path, turning angles, and point cloud.
     normalization : Normalization
         The normalization of translation and size.
     cutoff : float or None, default 10.0
         Movements are smoothed below this many cycles each, see `Smooth`; None for recordings without noise.
     max_angle : float, optional
-        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0.
+        Largest rotation [rad] between movements of one class, instead of the prior; 0 for none.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
+    prior : RotationPrior or None
+        How rare rotations are, in two and three dimensions, if there is no `max_angle`. None is the default of earlier
+        versions, a limit of pi/3.
 
     Raises
     ------
@@ -45,6 +50,7 @@ class ComparisonSpecification:
     cutoff: float | None = 10.0
     max_angle: float | None = None
     mean: str = "arithmetic"
+    prior: RotationPrior | None = field(default_factory=RotationPrior)
 
     def __post_init__(self) -> None:
         check_choice("mean", self.mean, list(LOG_MEANS))
@@ -53,6 +59,21 @@ class ComparisonSpecification:
         object.__setattr__(self, "representations", check_representations(self.representations))
         if self.max_angle is not None:
             check_number("max_angle", self.max_angle, least=0.0)
+        if self.prior is not None and not isinstance(self.prior, RotationPrior):
+            raise SpecificationError(
+                f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
+                "kineme.RotationPrior(concentration=0.03)"
+            )
+
+    @property
+    def by_rows(self) -> tuple[Representation, ...]:
+        """The representations that are compared sample by sample; they come first."""
+        return tuple(one for one in self.representations if not one.in_pairs)
+
+    @property
+    def by_pairs(self) -> tuple[Representation, ...]:
+        """The representations that are compared pair by pair."""
+        return self.representations[len(self.by_rows) :]
 
     @property
     def specification(self) -> ComparisonSpecification:
@@ -61,9 +82,14 @@ class ComparisonSpecification:
 
     def procrustes(self, n_dims: int) -> Procrustes:
         """The distance between rows of movements of `n_dims` dimensions."""
+        if self.max_angle is not None and self.max_angle >= math.pi and n_dims in (2, 3):
+            check_number("max_angle", self.max_angle, most=math.pi + 1e-12)
+            return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
         if self.max_angle is not None:
             return Procrustes(n_dims, float(self.max_angle))
-        return Procrustes(n_dims, math.pi / 3 if n_dims in (2, 3) else 0.0)
+        if n_dims not in (2, 3):
+            return Procrustes(n_dims, 0.0)
+        return Procrustes(n_dims, math.pi / 3 if self.prior is None else math.pi, self.prior)
 
 
 class Compares(Protocol):

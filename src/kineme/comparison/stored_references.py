@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.bounds import ReducedFeatures, Single, log_bounds
-from kineme.comparison.describe import Described
+from kineme.comparison.describe import prepare
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.specification import ComparisonSpecification
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -34,6 +36,8 @@ class StoredReferences:
         Rows of the reduced features that belong to a class, ordered by class.
     first : ndarray of shape (C,)
         Where in `members` each class begins.
+    specification : ComparisonSpecification
+        How the features are described.
     features : callable
         From rows of the reduced features to their feature rows per representation, see `describe.feature_rows`.
     movements : callable
@@ -44,6 +48,7 @@ class StoredReferences:
     reduced: tuple[tuple[ReducedFeatures, ...], ...]
     members: Rows
     first: Rows
+    specification: ComparisonSpecification
     features: Callable[[Rows], tuple[NDArray[Any], ...]]
     movements: Callable[[Rows], Demonstrations]
 
@@ -73,8 +78,7 @@ class StoredReferences:
 
     def described(self, similarity: AveragedSimilarity, rows: Rows) -> Described:
         """The movements of some rows, ready for comparison."""
-        blocks = tuple(map(similarity.procrustes.prepare, self.features(rows)))
-        return Described(blocks, similarity.procrustes, similarity.mean)
+        return prepare(self.features(rows), self.specification, similarity.procrustes)
 
 
 class HeldReferences:
@@ -109,11 +113,9 @@ class HeldReferences:
         new = self._stored.described(self._similarity, missing)
         if self._held is None:
             self._held = new.empty(_HELD)
-        stop = self._n_held + len(missing)
-        for ours, theirs in zip(self._held.blocks, new.blocks, strict=True):
-            ours.rows[self._n_held : stop], ours.squares[self._n_held : stop] = theirs
-        self._at[missing] = np.arange(self._n_held, stop) + 1
-        self._n_held = stop
+        self._held.put(self._n_held, new)
+        self._at[missing] = np.arange(self._n_held, self._n_held + len(missing)) + 1
+        self._n_held += len(missing)
 
 
 @dataclass(frozen=True, eq=False)

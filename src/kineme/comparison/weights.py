@@ -1,55 +1,61 @@
-"""Weights of the representations: given, equal, or fitted to the training movements where these suffice."""
+"""Weights of the representations: their own, equal, fitted to the training movements, or given."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.describe import Described
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.described import Described
+from kineme.comparison.representation import Representation
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
-ENOUGH = 8  # demonstrations of every class from which on weights are fitted
 _ROWS = 500  # movements that they are fitted to, at most
 _LEAST = 0.02  # smaller weights become 0, to save the time of their representation
-_DEFAULTS = 0.5  # of the weight always belongs to the default representations
+_OWN = 0.5  # of the fitted weight always belongs to the representations' own weights
 
-#: Representations whose weights are fitted by default: both quantities over time, arc length, and between.
-CANDIDATES = (
-    *DEFAULT_REPRESENTATIONS,
-    Representation("positions", arc_share=0.0),
-    Representation("positions", arc_share=0.5),
-    Representation("forcing", arc_share=0.5),
-)
+Representations = tuple[Representation, ...]
 
 
-def suffices(per_class: NDArray[Any]) -> bool:
-    """Whether there are enough demonstrations of every class to fit weights."""
-    return len(per_class) > 1 and int(per_class.min()) >= ENOUGH
+def own_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """The weights of the representations themselves, in the arithmetic mean; equal ones in the others."""
+    own = np.array([one.weight for one in representations]) if similarity.mean == "arithmetic" else None
+    return equal_weights(similarity, described, labels, representations) if own is None else own / own.sum()
+
+
+def equal_weights(
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
+) -> Array:
+    """The same weight for each."""
+    return np.full(len(representations), 1.0 / len(representations))
 
 
 def fitted_weights(
-    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], n_defaults: int
+    similarity: AveragedSimilarity, described: Described, labels: NDArray[Any], representations: Representations
 ) -> Array:
-    """Half of the weight as `aligned_weights` fits it, half shared equally by the first `n_defaults` representations.
+    """Half of the weight as `aligned_weights` fits it, half as the representations' own weights.
 
-    The fitted weights are those of representations that separate the training movements. A default representation
-    that does not help on them may still be needed for perturbations that they do not contain, so the defaults always
-    keep half of the weight.
+    The fitted weights are those of representations that separate the training movements. A representation that does
+    not help on them may still be needed for perturbations that they do not contain, so each keeps half of its own.
 
-    Returns
-    -------
-    ndarray of shape (R,)
-        Summing to 1.
+    Raises
+    ------
+    SpecificationError
+        Another mean than the arithmetic one, which weights are fitted for.
     """
-    defaults = np.arange(len(described.blocks)) < n_defaults
-    fitted = aligned_weights(similarity, described, labels)
-    return np.asarray((1.0 - _DEFAULTS) * fitted + _DEFAULTS * defaults / n_defaults)
+    if similarity.mean != "arithmetic":
+        raise SpecificationError(
+            f"expected weights='fitted' with mean='arithmetic', got it with mean={similarity.mean!r}"
+        )
+    own = own_weights(similarity, described, labels, representations)
+    return np.asarray((1.0 - _OWN) * aligned_weights(similarity, described, labels) + _OWN * own)
 
 
 def aligned_weights(similarity: AveragedSimilarity, described: Described, labels: NDArray[Any]) -> Array:
@@ -83,7 +89,7 @@ def aligned_weights(similarity: AveragedSimilarity, described: Described, labels
     weights, _ = nnls(kernels, _centered(same))
     weights = np.where(weights >= _LEAST * weights.sum(), weights, 0.0)
     if not weights.any():  # no kernel is aligned with that of the labels
-        return np.full(len(described.blocks), 1.0 / len(described.blocks))
+        return np.full(described.n_representations, 1.0 / described.n_representations)
     return np.asarray(weights / weights.sum())
 
 
@@ -101,11 +107,19 @@ def given_weights(weights: ArrayLike, n: int) -> Array:
         array = np.empty(0)
     if array.shape != (n,) or not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise SpecificationError(
-            f"expected weights to be 'auto', 'equal' or {n} numbers from 0, not all 0, one for each representation, "
-            f"got {weights!r}"
+            f"expected weights to be 'auto', 'equal', 'fitted' or {n} numbers from 0, not all 0, one for each "
+            f"representation, got {weights!r}"
         )
     array = array / array.max()  # so that the sum does not overflow
     return np.asarray(array / array.sum())
+
+
+#: Name -> what computes the weights (R,), summing to 1.
+WEIGHTS: dict[str, Callable[[AveragedSimilarity, Described, NDArray[Any], Representations], Array]] = {
+    "auto": own_weights,
+    "equal": equal_weights,
+    "fitted": fitted_weights,
+}
 
 
 def _centered(gram: Array) -> Array:

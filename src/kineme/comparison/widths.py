@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
+from kineme.comparison.distances import squared_distances
 from kineme.errors import SpecificationError
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
-SHARE = 0.35
+SHARE = 0.4
+BEGUN_SHARE = 0.35  # the same for beginnings
+_GAP_SHARE = 0.35  # of the typical distance to the first movement beyond a gap
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
 _SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
 _COPIES = 1e-5  # share of the size; unlabeled movements at smaller distances are copies
@@ -23,8 +26,8 @@ _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
 def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     """Width sigma_r of each representation: a share of the typical distance to the nearest movement of another class.
 
-    At 0.35 of it, a movement at the distance of an impostor has a similarity of exp(-4), under 0.02: only movements
-    closer than the nearest impostor have an influence. With one class, any other movement is the impostor. If classes
+    At 0.4 of it, a movement at the distance of an impostor has a similarity of exp(-3), under 0.05: movements closer
+    than the nearest impostor have nearly all influence. With one class, any other movement is the impostor. If classes
     coincide, as N and Z do under any rotation, the width is a hundredth of the movements' size. Estimated from at most
     500 evenly spaced movements, which bounds the cost.
 
@@ -39,16 +42,15 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
     """
     chosen = evenly_spaced(len(labels), _ROWS)
     some, owners = described.take(chosen), labels[chosen]
-    widths = []
-    for r, nearest in enumerate(_nearest_of_others(some, owners, chosen)):
-        size = _typical_size(some, r)
-        width = _share_of_median(nearest, _SAME * size)
-        if width is None:
-            raise SpecificationError(
-                "expected training movements that differ, got one movement or all the same; add demonstrations"
-            )
-        widths.append(max(width, _LEAST * size))
-    return np.array(widths)
+    sizes = some.sizes()
+    nearest = zip(_nearest_of_others(some, owners, chosen), sizes, strict=True)
+    widths = [_share_of_median(one, _SAME * size, SHARE) for one, size in nearest]
+    if all(width is None for width in widths):
+        raise SpecificationError(
+            "expected training movements that differ, got one movement or all the same; add demonstrations"
+        )
+    # Movements that do not differ in one representation have a similarity of 1 there.
+    return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:
@@ -61,7 +63,9 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
-    found = [_share_of_median(one, 0.0) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
+    found = [
+        _share_of_median(one, 0.0, BEGUN_SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
+    ]
     return np.array([_NO_IMPOSTOR if width is None else width for width in found])
 
 
@@ -94,24 +98,23 @@ def gap_widths(described: Described) -> Array:
         )
     chosen = evenly_spaced(n, _ROWS)
     widths = []
-    for r, block in enumerate(described.blocks):
-        squares = described.procrustes.squared_distances(block.take(chosen), block)
+    for squares, same in zip(
+        squared_distances(described.take(chosen), described), _COPIES * described.sizes(), strict=True
+    ):
         squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
-        same = _COPIES * _typical_size(described, r)
-        width = _share_of_median(_beyond_the_gap(np.sqrt(np.sort(squares, axis=1)[:, 1:]), same), same)
-        if width is None:
-            raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
-        widths.append(width)
-    return np.array(widths)
+        ordered = np.sqrt(np.maximum(np.sort(squares, axis=1)[:, 1:], 0.0))
+        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, _GAP_SHARE))
+    if all(width is None for width in widths):
+        raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
+    return np.array([np.inf if width is None else width for width in widths])
 
 
 def median_distances(described: Described) -> Array:
     """Median distance of two different movements in each representation, (R,); NaN for one movement."""
     pairs = ~np.eye(len(described), dtype=bool)
     if not pairs.any():
-        return np.full(len(described.blocks), np.nan)
-    between = (described.procrustes.squared_distances(block, block)[pairs] for block in described.blocks)
-    return np.array([np.sqrt(np.median(squares)) for squares in between])
+        return np.full(described.n_representations, np.nan)
+    return np.array([np.sqrt(np.median(squares[pairs])) for squares in squared_distances(described, described)])
 
 
 def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: NDArray[np.generic]) -> list[Array]:
@@ -120,22 +123,16 @@ def _nearest_of_others(described: Described, owners: NDArray[np.generic], each: 
     if own.all():
         own = each[:, None] == each
     found = []
-    for block in described.blocks:
-        squares = described.procrustes.squared_distances(block, block)
+    for squares in squared_distances(described, described):
         squares[own] = np.inf
         found.append(np.sqrt(squares.min(axis=1, initial=np.inf)))
     return found
 
 
-def _share_of_median(distances: Array, same: float) -> float | None:
-    """The share of the median of those distances that are finite and above `same`; None if none is."""
+def _share_of_median(distances: Array, same: float, share: float) -> float | None:
+    """The `share` of the median of those distances that are finite and above `same`; None if none is."""
     apart = distances[np.isfinite(distances) & (distances > same)]
-    return SHARE * float(np.median(apart)) if len(apart) else None
-
-
-def _typical_size(described: Described, r: int) -> float:
-    """Median norm of the rows of one representation."""
-    return float(np.sqrt(np.median(described.blocks[r].squares)))
+    return share * float(np.median(apart)) if len(apart) else None
 
 
 def _beyond_the_gap(ordered: Array, same: float) -> Array:

@@ -1,4 +1,4 @@
-"""Procrustes distances: after the best rotation by at most a given angle."""
+"""Procrustes distances: after the best rotation, by at most a given angle or under a prior."""
 
 from __future__ import annotations
 
@@ -12,9 +12,20 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.kernels.rotation import best_products, best_rotations, half_angle
+from kineme.kernels.soft_rotation import (
+    RotationPrior,
+    limited,
+    soft_products,
+    soft_products_in_plane,
+    soft_rotations,
+    turned,
+)
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles, single_threaded_blas
 from kineme.validation import Array, check_number
+
+#: Writes of a block of products (3 n, 3 m), norms (n,), (m,): best products (n, m), and rotations (n, m, 3, 3).
+Filler = Callable[[NDArray[Any], Array, Array, Array, NDArray[Any]], None]
 
 
 class Prepared(NamedTuple):
@@ -27,16 +38,22 @@ class Prepared(NamedTuple):
         """The chosen rows."""
         return Prepared(self.rows[chosen], self.squares[chosen])
 
+    def empty(self, n: int) -> Prepared:
+        """Room for n rows."""
+        return Prepared(*(np.empty((n, *one.shape[1:]), one.dtype) for one in self))
+
 
 @dataclass(frozen=True)
 class Procrustes:
-    """Squared distance of two movements after the best rotation of one of them by at most `max_angle`.
+    """Squared distance of two movements after the best rotation of one of them.
 
     ``d(A, B)^2 = min_R |A - R B|^2 = |A|^2 + |B|^2 - 2 max_R <A, R B>`` over rotations R (no mirror images) by
-    at most `max_angle`. In the plane, with ``z = x + i y``, ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``:
-    one complex matrix product for all pairs. In space, one real matrix product for all pairs, and a quadratic form of
-    unit quaternions for each, see `kernels.rotation`. In one dimension, and with ``max_angle = 0``, it is the Euclidean
-    distance.
+    at most `max_angle`. With a `prior`, any rotation is allowed and a large one costs: ``<A, R B>`` is replaced by
+    ``<A, R B> + |A| |B| (tr(R^T F) - tr F)``, see `kernels.soft_rotation`. In the plane, with ``z = x + i y``,
+    ``<A, R B> = Re(exp(-i angle) sum_t a_t conj(b_t))``: one complex matrix product for all pairs. In space, one real
+    matrix product for all pairs, and a small problem for each: a quadratic form of unit quaternions with a limit, see
+    `kernels.rotation`, the root of a quartic with a prior. In one dimension, and with ``max_angle = 0``, it is the
+    Euclidean distance.
 
     Parameters
     ----------
@@ -45,6 +62,8 @@ class Procrustes:
     max_angle : float
         Largest rotation [rad], 0 to pi. Choose it as small as the application allows: with pi, N and Z are the
         same, and with more than a right angle, V and caret. Beyond three dimensions only 0 is possible.
+    prior : RotationPrior, optional
+        Instead of a limit, with ``max_angle=pi``, in two and three dimensions.
 
     References
     ----------
@@ -53,6 +72,7 @@ class Procrustes:
 
     n_dims: int
     max_angle: float = math.pi / 3
+    prior: RotationPrior | None = None
 
     def __post_init__(self) -> None:
         check_number("max_angle", self.max_angle, least=0.0, smallest=0.0)
@@ -62,6 +82,13 @@ class Procrustes:
             raise SpecificationError(
                 f"expected max_angle=0 beyond three dimensions, got {self.max_angle!r} with {self.n_dims} dimensions"
             )
+        if self.prior is not None:
+            if self.n_dims not in (2, 3) or self.max_angle < math.pi - 1e-12:
+                raise SpecificationError(
+                    "expected a prior with max_angle=pi in two or three dimensions, got one with "
+                    f"max_angle={self.max_angle!r} and {self.n_dims} dimensions; leave the prior out"
+                )
+            self.prior.matrix(self.n_dims)
 
     def prepare(self, rows: Array) -> Prepared:
         """Rows (n, d * S) in the form that comparisons need, so that stored movements are converted once.
@@ -77,17 +104,49 @@ class Procrustes:
         return np.maximum(norms - 2.0 * self.alignment(A, B), 0.0)
 
     def alignment(self, A: Prepared, B: Prepared) -> Array:
-        """The largest inner products ``<A, R B>`` (n, m) over the rotations allowed."""
+        """The largest inner products ``<A, R B>`` (n, m) over the rotations allowed, less what they cost."""
         if self.max_angle == 0 or self.n_dims == 1:
             return np.asarray(A.rows @ B.rows.T)
         if self.n_dims == 2:
-            return _within(_products(A.rows, B.rows), self.max_angle)  # the angle's sign does not matter here
-        return _aligned_in_space(A.rows, B.rows, self.max_angle)
+            parts = _products(A.rows, B.rows)
+            if self.prior is None:
+                return _within(parts, self.max_angle)  # the angle's sign does not matter here
+            return soft_products_in_plane(_double(parts[0]), _double(parts[1]), self._weights(A, B))[0]
+        if self.prior is None:
+            return _in_space(A, B, self._hard_filler(len(A.rows) * len(B.rows)))[0]
+        return _in_space(A, B, self._soft_filler(len(A.rows) * len(B.rows)))[0]
+
+    def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
+        """The same, and the rotations that bring B closest to A.
+
+        Under a limit in space, these are the best free rotations, turned back to the limit.
+
+        Returns
+        -------
+        alignment : ndarray of shape (n, m)
+        rotations : ndarray of shape (n, m, 2) with cosine and sine in the plane, (n, m, 3, 3) in space, None without
+        """
+        if self.max_angle == 0 or self.n_dims not in (2, 3):
+            return self.alignment(A, B), None
+        if self.n_dims == 2:
+            re, im = map(_double, _products(A.rows, B.rows))
+            if self.prior is None:
+                angle = np.clip(np.arctan2(-im, re), -self.max_angle, self.max_angle)
+                c, s = np.cos(angle), np.sin(angle)
+                return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
+            best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
+            return best, np.stack((c, -s), -1).astype(np.float32)
+        n_pairs = len(A.rows) * len(B.rows)
+        best, rotations = _in_space(A, B, self._soft_filler(n_pairs, rotations=True), rotations=True)
+        if self.prior is None and rotations is not None:
+            return self.alignment(A, B), limited(rotations, self.max_angle)
+        return best, rotations
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
+        A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
@@ -99,6 +158,40 @@ class Procrustes:
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
         return best_rotations(C, self.max_angle)
+
+    def _weights(self, A: Prepared, B: Prepared) -> Array:
+        """``|A| |B| tr F``, (n, m)."""
+        assert self.prior is not None
+        return np.asarray(np.trace(self.prior.matrix(2)) * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
+
+    def _hard_filler(self, n_pairs: int) -> Filler:
+        """What writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
+        if use_compiled(n_pairs * _PAIR_OPERATIONS):
+            fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
+            return lambda products, a, b, best, R: fill_best_products(products, *half_angle(self.max_angle), best)
+
+        def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
+            best[:] = best_products(_covariances(products), self.max_angle).reshape(best.shape)
+
+        return fill
+
+    def _soft_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
+        """The same under a prior, or under none, and rotations."""
+        F = np.zeros((3, 3)) if self.prior is None else self.prior.matrix(3)
+        if use_compiled(n_pairs * _PAIR_OPERATIONS):
+            soft = compiled_module("kineme.kernels._soft_rotation")
+            if rotations:
+                return lambda products, a, b, best, R: soft.fill_soft_rotations(products, a, b, F, best, R)
+            return lambda products, a, b, best, R: soft.fill_soft_products(products, a, b, F, best)
+
+        def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
+            norms = (a[:, None] * b).ravel()
+            M = turned(_covariances(products), norms, F)
+            best[:] = (soft_products(M) - norms * np.trace(F)).reshape(best.shape)
+            if rotations:
+                R[:] = soft_rotations(M).reshape(R.shape)
+
+        return fill
 
 
 _ROWS_AT_ONCE = 256
@@ -174,37 +267,36 @@ _PAIRS = 20_000  # covariances at a time: their intermediate results fit the cac
 _PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
 
 
-def _aligned_in_space(A: NDArray[Any], B: NDArray[Any], max_angle: float) -> Array:
-    """``best_products`` of the covariances ``A_i B_j^T`` (n, m), a tile of the longer side at a time."""
-    n, m = len(A), len(B)
-    a, b = A.reshape(n * 3, -1), B.reshape(m * 3, -1)
-    fill = _filler(n * m * _PAIR_OPERATIONS)
-    best = np.empty((n, m))
+def _double(part: NDArray[Any]) -> Array:
+    return part.astype(np.float64)
+
+
+def _in_space(
+    A: Prepared, B: Prepared, fill: Filler, rotations: bool = False
+) -> tuple[Array, NDArray[np.float32] | None]:
+    """What `fill` makes of the covariances ``A_i B_j^T`` (n, m), a tile of the longer side at a time."""
+    n, m = len(A.rows), len(B.rows)
+    a, b = A.rows.reshape(n * 3, -1), B.rows.reshape(m * 3, -1)
+    p, q = np.sqrt(A.squares), np.sqrt(B.squares)
+    best, R = np.empty((n, m)), np.empty((n, m, 3, 3) if rotations else (n, m, 0, 0), np.float32)
 
     def rows(start: int, stop: int) -> None:
-        fill(a[3 * start : 3 * stop] @ b.T, max_angle, best[start:stop])
+        some = slice(start, stop)
+        fill(a[3 * start : 3 * stop] @ b.T, p[some], q, best[some], R[some])
 
     def columns(start: int, stop: int) -> None:
-        part = b[3 * start : 3 * stop]
+        some, part = slice(start, stop), b[3 * start : 3 * stop]
         products = _few_products(a, part) if n < _MANY else a @ part.T
-        fill(products, max_angle, best[:, start:stop])
+        fill(products, p, q[some], best[:, some], R[:, some])
 
     if n >= m:
         for_tiles(rows, n, max(1, _PAIRS // m))
     else:
         for_tiles(columns, m, max(1, _PAIRS // n))
-    return best
+    return best, R if rotations else None
 
 
-def _filler(n_operations: int) -> Callable[[NDArray[Any], float, Array], None]:
-    """The function that writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
-    if use_compiled(n_operations):
-        fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
-        return lambda products, max_angle, best: fill_best_products(products, *half_angle(max_angle), best)
-
-    def fill(products: NDArray[Any], max_angle: float, best: Array) -> None:
-        n, m = best.shape
-        C = products.reshape(n, 3, m, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
-        best[:] = best_products(C, max_angle).reshape(n, m)
-
-    return fill
+def _covariances(products: NDArray[Any]) -> NDArray[Any]:
+    """A block of products (3 n, 3 m) as covariances (n m, 3, 3)."""
+    n, m = products.shape[0] // 3, products.shape[1] // 3
+    return products.reshape(n, 3, m, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)

@@ -133,6 +133,12 @@ class Shapes:
             cloud=self.cloud,
         )
 
+    def put(self, start: int, others: Shapes) -> None:
+        """Write other movements over those from `start` on."""
+        theirs = others.arrays()
+        for name, array in self.arrays().items():
+            array[start : start + len(others)] = theirs[name]
+
     def arrays(self) -> dict[str, Floats]:
         """The arrays by name."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("elastic", "cloud")}

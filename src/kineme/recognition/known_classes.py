@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.fit import fit_comparison, fit_to_references
 from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, score
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.comparison.weights import CANDIDATES
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, answers, known_labels
@@ -79,7 +78,7 @@ def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
         return KnownClasses(fitted.comparison_, fitted.references_, fitted.classifier_, calibration)
     demos = Demonstrations.of(known)
     labels = check_labels(demos, None)
-    return _known(*fit_comparison(ComparisonSpecification(), demos, labels, candidates=CANDIDATES), "auto")
+    return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
 
 
 def fit_known_classes(

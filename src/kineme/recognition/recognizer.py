@@ -13,14 +13,15 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.fit import fit_comparison
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.references import References
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.representation import Representation, default_representations
 from kineme.comparison.scores import Compared, Score, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.comparison.weights import CANDIDATES
+from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -35,17 +36,21 @@ if TYPE_CHECKING:
     from kineme.recognition.spotting import Spotted
 
 
+_PRIOR = RotationPrior()
+
+
 class Recognizer(ClassifierMixin, BaseEstimator):
     """Recognize movements by an average of kernels over several representations.
 
     Parameters
     ----------
     representations : tuple of Representation, optional
-        By default positions over arc length, forcing term over arc length, forcing term over time; where `weights`
-        are fitted, also positions over time and both over a blend of time and arc length.
+        By default positions over arc length, forcing term over time, elastic path, turning angles, and point cloud;
+        with ``translation=False`` or ``scale="none"`` positions over arc length, and the forcing term over arc length
+        and over time.
     max_angle : float, optional
-        Largest rotation [rad] between movements of one class; by default pi/3 in two and three dimensions, else 0. With
-        pi, N and Z become equal; above a right angle, V and caret.
+        Largest rotation [rad] between movements of one class, instead of the `rotation_prior`; 0 for none. With pi, N
+        and Z become equal; above a right angle, V and caret.
     scale : {"path", "per-dimension", "none"}, default "path"
         Normalization of the size, see `Normalization`. With "path", a dot and a circle become equal.
     translation : bool, default True
@@ -54,12 +59,17 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Smooth below this many cycles per movement first, see `Smooth`; None for recordings without noise.
     mean : {"arithmetic", "geometric", "harmonic", "quadratic", "min"}, default "arithmetic"
         The A-average over representations.
-    weights : {"auto", "equal"} or sequence of R numbers, default "auto"
-        Of the representations in the arithmetic mean. "auto" fits them to the training movements from eight of every
-        class on, see `kineme.comparison.weights.fitted_weights`; with fewer, or with another mean, they are equal.
+    weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
+        Of the representations in the arithmetic mean. "auto": their own; "fitted": half their own, half fitted to the
+        training movements, see `kineme.comparison.weights.fitted_weights`.
     classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
         "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
-        the SVM from eight demonstrations of every class on, up to 4000 in all, else the nearest.
+        the nearest.
+    rotation_prior : RotationPrior or None
+        How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
+        right angle costs 0.06 of the inner product of two equal paths, and none is forbidden. Pass
+        ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
+        is the default of earlier versions, ``max_angle=pi/3``.
 
     Attributes
     ----------
@@ -97,6 +107,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         mean: str = "arithmetic",
         classifier: str = "auto",
         weights: str | Sequence[float] = "auto",
+        rotation_prior: RotationPrior | None = _PRIOR,
     ) -> None:
         self.representations = representations
         self.max_angle = max_angle
@@ -106,17 +117,19 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.mean = mean
         self.classifier = classifier
         self.weights = weights
+        self.rotation_prior = rotation_prior
 
     @property
     def specification(self) -> ComparisonSpecification:
         """How movements are compared, by the parameters alone."""
-        given = self.representations
+        given, normalization = self.representations, Normalization(self.translation, self.scale)
         return ComparisonSpecification(
-            DEFAULT_REPRESENTATIONS if given is None else given,
-            Normalization(self.translation, self.scale),
+            default_representations(normalization) if given is None else given,
+            normalization,
             self.cutoff,
             self.max_angle,
             self.mean,
+            self.rotation_prior,
         )
 
     def fit(self, X: MovementsLike, y: ArrayLike | None = None) -> Self:
@@ -140,8 +153,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
-        candidates = CANDIDATES if self.representations is None else None
-        comparison, references = fit_comparison(specification, demos, labels, self.weights, candidates)
+        comparison, references = fit_comparison(specification, demos, labels, self.weights)
         classifier = fit_classifier(self.classifier, comparison, references)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.bounds import log_bounds
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
 from kineme.recognition.conformal import Calibration, ClassDistances, distances, score_classes, typical_scale

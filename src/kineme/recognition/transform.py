@@ -12,6 +12,7 @@ from kineme.comparison.alignment import fit_maps
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import even_paths, recorded_paths
 from kineme.comparison.references import IndexedMovements
+from kineme.comparison.representation import POSITIONS
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
@@ -74,7 +75,10 @@ def map_onto(
     paths : ndarray of shape (n, d, T)
         Of the movements, where they were recorded.
     """
-    phases = np.array([one.arc_share for one in comparison.representations])[share.argmax(axis=0)]
+    # Of two representations that are equally alike, the one with the larger weight has the larger share.
+    weights = comparison.similarity.weights
+    alike = share if weights is None else share / np.maximum(weights, np.finfo(float).tiny)[:, None]
+    phases = np.array([one.arc_share for one in comparison.representations])[alike.argmax(axis=0)]
     used, which = np.unique(example, return_inverse=True)  # one example may be that of many
     stored = references[used]
     examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]
@@ -82,7 +86,7 @@ def map_onto(
     found: dict[int, Transform] = {}
     for phase in np.unique(phases):
         chosen = np.flatnonzero(phases == phase)
-        positions = replace(comparison.representations[0], quantity="positions", arc_share=float(phase))
+        positions = replace(POSITIONS, arc_share=float(phase))
         ours, theirs = positions.along(examples[chosen]), positions.along(paths[chosen])
         maps = fit_maps(ours, theirs, comparison.normalization, comparison.procrustes)
         for i, matrix, shift, rotation, scale in zip(chosen.tolist(), *maps, strict=True):

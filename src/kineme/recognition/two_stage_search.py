@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from kineme.comparison.bounds import ReducedFeatures, Single, reduce_features
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described, describe_tile, recorded_paths
+from kineme.comparison.describe import describe_tile, recorded_paths
+from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
 from kineme.comparison.scores import Compared
@@ -34,10 +35,12 @@ _BOUNDS = 1_000_000  # bounds at a time, where that is more than the least
 class TwoStageSearch:
     """Recognition where only the reduced features of the references are in memory.
 
-    The best-ranked class is that of an exhaustive search as long as no more than 4096 movements are in doubt, their
-    bound above the similarity to the nearest one known. P-values are given for the 64 classes whose could be largest;
-    they are exact as long as no more than 256 others could be the nearest of their class, else not too small for
-    the nearest classes, and possibly too small for those far away.
+    Without representations that are compared pair by pair, the best-ranked class is that of an exhaustive search as
+    long as no more than 4096 movements are in doubt, their bound above the similarity to the nearest one known. With
+    them, as by default, it is the best among the most promising movements of all and of each class and some 256 more,
+    in the order of the bounds of the other representations. P-values are given for the 64 classes whose could be
+    largest; they are exact as long as no more than 256 others could be the nearest of their class, else not too small
+    for the nearest classes, and possibly too small for those far away.
 
     On bent handwriting (bench/library.py; two busy cores), of 500 movements asked among 200,000 in the plane and of 40
     among 20,000 in space, all were ranked as by comparing all; an answer took 20 ms and 33 ms of processor time.
@@ -112,10 +115,11 @@ class TwoStageSearch:
         owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         begins = np.flatnonzero(np.diff(owners, prepend=-1))
         near[owners[begins]] = np.maximum.reduceat(logs, begins)
-        doubtful = bounds > np.repeat(near, self.stored.counts)
+        in_pairs = bool(self.comparison.specification.by_pairs)  # what they add to the others is not bounded
+        doubtful = np.ones(len(bounds), bool) if in_pairs else bounds > np.repeat(near, self.stored.counts)
         doubtful[chosen] = False
         more = np.flatnonzero(doubtful)
-        decisive = int(np.count_nonzero(bounds[more] > logs.max()))
+        decisive = 0 if in_pairs else int(np.count_nonzero(bounds[more] > logs.max()))
         n_more = min(decisive, _MOST) + _OF_CLASSES
         if len(more) > n_more:
             more = np.sort(more[np.argpartition(-bounds[more], n_more)[:n_more]])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import similarities
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances

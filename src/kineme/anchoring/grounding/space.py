@@ -15,7 +15,8 @@ from warnings import warn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import averaged
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances

@@ -13,7 +13,8 @@ from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.propose import own_order
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.anchoring.clustering.clustering import Clusters, average_linkage, cuts
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.propose import own_order
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import averaged, compare, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError

@@ -10,7 +10,8 @@ from kineme.anchoring.clustering.number_of_clusters import count_clusters
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
-from kineme.comparison.describe import Described, describe
+from kineme.comparison.describe import describe
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.proposals.proposals import Proposals
-from kineme.comparison.describe import Described
+from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity, averaged, compare
 from kineme.validation import Array
 

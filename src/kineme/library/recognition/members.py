@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.comparison import Comparison
-from kineme.comparison.describe import Described, describe_rows
+from kineme.comparison.describe import describe_rows
+from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.stored_references import OnDemand
 from kineme.errors import SpecificationError

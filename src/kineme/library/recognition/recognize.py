@@ -82,7 +82,8 @@ def known_members(store: Store, members: Members) -> KnownClasses:
 def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:
     """The recognizer of a large library."""
     comparison = sample_comparison(store, members)
-    kept = [store.specification.representations.index(one) for one in comparison.representations]
+    how = comparison.specification
+    kept = [store.specification.comparison.by_rows.index(one) for one in how.by_rows]
     ends = np.cumsum(store.specification.widths(store.n_dims or 0))
 
     def features(rows: NDArray[np.intp]) -> tuple[NDArray[Any], ...]:
@@ -94,6 +95,7 @@ def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> Two
         tuple(tuple(block[r] for r in kept) for block in reduced.blocks),
         reduced.rows(members.ids),
         members.first,
+        how,
         features,
         lambda rows: read.movements(store, reduced.ids[rows]),
     )

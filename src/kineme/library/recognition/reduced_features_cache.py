@@ -119,7 +119,7 @@ def _layout(store: Store, n: int) -> tuple[list[tuple[type[Any], tuple[int, ...]
     """Types and shapes of the arrays in the file, in order, and their total bytes."""
     d = store.n_dims or 0
     parts: list[tuple[type[Any], tuple[int, ...]]] = [(np.int64, (n,))]
-    for one in store.specification.representations:
+    for one in store.specification.comparison.by_rows:
         k = min(N_REDUCED, one.n_points)
         parts += [(np.float64, (one.n_points, k)), (np.float32, (n, d * k)), (np.float32, (n,)), (np.float32, (n,))]
     return parts, sum(_size(*part) for part in parts)

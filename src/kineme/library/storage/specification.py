@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, Representation
+from kineme.comparison.representation import ROW_REPRESENTATIONS, Representation
 from kineme.comparison.specification import Compares, ComparisonSpecification
+from kineme.comparison.weights import WEIGHTS
 from kineme.errors import DataError, KinemeError, SpecificationError
+from kineme.kernels.soft_rotation import RotationPrior
 from kineme.library.storage.rows import parsed
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.persistence import specification_from_dict, specification_to_dict
@@ -61,7 +63,7 @@ class Specification:
 
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
         if isinstance(self.weights, str):
-            check_choice("weights", self.weights, ["auto", "equal"])
+            check_choice("weights", self.weights, list(WEIGHTS))
         elif len(self.weights) != len(self.representations):
             raise SpecificationError(f"expected {len(self.representations)} weights, got {len(self.weights)}")
         else:
@@ -92,7 +94,7 @@ class Specification:
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
         """Numbers per movement in the rows of each representation."""
-        return tuple(n_dims * one.n_points for one in self.representations)
+        return tuple(n_dims * one.n_points for one in self.comparison.by_rows)
 
     def recognizer(self) -> Recognizer:
         """A recognizer, not fitted, that compares and recognizes movements in this way."""
@@ -112,11 +114,16 @@ class Specification:
             "mean": how.mean,
             "classifier": self.classifier,
             "weights": self.weights,
+            "rotation_prior": how.prior,
         }
 
     def to_json(self) -> dict[str, str]:
         """Two documents: ``recognizer`` and ``dmp``."""
-        parameters = self._parameters() | {"representations": [asdict(one) for one in self.representations]}
+        prior = self.comparison.prior
+        parameters = self._parameters() | {
+            "representations": [asdict(one) for one in self.representations],
+            "rotation_prior": None if prior is None else asdict(prior),
+        }
         return {"recognizer": json.dumps(parameters), "dmp": json.dumps(specification_to_dict(self.dmp))}
 
     @classmethod
@@ -125,6 +132,12 @@ class Specification:
         try:
             parameters, dmp = parsed(meta["recognizer"]), parsed(meta["dmp"])
             parameters["representations"] = tuple(Representation(**one) for one in parameters["representations"])
+            if parameters.get("rotation_prior") is not None:
+                prior = parameters["rotation_prior"]
+                vertical = prior["vertical"]
+                parameters["rotation_prior"] = RotationPrior(
+                    prior["concentration"], None if vertical is None else tuple(vertical), prior["tilt"]
+                )
             made = cls._from_parameters(specification_from_dict(DMP, dmp), **parameters)
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             reason = error if isinstance(error, KinemeError) else f"{type(error).__name__}: {error}"
@@ -139,7 +152,7 @@ class Specification:
         cls,
         dmp: DMP,
         *,
-        representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS,
+        representations: tuple[Representation, ...] = ROW_REPRESENTATIONS,
         max_angle: float | None = None,
         scale: str = "path",
         translation: bool = True,
@@ -147,9 +160,11 @@ class Specification:
         mean: str = "arithmetic",
         classifier: str = "auto",
         weights: str | Sequence[float] = "auto",
+        rotation_prior: RotationPrior | None = None,
     ) -> Specification:
         """As `_parameters` gives them; earlier versions wrote some of them."""
-        how = ComparisonSpecification(representations, Normalization(translation, scale), cutoff, max_angle, mean)
+        normalization = Normalization(translation, scale)
+        how = ComparisonSpecification(representations, normalization, cutoff, max_angle, mean, rotation_prior)
         return cls(how, classifier, weights if isinstance(weights, str) else tuple(map(float, weights)), dmp)
 
 

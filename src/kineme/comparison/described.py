@@ -1,0 +1,108 @@
+"""Described movements: one block of rows per representation, and what is compared pair by pair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.kernels.shapes import Shapes
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """What n movements are compared by pair by pair.
+
+    Attributes
+    ----------
+    positions : Prepared
+        Positions over arc length, which give the rotation of a pair.
+    shapes : Shapes
+    measures : tuple of int
+        Which of the distances that `kineme.kernels.pair_distances` gives, in order.
+    """
+
+    positions: Prepared
+    shapes: Shapes
+    measures: tuple[int, ...]
+
+    def take(self, chosen: Any) -> Pairs:
+        """The chosen movements."""
+        return replace(self, positions=self.positions.take(chosen), shapes=self.shapes.take(chosen))
+
+    def empty(self, n: int) -> Pairs:
+        """Room for n movements."""
+        return replace(self, positions=self.positions.empty(n), shapes=self.shapes.empty(n))
+
+
+@dataclass(frozen=True, eq=False)
+class Described:
+    """n movements in each of R representations, ready for comparison.
+
+    Attributes
+    ----------
+    blocks : tuple of Prepared
+        One block of n rows for each representation that is compared sample by sample.
+    procrustes : Procrustes
+        The distance between rows.
+    mean : str
+        The A-average over representations.
+    pairs : Pairs or None
+        For the representations after those, which are compared pair by pair.
+    """
+
+    blocks: tuple[Prepared, ...]
+    procrustes: Procrustes
+    mean: str = "arithmetic"
+    pairs: Pairs | None = None
+
+    def __len__(self) -> int:
+        return len((self.blocks[0] if self.pairs is None else self.pairs.positions).rows)
+
+    @property
+    def n_representations(self) -> int:
+        """R."""
+        return len(self.blocks) + (0 if self.pairs is None else len(self.pairs.measures))
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return self.procrustes.n_dims
+
+    def take(self, chosen: Any) -> Described:
+        """The chosen movements: a slice, a mask or indices."""
+        blocks = tuple(block.take(chosen) for block in self.blocks)
+        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.take(chosen))
+
+    def empty(self, n: int) -> Described:
+        """Room for n movements that are described in the same way."""
+        blocks = tuple(block.empty(n) for block in self.blocks)
+        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.empty(n))
+
+    def put(self, start: int, others: Described) -> None:
+        """Write other movements over those from `start` on."""
+        rows = slice(start, start + len(others))
+        blocks = list(zip(self.blocks, others.blocks, strict=True))
+        if self.pairs is not None and others.pairs is not None:
+            blocks.append((self.pairs.positions, others.pairs.positions))
+            self.pairs.shapes.put(start, others.pairs.shapes)
+        for ours, theirs in blocks:
+            ours.rows[rows], ours.squares[rows] = theirs
+
+    def select(self, representations: Iterable[int]) -> Described:
+        """The same movements in some of the representations."""
+        chosen, n = list(representations), len(self.blocks)
+        measures = tuple(self.pairs.measures[r - n] for r in chosen if r >= n) if self.pairs is not None else ()
+        return replace(
+            self,
+            blocks=tuple(self.blocks[r] for r in chosen if r < n),
+            pairs=replace(self.pairs, measures=measures) if self.pairs is not None and measures else None,
+        )
+
+    def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents."""
+        by_rows = [float(np.sqrt(np.median(block.squares))) for block in self.blocks]
+        return np.array(by_rows + [2.0] * (self.n_representations - len(by_rows)))
