@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme.experiments.evaluation.spotting import Counts, concatenate, count_spotted
 from kineme.recognition.spotting import Spotted, _left_over, best_chain
 from movement_samples import draw_shapes
 
@@ -106,6 +107,37 @@ def test_arrays_without_time_stamps_have_no_duration_to_compare():
     recording, _ = _stream(2, ["WShape", "CShape"])
     found = Recognizer().fit(arrays, demos.labels).spot(recording)
     assert [one.label for one in found if one.label is not None] == ["WShape", "CShape"]
+
+
+def _counts(rests, known=True, stretched=1.0):
+    """Spots in concatenated recordings of demonstrations not trained on, of eight classes."""
+    shapes = [*KNOWN, "GShape", "Zshape", "PShape", "Trapezoid"]
+    rng, found = np.random.default_rng(0), Counts()
+    demos = kineme.load_lasa([*shapes, *UNKNOWN])
+    held_out = np.flatnonzero(np.arange(len(demos)) % 7 >= 3)
+    shown = np.isin(demos.labels, shapes) & (np.arange(len(demos)) % 7 < 3)
+    recognizer = Recognizer().fit(demos[np.flatnonzero(shown)])
+    for _ in range(3):
+        chosen = [i for i in rng.permutation(held_out).tolist() if not known or demos.labels[i] in shapes][:9]
+        labels = [demos.labels[i] if demos.labels[i] in shapes else None for i in chosen]
+        movements = Demonstrations([Trajectory(stretched * one.times, one.positions) for one in demos[chosen]])
+        recording, truth, _ = concatenate(movements, labels, rng, rests=rests)
+        found = found + count_spotted(recognizer.spot(recording), truth)
+    return found
+
+
+@pytest.mark.parametrize(("rests", "known"), [(True, True), (True, False), (False, True), (False, False)])
+def test_what_is_in_a_recording_is_found_with_and_without_rests(rests, known):
+    found = _counts(rests, known)
+    assert found.recall >= 0.95
+    assert found.precision >= 0.9
+
+
+@pytest.mark.parametrize("stretched", [0.6, 1.7])
+def test_a_recording_may_be_faster_or_slower_than_what_was_demonstrated(stretched):
+    found = _counts(True, stretched=stretched)
+    assert found.recall >= 0.95
+    assert found.precision >= 0.9
 
 
 def test_the_best_chain_is_that_of_all_chains():

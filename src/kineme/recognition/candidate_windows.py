@@ -71,16 +71,12 @@ class Surroundings(NamedTuple):
         Share of the duration.
     rests_inside : ndarray
         How many rests a window spans.
-    before, after : ndarray
-        How long it has been moving since a rest when the window starts, and until a rest when it ends [s].
     """
 
     edge_speeds: Array
     far_from_rest: Array
     at_rest: Array
     rests_inside: Array
-    before: Array
-    after: Array
 
 
 def candidate_windows(recording: Trajectory, durations: Durations | None, most_bouts: int) -> Windows:
@@ -174,25 +170,16 @@ def surroundings(motion: Motion, bouts: Rows, rows: Rows, reach: float = 0.15) -
     speeds = np.minimum(motion.speed / motion.peak, 1.0)
     still = np.append(0.0, np.cumsum(np.diff(t) * (speeds[1:] <= _SLOW)))
     lasting = t[rows[:, 1]] - t[rows[:, 0]]
-    starts, stops = t[bouts[:, 0]], t[bouts[:, 1] - 1]
     ends = np.sort(np.concatenate((t[bouts[:, 0]], t[bouts[:, 1] - 1], [-np.inf, np.inf])))
     times = t[rows]
     after = np.searchsorted(ends, times)
     distance = np.minimum(ends[after] - times, times - ends[after - 1])
-    into = np.searchsorted(starts, times[:, 0], side="right") - 1  # the bout that a window starts in or after
-    out = np.searchsorted(stops, times[:, 1])  # the bout that it ends in or before
-    before = times[:, 0] - np.append(starts, np.inf)[into]
-    before[(into < 0) | (times[:, 0] >= np.append(stops, np.inf)[into])] = 0.0
-    until = np.append(stops, np.inf)[out] - times[:, 1]
-    until[(out >= len(stops)) | (times[:, 1] <= np.append(starts, np.inf)[out])] = 0.0
     spanned = np.searchsorted(bouts[:, 0], rows[:, 1]) - np.searchsorted(bouts[:, 1], rows[:, 0] + 1)
     return Surroundings(
         speeds[rows].sum(axis=1),
         np.minimum(distance / (reach * lasting[:, None]), 1.0).sum(axis=1),
         (still[rows[:, 1]] - still[rows[:, 0]]) / lasting,
         np.maximum(spanned - 1, 0).astype(np.float64),
-        before,
-        until,
     )
 
 

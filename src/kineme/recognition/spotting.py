@@ -106,7 +106,7 @@ def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, ND
     for _ in range(_PASSES - 1):
         scored = score_windows(compared, typical, around, manner, error_rate)
         chosen = _best_windows(compared.rows, scored)
-        manner = manner_of(compared, typical, around, chosen, scored)
+        manner = manner_of(compared, typical, chosen, scored.best)
     scored = score_windows(compared, typical, around, manner, error_rate)
     chosen = _best_windows(compared.rows, scored)
     if chosen:

@@ -26,9 +26,6 @@ _REACH = 0.975  # nonconformity at which a window counts as far, in that which m
 _TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
-_REMAINDER = 0.2  # cost of motion left over before or after a window, where movements begin and end at rests
-_BOUNDED = 0.88, 0.98  # how many must do so for it to count not at all, and in full
-_LONG = 0.5  # typical durations from which a remainder counts in full
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _SLOW = 0.2  # share of the mean speed of a window below which it rests
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
@@ -61,19 +58,10 @@ class Expected(NamedTuple):
 
 @dataclass(frozen=True)
 class Manner:
-    """How a recording differs from the demonstrations as a whole.
-
-    Attributes
-    ----------
-    tempo, size : float or None
-        Logarithms of the ratios of durations and sizes; None while unknown.
-    bounded : float
-        How much of what is known begins and ends at rests, from 0 to 1.
-    """
+    """How a recording differs from the demonstrations as a whole: logarithms of ratios; None while unknown."""
 
     tempo: float | None = None
     size: float | None = None
-    bounded: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,27 +179,15 @@ def score_windows(
     closeness = 1.0 - costs[np.arange(len(best)), best]
     closeness -= _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest
     closeness -= _SPANNED * around.rests_inside
-    certain = min(max((manner.bounded - _BOUNDED[0]) / (_BOUNDED[1] - _BOUNDED[0]), 0.0), 1.0)
-    closeness -= _REMAINDER * certain * remainders(around, usual)
     return Scored(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
 
 
-def remainders(around: Surroundings, log_duration: float) -> Array:
-    """Motion from the last rest to each window and from it to the next, each at most 1, (n,)."""
-    long = _LONG * math.exp(log_duration)
-    return np.asarray(np.minimum(around.before / long, 1.0) + np.minimum(around.after / long, 1.0))
-
-
-def manner_of(
-    compared: Compared, typical: Expected, around: Surroundings, chosen: list[int], scored: Scored
-) -> Manner:
+def manner_of(compared: Compared, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
     """The manner of a recording by the windows that are chosen; its tempo is shrunk towards that demonstrated."""
     if not chosen:
         return Manner()
-    classes, weights = scored.best[chosen], scored.score[chosen]
-    usual = float(np.median(compared.log_durations[chosen]))
-    bounded = 1.0 - 0.5 * float(np.average(remainders(around, usual)[chosen], weights=weights))
-    manner = Manner(None, float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])), bounded)
+    classes = best[chosen]
+    manner = Manner(size=float(np.median(compared.log_sizes[chosen] - typical.log_sizes[classes])))
     if typical.log_durations is None:
         return manner
     ratio = float(np.median(compared.log_durations[chosen] - typical.log_durations[classes]))
