@@ -113,7 +113,7 @@ def test_what_was_stored_is_recognized_as_itself(make_small, contender, n_dims):
     np.testing.assert_allclose(familiarity, 0.0, atol=1e-9)
 
 
-def test_points_in_plane_and_space_are_those_of_the_paper_and_of_the_issue(make_small):
+def test_plus_takes_the_points_of_the_paper_in_the_plane_and_fewer_in_space(make_small):
     assert PlusCloud().describe(make_small()).shape[1:] == (32, 3)
     assert PlusCloud().describe(make_small(n_dims=3)).shape[1:] == (16, 4)
     assert module.PointCloud().describe(make_small()).shape[1:] == (32, 2)

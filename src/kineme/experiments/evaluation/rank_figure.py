@@ -63,7 +63,15 @@ def _draw_method(axes: Any, method: tuple[str, float], corner: tuple[float, floa
     color, width = (BLUE, 1.6) if ours else ("#444444", 0.8)
     x, y = corner
     end = _SIDE + _AXIS + 0.12 if right else _SIDE - 0.12
-    axes.plot((x, x, end), (0, y, y), color=color, linewidth=width, solid_joinstyle="miter", zorder=2 + ours)
+    axes.plot(
+        (x, x, end),
+        (0, y, y),
+        color=color,
+        linewidth=width,
+        solid_joinstyle="miter",
+        solid_capstyle="butt",
+        zorder=2 + ours,
+    )
     title = METHODS[name].title
     text, gap, side = (f"{title}  {mean:.2f}", 0.06, "left") if right else (f"{mean:.2f}  {title}", -0.06, "right")
     weight = "bold" if ours else "normal"

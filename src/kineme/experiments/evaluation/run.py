@@ -85,7 +85,7 @@ def evaluate(
         "data": data.name,
         "movements": len(demos),
         **settings._asdict(),
-        "shots": list(settings.shots),
+        "shots": list(settings.shots) or "each protocol's own",
         "versions": _versions(),
     }
     return _write(data, (results, rows), facts, out, time.perf_counter() - began)
