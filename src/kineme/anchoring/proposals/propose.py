@@ -136,8 +136,8 @@ def by_shape(described: Described) -> Described:
     """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
     if described.pairs is None:
         return described
-    n = len(described.blocks)
-    positions = [r for r, one in enumerate(described.blocks) if one is described.pairs.positions]
+    n, rows = len(described.blocks), described.pairs.positions.rows
+    positions = [r for r, one in enumerate(described.blocks) if np.array_equal(one.rows, rows)]
     return described.select([*positions, *range(n, described.n_representations)])
 
 
