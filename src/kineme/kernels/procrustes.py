@@ -140,21 +140,17 @@ class Procrustes:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
+        A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
             return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
-        norms = np.sqrt(np.einsum("ij,ij->i", A, A)) * np.sqrt(np.einsum("ij,ij->i", B, B))
         if d == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
-            if self.prior is not None:
-                product = product + norms * np.trace(self.prior.matrix(2))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        if self.prior is not None:
-            return soft_rotations(turned(C, norms, self.prior.matrix(3)))
         return best_rotations(C, self.max_angle)
 
     def _weights(self, A: Prepared, B: Prepared) -> Array:

@@ -27,6 +27,7 @@ from kineme.validation import Array, check_number
 
 STEPS = 40  # of Newton's, at most; five to eight in practice
 CLOSE = 1e-12  # relative step after which there are no more
+ROUNDING = 1e-15  # of |M|^4: the quartic is no more exact, and where two roots meet its slope is none at all
 TIE = 1e-5  # of the cube of the norm: smaller divisors have lost digits, since two rotations are about equally good
 #: Of the norm, added to the diagonal where rotations are equally good, so that one of them is better.
 TIE_BREAK = (3e-3, 2e-3, 1e-3)
@@ -138,7 +139,8 @@ def _largest_root(square: Array, determinant: Array, last: Array) -> Array:
         over = x * x - square
         slope = 4.0 * x * over - 8.0 * determinant
         value = over * over - 8.0 * x * determinant - last
-        step = np.where(slope > 0, np.maximum(value, 0.0) / np.where(slope > 0, slope, 1.0), 0.0)
+        moving = (value > ROUNDING * square * square) & (slope > 0)
+        step = np.where(moving, value / np.where(moving, slope, 1.0), 0.0)
         x = x - step
         if not (step > CLOSE * x).any():
             break

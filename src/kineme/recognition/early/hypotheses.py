@@ -13,14 +13,14 @@ from kineme.comparison.comparison import Comparison
 from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
-from kineme.comparison.widths import SHARE, beginning_widths
+from kineme.comparison.widths import BEGUN_SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.recognition.early.prefixes import Prefixes, beginnings, smooth_paths
 from kineme.validation import Array, check_count, check_number
 
 #: An unknown movement is as far as a typical impostor, and as unlikely in size, duration and timing as a true one.
-_LOG_UNKNOWN = -0.5 / SHARE**2 - 1.5
+_LOG_UNKNOWN = -0.5 / BEGUN_SHARE**2 - 1.5
 _EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
 _MOST_PROGRESS = 1000  # beginnings of one movement
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
