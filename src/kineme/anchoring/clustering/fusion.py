@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from kineme.validation import Array
 
@@ -17,7 +18,8 @@ from kineme.validation import Array
 NEIGHBORS = (7, 15)
 _WIDTH = 0.5  # mu of the source, Eq. (2)
 _ROUNDS = 5  # of fusion; it has converged
-_ISOLATED = 5.0  # times as far from its neighbors as these are from theirs
+_FAR = 5.0  # times the usual distance to a neighbor
+_APART = 1e-3  # of their similarity is left to movements of groups apart
 _NONE = 1e-6  # largest distance, as a share of the typical one, of movements that do not differ
 _LEAST = 1e-30  # similarity, above 0
 
@@ -41,25 +43,37 @@ def fuse(squares: Array) -> Array:
     return np.asarray(sum(_fused(differ, neighbors) for neighbors in NEIGHBORS))
 
 
-def isolated(squares: Array, min_members: int) -> NDArray[np.bool_]:
-    """Whether each movement is far from all others, (n,).
+def groups(squares: Array) -> NDArray[np.intp]:
+    """Index of the group of each movement, (n,): far from all other groups, in chains of neighbors.
 
-    s_r(i) is the distance of movement i to its k-th nearest neighbor in representation r, k one less than
-    `min_members`. A movement is isolated if s_r(i) is five times as large as the smallest s_r of these neighbors and as
-    the median of all, in the geometric mean over representations. Within classes of people's movements, and of drawn
-    ones, the ratio stays below 3.2; movements of no class have 8 and more.
+    s_r(i) is the distance of movement i to its second nearest neighbor in representation r, and u_r(i) the smallest
+    s_r of these neighbors, but at least the median of all. Two movements i and j are linked if d_r(i, j) is less than
+    five times the larger of u_r(i) and u_r(j), in the geometric mean over representations; groups are what links
+    connect. Movements of one class have 3.2 to their second neighbors at most, among people's and drawn ones;
+    movements of no class have 8 and more.
     """
-    k = min(min_members, squares.shape[1]) - 1
     logs = []
     for one in squares:
         distances = np.sqrt(np.maximum(one, 0.0))
         np.fill_diagonal(distances, -1.0)
-        nearest = np.argpartition(distances, k, axis=1)[:, : k + 1]
+        nearest = np.argpartition(distances, 2, axis=1)[:, :3]
         own = np.take_along_axis(distances, nearest, axis=1).max(axis=1)
-        usual = np.maximum(own[nearest].min(axis=1), np.median(own))
-        if np.median(own) > 0:
-            logs.append(np.log(np.maximum(own, np.finfo(float).tiny) / usual))
-    return np.asarray(np.mean(logs, axis=0) > np.log(_ISOLATED)) if logs else np.zeros(squares.shape[1], dtype=bool)
+        if (typical := float(np.median(own))) > 0:
+            usual = np.maximum(own[nearest].min(axis=1), typical)
+            logs.append(np.log(np.maximum(distances, _NONE * typical) / np.maximum(usual[:, None], usual)))
+    if not logs:
+        return np.zeros(squares.shape[1], dtype=np.intp)
+    return np.asarray(connected_components(np.mean(logs, axis=0) < np.log(_FAR))[1], dtype=np.intp)
+
+
+def set_apart(similar: Array, group: NDArray[np.intp]) -> Array:
+    """Similarities in which small groups, of fewer movements than a neighborhood has, are nearly alone.
+
+    The neighbors of such a movement are not all of its group, so that fusion connects it with whatever comes next.
+    """
+    few = np.bincount(group)[group] <= min(NEIGHBORS)
+    apart = (group[:, None] != group) & (few[:, None] | few)
+    return np.where(apart, _APART * similar, similar)
 
 
 def _fused(squares: list[Array], neighbors: int) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.clustering.clustering import METHODS, Clusters
-from kineme.anchoring.clustering.fusion import fuse, isolated
+from kineme.anchoring.clustering.fusion import fuse, groups, set_apart
 from kineme.anchoring.clustering.number_of_clusters import count_clusters
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.clustering.stability import stabilities
@@ -117,15 +117,16 @@ def _propose(
 
 
 def _by_neighbors(described: Described, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
-    """Clusters of those movements that are not isolated, and how stable each is."""
+    """Clusters of movements that are not alone, and how stable each is."""
     described = by_shape(described)
     squares = squared_distances(described, described)
     squares = 0.5 * (squares + squares.transpose(0, 2, 1))
-    kept = np.flatnonzero(~isolated(squares, min_members))
+    group = groups(squares)
+    kept = np.flatnonzero(np.bincount(group)[group] >= min_members)
     clusters = np.full(len(described), -1, dtype=np.intp)
     if len(kept) < 3:
         return clusters, np.empty(0)
-    similar = fuse(squares[:, kept[:, None], kept])
+    similar = set_apart(fuse(squares[:, kept[:, None], kept]), group[kept])
     wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
     clusters[kept] = spectral(similar, wanted, min_members)
     stable = stabilities(similar, clusters[kept], lambda some: spectral(some, wanted), _REPEATS)
