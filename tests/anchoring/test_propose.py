@@ -178,7 +178,7 @@ def test_widths_without_labels_are_near_those_with_labels():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"method": "k-means"}, r"expected method to be one of \['spectral', 'agglomerative', 'hdbscan'\], got 'k-means'"),
+        ({"method": "k-means"}, r"method to be one of \['spectral', 'agglomerative', 'hdbscan'\], got 'k-means'"),
         ({"min_members": 1}, "expected min_members to be a whole number of at least 2, got 1"),
         ({"n_clusters": 0}, "expected n_clusters to be a whole number of at least 1, got 0"),
         ({"n_clusters": 13}, "expected n_clusters of at most 12, the number of movements, got 13"),
