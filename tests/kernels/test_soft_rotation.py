@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kineme import SpecificationError
 from kineme.kernels.procrustes import Procrustes
-from kineme.kernels.soft_rotation import RotationPrior, soft_products, soft_rotations
+from kineme.kernels.soft_rotation import RotationPrior, limited, soft_products, soft_rotations
 
 seeds = given(seed=st.integers(0, 10_000))
 
@@ -113,3 +113,20 @@ def test_where_a_prior_has_no_place():
         Procrustes(4, 0.0, RotationPrior())
     with pytest.raises(SpecificationError, match="3 dimensions with vertical"):
         Procrustes(2, math.pi, RotationPrior(vertical=(0, 0, 1)))
+
+
+@seeds
+def test_rotations_beyond_a_limit_are_turned_back_about_their_axes(seed):
+    rng = np.random.default_rng(seed)
+    vectors = rng.normal(size=(30, 3))
+    angles = np.concatenate((rng.uniform(0.0, math.pi, 28), [0.0, math.pi - 1e-4]))
+    vectors *= (angles / np.linalg.norm(vectors, axis=1))[:, None]
+    kept = vectors * np.minimum(1.0, 0.8 / np.maximum(angles, 1e-12))[:, None]
+    R = limited(Rotation.from_rotvec(vectors).as_matrix(), 0.8)
+    np.testing.assert_allclose(R, Rotation.from_rotvec(kept).as_matrix(), atol=3e-3)
+    procrustes = Procrustes(3, 0.8)
+    A, B = (procrustes.prepare(rng.normal(size=(n, 60))) for n in (4, 5))
+    alignment, R = procrustes.align(A, B)
+    np.testing.assert_allclose(alignment, procrustes.alignment(A, B))
+    angles = np.linalg.norm(Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec(), axis=1)
+    assert (angles < 0.8 + 1e-3).all()

@@ -20,7 +20,7 @@ METHOD_NAMES = (
     "kineme", "paper", "paper-bio", "euclidean", "dtw", "dtw-path", "gak-svm", "minirocket", "point-cloud",
     "plus-cloud", "quick-cloud", "hmm",
 )  # fmt: skip
-_QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm"}
+_QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 
 
 @click.command(short_help="Compare recognizers on data sets.")
@@ -43,7 +43,9 @@ _QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm"}
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
               help="Folder for evaluation.html and evaluation.json of each data set, and results.csv, results.json and "
               "ranks.png of all.")  # fmt: skip
-@click.option("--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm and hmm.")
+@click.option(
+    "--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm, hmm and dtw-path."
+)
 def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
     """Evaluate recognition on DATA: lasa, lasa-letters, a folder of recordings, or a file.
 

@@ -14,6 +14,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.rotation import best_products, best_rotations, half_angle
 from kineme.kernels.soft_rotation import (
     RotationPrior,
+    limited,
     soft_products,
     soft_products_in_plane,
     soft_rotations,
@@ -112,11 +113,13 @@ class Procrustes:
                 return _within(parts, self.max_angle)  # the angle's sign does not matter here
             return soft_products_in_plane(_double(parts[0]), _double(parts[1]), self._weights(A, B))[0]
         if self.prior is None:
-            return _in_space(A, B, self._hard_filler(len(A) * len(B)))[0]
-        return _in_space(A, B, self._soft_filler(len(A) * len(B)))[0]
+            return _in_space(A, B, self._hard_filler(len(A.rows) * len(B.rows)))[0]
+        return _in_space(A, B, self._soft_filler(len(A.rows) * len(B.rows)))[0]
 
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
         """The same, and the rotations that bring B closest to A.
+
+        Under a limit in space, these are the best free rotations, turned back to the limit.
 
         Returns
         -------
@@ -133,8 +136,11 @@ class Procrustes:
                 return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
             best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
             return best, np.stack((c, -s), -1).astype(np.float32)
-        fill = self._soft_filler if self.prior is not None else self._hard_filler
-        return _in_space(A, B, fill(len(A) * len(B), rotations=True), rotations=True)
+        n_pairs = len(A.rows) * len(B.rows)
+        best, rotations = _in_space(A, B, self._soft_filler(n_pairs, rotations=True), rotations=True)
+        if self.prior is None and rotations is not None:
+            return self.alignment(A, B), limited(rotations, self.max_angle)
+        return best, rotations
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
@@ -158,24 +164,20 @@ class Procrustes:
         assert self.prior is not None
         return np.asarray(np.trace(self.prior.matrix(2)) * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
 
-    def _hard_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
-        """What writes the best products (n, m) of a block of products (3 n, 3 m), and rotations: compiled or plain."""
-        if not rotations and use_compiled(n_pairs * _PAIR_OPERATIONS):
+    def _hard_filler(self, n_pairs: int) -> Filler:
+        """What writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
+        if use_compiled(n_pairs * _PAIR_OPERATIONS):
             fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
             return lambda products, a, b, best, R: fill_best_products(products, *half_angle(self.max_angle), best)
 
         def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
-            C = _covariances(products)
-            best[:] = best_products(C, self.max_angle).reshape(best.shape)
-            if rotations:
-                R[:] = best_rotations(C, self.max_angle).reshape(R.shape)
+            best[:] = best_products(_covariances(products), self.max_angle).reshape(best.shape)
 
         return fill
 
     def _soft_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
-        """The same under a prior."""
-        assert self.prior is not None
-        F = self.prior.matrix(3)
+        """The same under a prior, or under none, and rotations."""
+        F = np.zeros((3, 3)) if self.prior is None else self.prior.matrix(3)
         if use_compiled(n_pairs * _PAIR_OPERATIONS):
             soft = compiled_module("kineme.kernels._soft_rotation")
             if rotations:
