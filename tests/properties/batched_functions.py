@@ -40,7 +40,7 @@ from kineme.comparison.alignment import moved as laid_onto
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import describe_rows, feature_rows
 from kineme.comparison.normalization import SCALES, Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.representation import ROW_REPRESENTATIONS
 from kineme.comparison.similarity import compare
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.features.movement_features import FEATURES
@@ -252,9 +252,9 @@ def described(scale: str, translation: bool, cutoff: float | None) -> Batched:
                 np.split(demos.positions / unit, demos.offsets[1:-1]),
                 times=np.split(demos.times, demos.offsets[1:-1]),
             )
-        specification = ComparisonSpecification(normalization=Normalization(translation, scale), cutoff=cutoff)
+        specification = ComparisonSpecification(ROW_REPRESENTATIONS, Normalization(translation, scale), cutoff)
         rows = feature_rows(demos, specification)
-        return each(len(demos), **{one.name: row for one, row in zip(DEFAULT_REPRESENTATIONS, rows, strict=True)})
+        return each(len(demos), **{one.name: row for one, row in zip(ROW_REPRESENTATIONS, rows, strict=True)})
 
     return Batched(f"feature_rows {scale} {translation} {cutoff}", call, 1e-8)
 

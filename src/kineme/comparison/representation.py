@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.comparison.normalization import Normalization
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.spline import spline_matrix
@@ -126,9 +127,10 @@ ROW_REPRESENTATIONS = (
 )
 
 
-def default_representations(translation: bool, scale: str) -> tuple[Representation, ...]:
+def default_representations(normalization: Normalization) -> tuple[Representation, ...]:
     """Those of a recognizer: of the whole shape, unless position or size distinguishes movements."""
-    return DEFAULT_REPRESENTATIONS if translation and scale != "none" else ROW_REPRESENTATIONS
+    shape_alone = normalization.translation and normalization.scale != "none"
+    return DEFAULT_REPRESENTATIONS if shape_alone else ROW_REPRESENTATIONS
 
 
 def check_representations(representations: Any) -> tuple[Representation, ...]:

@@ -59,6 +59,21 @@ class ComparisonSpecification:
         object.__setattr__(self, "representations", check_representations(self.representations))
         if self.max_angle is not None:
             check_number("max_angle", self.max_angle, least=0.0)
+        if self.prior is not None and not isinstance(self.prior, RotationPrior):
+            raise SpecificationError(
+                f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
+                "kineme.RotationPrior(concentration=0.03)"
+            )
+
+    @property
+    def by_rows(self) -> tuple[Representation, ...]:
+        """The representations that are compared sample by sample; they come first."""
+        return tuple(one for one in self.representations if not one.in_pairs)
+
+    @property
+    def by_pairs(self) -> tuple[Representation, ...]:
+        """The representations that are compared pair by pair."""
+        return self.representations[len(self.by_rows) :]
 
     @property
     def by_rows(self) -> tuple[Representation, ...]:
