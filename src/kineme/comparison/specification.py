@@ -76,16 +76,6 @@ class ComparisonSpecification:
         return self.representations[len(self.by_rows) :]
 
     @property
-    def by_rows(self) -> tuple[Representation, ...]:
-        """The representations that are compared sample by sample; they come first."""
-        return tuple(one for one in self.representations if not one.in_pairs)
-
-    @property
-    def by_pairs(self) -> tuple[Representation, ...]:
-        """The representations that are compared pair by pair."""
-        return self.representations[len(self.by_rows) :]
-
-    @property
     def specification(self) -> ComparisonSpecification:
         """The specification itself."""
         return self
