@@ -113,8 +113,8 @@ class Procrustes:
                 return _within(parts, self.max_angle)  # the angle's sign does not matter here
             return soft_products_in_plane(_double(parts[0]), _double(parts[1]), self._weights(A, B))[0]
         if self.prior is None:
-            return _in_space(A, B, self._hard_filler(len(A) * len(B)))[0]
-        return _in_space(A, B, self._soft_filler(len(A) * len(B)))[0]
+            return _in_space(A, B, self._hard_filler(len(A.rows) * len(B.rows)))[0]
+        return _in_space(A, B, self._soft_filler(len(A.rows) * len(B.rows)))[0]
 
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
         """The same, and the rotations that bring B closest to A.
@@ -135,7 +135,7 @@ class Procrustes:
             best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
             return best, np.stack((c, -s), -1).astype(np.float32)
         fill = self._soft_filler if self.prior is not None else self._hard_filler
-        return _in_space(A, B, fill(len(A) * len(B), rotations=True), rotations=True)
+        return _in_space(A, B, fill(len(A.rows) * len(B.rows), rotations=True), rotations=True)
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
