@@ -141,6 +141,11 @@ def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, 
     return Tile(start, stop, paths, prepare(rows, like, procrustes))
 
 
+def describe_paths(paths: Array, like: Compares, procrustes: Procrustes) -> Described:
+    """Describe smooth, evenly timed paths (n, d, T): relative ones, or recorded ones where position matters."""
+    return prepare(_path_rows(paths, like.specification), like, procrustes)
+
+
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
     """Movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T)."""
     if cutoff is None:
@@ -159,6 +164,10 @@ def _tile_rows(
     """Paths of movements start:stop, as `even_paths` gives them, and their feature rows."""
     relative = even_paths(demos, start, stop, how.cutoff)
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
+    return relative, _path_rows(paths, how)
+
+
+def _path_rows(paths: Array, how: ComparisonSpecification) -> tuple[Array, ...]:
     normalized: dict[tuple[float, int], Array] = {}  # representations of equal phase share it
     rows = []
     for one in how.by_rows:
@@ -166,7 +175,7 @@ def _tile_rows(
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(one.along(paths))
         rows.append(one.describe(normalized[phase], how.normalization.translation))
-    return relative, tuple(rows)
+    return tuple(rows)
 
 
 def _tile_movements(n_dims: int) -> int:

@@ -13,7 +13,6 @@ from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
 SHARE = 0.4
-_BEGUN_SHARE = 0.35  # the same for beginnings
 _GAP_SHARE = 0.35  # of the typical distance to the first movement beyond a gap
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
 _SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
@@ -64,7 +63,7 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
     found = [
-        _share_of_median(one, 0.0, _BEGUN_SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
+        _share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
     ]
     return np.array([_NO_IMPOSTOR if width is None else width for width in found])
 

@@ -15,15 +15,15 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.evidence import begun, log_evidence
 from kineme.recognition.early.forecast import forecast
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
-from kineme.recognition.early.prefixes import beginnings, smoother
+from kineme.recognition.early.prefixes import smoother
 from kineme.runtime.compiled import load_compiled
 from kineme.validation import MIN_SAMPLES, Array
 
 CAPACITY = 4096  # samples that are kept one by one
-_WHOLE = np.ones(1)
 
 
 class Live:
@@ -119,8 +119,10 @@ class Live:
 
     def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
         elapsed = float(kept[-1, 0] - kept[0, 0])
-        begun = beginnings(self._smooth(kept), _WHOLE)
-        evidence = self._hypotheses.log_evidence(begun, np.array([elapsed]))
+        so_far = begun(
+            self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed])
+        )
+        evidence = log_evidence(self._hypotheses, so_far)
         logs = self._hypotheses.log_classes(evidence)[0]
         shares = np.exp(logs - logs.max())
         shares /= shares.sum()
@@ -128,7 +130,7 @@ class Live:
         leader = int(order[0])
         decided = self._decision.update(elapsed, leader, float(shares[leader]))
         shown = leader if decided is None else decided
-        ahead = forecast(self._hypotheses, evidence[0], shown, begun, elapsed)
+        ahead = forecast(self._hypotheses, evidence[0], shown, so_far.prefixes, elapsed)
         self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
         self._leader = shown
         path = kept[-1, 1:] + ahead.path
