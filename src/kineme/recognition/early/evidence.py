@@ -20,7 +20,7 @@ _COMPARED = 200  # hypotheses compared pair by pair, and the best one of each cl
 _WIDENED = 2.0  # widths of positions where they choose those
 _ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
 _NARROWED = 0.5  # widths of whole movements, for hypotheses compared with those of beginnings
-_NEGLIGIBLE = 12.0  # logarithm of the ratio of evidence to the largest, below which nothing is computed
+_NEGLIGIBLE = 5.0  # whole movements with less than exp(-5) of the largest evidence are not compared
 
 _WHOLE = np.ones(1)
 

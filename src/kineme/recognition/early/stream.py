@@ -21,6 +21,7 @@ from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.recognition.early.prefixes import smoother
 from kineme.runtime.compiled import load_compiled
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
 
 CAPACITY = 4096  # samples that are kept one by one
@@ -82,7 +83,8 @@ class Live:
         kept = self._path.kept()
         if len(kept) < MIN_SAMPLES or not np.ptp(kept[:, 1:], axis=0).any():
             return self._nothing(status | LiveStatus.TOO_SHORT)
-        return self._estimate(kept, status)
+        with single_threaded_blas():  # held once, not for each of many small products
+            return self._estimate(kept, status)
 
     def finish(self) -> Answer:
         """The answer of `Recognizer.recognize` to the whole movement.
