@@ -24,6 +24,7 @@ SUBJECTS = (
     "library",
     "binning",
     "anchoring",
+    "by_person",
 )
 
 

@@ -80,7 +80,7 @@ def test_kernels_know_nothing_of_movements():
 
 def _compiled_modules():
     """Modules with compiled functions, and the one that keeps their machine code: importing them imports Numba."""
-    jitted = [path for path in _modules() if re.search(r"^@jit|= jit\(", path.read_text(), re.MULTILINE)]
+    jitted = [path for path in _modules() if re.search(r"^@_?jit|= jit\(", path.read_text(), re.MULTILINE)]
     return {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in jitted} | {
         "kineme.runtime.machine_code": PACKAGE / "runtime" / "machine_code.py"
     }

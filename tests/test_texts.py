@@ -119,7 +119,7 @@ def folder(tmp_path_factory):
     with kineme.ActionLibrary(folder, create=True) as library:
         library.learn(demos)
         for name in NAMES:
-            library.describe(name, name)
+            library.annotate(name, name)
     return folder
 
 

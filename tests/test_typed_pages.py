@@ -37,6 +37,8 @@ for array in (movement.positions, [movement.positions], [[0.0, 1.0, 2.0, 4.0]]):
     kineme.DMP().learn(array)
 kineme.preprocess([cut, cut], [kineme.Smooth()])
 kineme.DMP().learn([read, rollout, cut, movement, movement.positions])
+rollout.plot().savefig("rollout.png")
+rollout.plot(rollout.plot().axes[0]).set_title("rollout")
 kineme.Recognizer().fit([read, rollout[0]])
 kineme.preprocess([movement, movement], (kineme.TrimRest(), kineme.Resample(50)))
 for taken in (demos, read, cut, rollout):

@@ -40,6 +40,7 @@ from kineme import kernels as kernels
 # Recognition
 from kineme.recognition.recognizer import Recognizer as Recognizer
 from kineme.comparison.representation import Representation as Representation
+from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early
 

@@ -29,6 +29,7 @@ _EPS = np.finfo(np.float64).eps
 _NEAR_ZERO = 1e4 * SHORTEST_STEP / _EPS  # beyond it, different stamps are always far enough apart
 _SMALL_POSITION = SMALLEST_EXTENT / _EPS  # beyond it, no extent can be too small
 _FLOAT64 = np.dtype(np.float64)
+_STAMPS_AT_ONCE = 16_384  # temporaries stay in the cache
 
 
 def describe(index: int, names: Sequence[str | None] | None) -> str:
@@ -127,6 +128,9 @@ def check_finite(values: Array, offsets: NDArray[np.intp], names: Sequence[str |
 def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | None] | None) -> None:
     """Refuse concatenated time stamps (total,) that do not strictly increase within each movement."""
     check_finite(times, offsets, names, "times")
+    between = times[offsets[1:-1]] - times[offsets[1:-1] - 1]  # from one movement to the next
+    if _count_short_steps(times) == np.count_nonzero(between < SHORTEST_STEP):
+        return
     increasing = times[1:] > times[:-1]  # a pass without a temporary as large as the stamps
     near = np.flatnonzero((times[:-1] < _NEAR_ZERO) & (times[:-1] > -_NEAR_ZERO))
     increasing[near] = times[near + 1] - times[near] >= SHORTEST_STEP
@@ -148,11 +152,18 @@ def check_times(times: Array, offsets: NDArray[np.intp], names: Sequence[str | N
     )
 
 
+def _count_short_steps(times: Array) -> int:
+    """How many stamps (total,) follow the one before by less than `SHORTEST_STEP`."""
+    blocks = (times[i : i + _STAMPS_AT_ONCE + 1] for i in range(0, len(times), _STAMPS_AT_ONCE))
+    return sum(int(np.count_nonzero(np.diff(one) < SHORTEST_STEP)) for one in blocks)
+
+
 def too_small(positions: Array, offsets: NDArray[np.intp]) -> list[tuple[int, float]]:
     """Movements so small that the squares of their positions underflow, with their extents."""
     suspects = np.arange(len(offsets) - 1)
     for probe in (offsets[1:] - 1, offsets[:-1], (offsets[:-1] + offsets[1:]) // 2):
-        suspects = suspects[(np.abs(positions[probe[suspects]]) < _SMALL_POSITION).all(axis=1)]
+        small = np.abs(positions[probe[suspects]]) < _SMALL_POSITION
+        suspects = suspects[small.all(axis=1)] if small.any() else suspects[:0]
         if not len(suspects):
             return []
     own = [(int(i), positions[offsets[i] : offsets[i + 1]]) for i in suspects]

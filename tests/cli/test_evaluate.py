@@ -3,6 +3,7 @@
 import json
 
 import commands
+import numpy as np
 import pytest
 
 from kineme.cli.evaluate import METHOD_NAMES, PROTOCOL_NAMES
@@ -40,7 +41,7 @@ def test_a_folder_of_recordings_is_evaluated(folder, tmp_path):
     content = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
     assert content["data"] == folder.name
     assert content["splits"] == 2
-    assert content["shots"] == [1, 3, 5]
+    assert content["shots"] == [1, 3]
     assert content["protocols"]["few-shot"]["kineme"]["1 shot"]["accuracy"]["mean"] == 1.0
     assert (tmp_path / "evaluation.html").read_text(encoding="utf-8").startswith("<!doctype html>")
 
@@ -60,7 +61,7 @@ def test_protocols_splits_shots_and_seed_are_heard(folder, tmp_path):
 def test_data_that_are_not_there_are_one_line_and_exit_status_1(tmp_path):
     done = run(tmp_path / "nothing", "--out", tmp_path / "out", by=commands.start)
     assert done.returncode == 1
-    assert done.stderr.startswith("kineme: expected lasa, lasa-letters or a folder, found no folder")
+    assert done.stderr.startswith("kineme: expected lasa, lasa-letters, a folder or a file, found nothing at")
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
@@ -86,3 +87,61 @@ def test_options_that_make_no_sense_are_a_usage_error(folder, arguments):
 
 def test_data_are_asked_for():
     assert run().returncode == 2
+
+
+@pytest.fixture(scope="module")
+def archives(tmp_path_factory, make_movement):
+    """Two archives of 3 people, 2 classes and 3 movements of each; the second is in space."""
+    folder = tmp_path_factory.mktemp("archives")
+    for name, n_dims in (("plane", 2), ("space", 3)):
+        made = [(make_movement([k, 0], n_dims, 50)[1] * (1 + 0.1 * i), k, i) for k in (0, 1) for i in range(9)]
+        np.savez(
+            folder / f"{name}.npz",
+            positions=np.concatenate([x for x, _, _ in made]),
+            times=np.tile(np.linspace(0, 2, 50), len(made)),
+            offsets=np.arange(len(made) + 1) * 50,
+            labels=np.array(["wave", "point"])[[k for _, k, _ in made]],
+            people=np.array(["ann", "bob", "cy"])[[i % 3 for _, _, i in made]],
+        )
+    return folder
+
+
+def test_several_data_sets_have_a_folder_each_and_a_table_and_a_diagram_together(archives, tmp_path):
+    methods = [part for name in ("kineme", "euclidean", "plus-cloud") for part in ("--method", name)]
+    protocols = [part for name in ("user-dependent", "user-independent") for part in ("--protocol", name)]
+    done = run(
+        archives / "plane.npz", archives / "space.npz", *methods, *protocols, "--splits", 3, "--shots", 1, "--jobs", 1,
+        "--out", tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for name in ("plane", "space"):
+        content = json.loads((tmp_path / name / "evaluation.json").read_text(encoding="utf-8"))
+        assert content["data"] == name
+        assert list(content["protocols"]) == ["user-dependent", "user-independent"]
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert results["columns"][:3] == ["data", "protocol", "condition"]
+    assert {row[0] for row in results["rows"]} == {"plane", "space"}
+    assert results["ranks"]["n_blocks"] == 2 * 2 * 3
+    assert "Not all rivals ran everywhere" in results["conclusions"]["plane"]
+    lines = (tmp_path / "results.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 1 + len(results["rows"])
+    assert (tmp_path / "ranks.png").read_bytes().startswith(b"\x89PNG")
+    assert "Mean ranks" in done.stdout
+
+
+def test_an_old_diagram_does_not_stay_beside_new_results(archives, tmp_path):
+    (tmp_path / "ranks.png").write_bytes(b"old")
+    arguments = ["--method", "kineme", "--protocol", "user-dependent", "--splits", 1, "--shots", 1, "--jobs", 1]
+    done = run(archives / "plane.npz", *arguments, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Ranks need at least 3 methods" in done.stdout
+    assert not (tmp_path / "ranks.png").exists()
+
+
+def test_data_sets_of_one_name_are_numbered(archives, tmp_path):
+    arguments = ["--method", "euclidean", "--protocol", "user-dependent", "--splits", 1, "--shots", 1, "--jobs", 1]
+    done = run(archives / "plane.npz", archives / "plane.npz", *arguments, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"plane-1", "plane-2"}
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert [row[0] for row in results["rows"]] == ["plane-1", "plane-2"]

@@ -68,8 +68,15 @@ def test_any_name_is_data(folder):
     assert sorted(path.name for path in folder.parent.iterdir()) == [folder.name]
 
 
-def test_describe_merge_delete_and_history(folder):
-    assert answer("library", "describe", "CShape", "open, like a C", "-l", folder)["description"] == "open, like a C"
+def test_the_former_command_works_and_is_not_listed(folder):
+    done = start("library", "describe", "NShape", "like an N", "-l", folder, "--json")
+    assert json.loads(done.stdout)["description"] == "like an N"
+    assert "deprecated" in done.stderr
+    assert "  describe " not in start("library", "--help").stdout
+
+
+def test_annotate_merge_delete_and_history(folder):
+    assert answer("library", "annotate", "CShape", "open, like a C", "-l", folder)["description"] == "open, like a C"
     merged = answer("library", "merge", "CShape", "GShape", "--into", "round", "-l", folder)
     assert (merged["name"], merged["movements"], len(merged["parents"])) == ("round", 14, 2)
     answer("library", "delete", "NShape", "-y", "-l", folder)
@@ -77,7 +84,7 @@ def test_describe_merge_delete_and_history(folder):
     now = answer("library", "list", "-l", folder)
     assert (now["movements"], now["unlabeled"], [one["name"] for one in now["symbols"]]) == (19, 7, ["round"])
     versions = answer("library", "history", "-l", folder)
-    assert [one["action"] for one in versions] == ["learn", "describe", "merge", "delete", "delete"]
+    assert [one["action"] for one in versions] == ["learn", "annotate", "merge", "delete", "delete"]
     assert answer("library", "list", "--at", 1, "-l", folder)["movements"] == 21
     assert len(answer("library", "history", "-n", 2, "-l", folder)) == 2
 

@@ -10,8 +10,8 @@ from sklearn.base import clone
 
 from kineme import Recognizer
 from kineme.comparison.described import Described
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
-from kineme.comparison.weights import CANDIDATES, aligned_weights
+from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
+from kineme.comparison.weights import aligned_weights
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from movement_samples import draw_shapes
@@ -31,7 +31,7 @@ def _timed(n, seed):
 
 
 def test_what_differs_in_timing_only_is_left_to_time():
-    recognizer = Recognizer(classifier="nearest").fit(*_timed(24, seed=0))
+    recognizer = Recognizer(classifier="nearest", weights="fitted").fit(*_timed(24, seed=0))
     over_time = [one.arc_share == 0 for one in recognizer.representations_]
     assert recognizer.weights_[over_time].sum() > 0.5
     fresh, truth = _timed(60, seed=1)
@@ -44,7 +44,7 @@ def test_what_differs_in_timing_only_is_left_to_time():
 def test_the_weights_are_those_of_largest_centered_alignment():
     """Against a search over all weights on a grid of twentieths."""
     demos = draw_shapes([9] * 3, seed=4, spread=1.2)
-    recognizer = Recognizer(DEFAULT_REPRESENTATIONS, weights="equal").fit(demos)
+    recognizer = Recognizer(ROW_REPRESENTATIONS, weights="equal").fit(demos)
     weights = aligned_weights(
         recognizer.comparison_.similarity, recognizer.references_.described, recognizer.references_.labels
     )
@@ -67,19 +67,20 @@ def test_the_weights_are_those_of_largest_centered_alignment():
     assert alignment(weights) >= max(map(alignment, grid)) - 1e-4
 
 
-@pytest.mark.parametrize("counts", [[1, 1, 1], [7, 9], [30]])
-def test_few_or_one_class_keep_equal_weights_and_three_representations(counts):
+@pytest.mark.parametrize("counts", [[1, 1, 1], [7, 9], [30], [8, 8]])
+def test_by_default_each_representation_has_its_own_weight(counts):
     recognizer = Recognizer().fit(draw_shapes(counts))
     assert recognizer.representations_ == DEFAULT_REPRESENTATIONS
-    np.testing.assert_array_equal(recognizer.weights_, np.full(3, 1 / 3))
+    np.testing.assert_allclose(recognizer.weights_, np.array([2, 1, 2, 1, 2]) / 8)
 
 
-def test_many_choose_among_six_and_keep_what_speaks():
-    recognizer = Recognizer().fit(draw_shapes([8] * 4, spread=0.8))
-    assert set(recognizer.representations_) <= set(CANDIDATES)
+@pytest.mark.parametrize("weights", ["auto", "equal", "fitted"])
+def test_weights_sum_to_one_and_every_part_has_one(weights):
+    recognizer = Recognizer(weights=weights).fit(draw_shapes([8] * 4, spread=0.8))
     assert (recognizer.weights_ > 0).all()
     assert recognizer.weights_.sum() == pytest.approx(1.0)
-    assert len(recognizer.references_.described.blocks) == len(recognizer.widths_) == len(recognizer.representations_)
+    described = recognizer.references_.described
+    assert described.n_representations == len(recognizer.widths_) == len(recognizer.representations_)
     answer = recognizer.recognize(recognizer.demonstrations_[0])
     assert set(answer.responsibilities) == {one.name for one in recognizer.representations_}
     assert sum(answer.responsibilities.values()) == pytest.approx(1.0)
@@ -87,14 +88,22 @@ def test_many_choose_among_six_and_keep_what_speaks():
 
 def test_given_weights_are_those_of_the_weighted_mean():
     demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
-    equal = Recognizer().fit(demos)
-    given = Recognizer(weights=(2.0, 1.0, 1.0)).fit(demos)
+    equal = Recognizer(weights="equal").fit(demos)
+    given = Recognizer(weights=(2.0, 1.0, 1.0, 3.0, 1.0)).fit(demos)
     each = np.exp(equal.comparison_.similarity.logs(equal.describe(fresh), equal.references_.described))
-    expected = np.log(np.tensordot([0.5, 0.25, 0.25], each, 1))
+    expected = np.log(np.tensordot(np.array([2.0, 1.0, 1.0, 3.0, 1.0]) / 8.0, each, 1))
     np.testing.assert_allclose(given.log_similarity(fresh), expected, rtol=1e-4, atol=1e-4)  # single precision
-    one = Recognizer(weights=(0.0, 3.0, 0.0)).fit(demos)
+    one = Recognizer(weights=(0.0, 3.0, 0.0, 0.0, 0.0)).fit(demos)
     alone = Recognizer((DEFAULT_REPRESENTATIONS[1],)).fit(demos)
     np.testing.assert_allclose(one.log_similarity(fresh), alone.log_similarity(fresh), rtol=1e-4, atol=1e-4)
+
+
+def test_positions_without_weight_still_give_the_rotation():
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    whole, clouds = Recognizer().fit(demos), Recognizer(weights=(0, 0, 0, 0, 1)).fit(demos)
+    logs = whole.comparison_.similarity.logs(whole.describe(fresh), whole.references_.described)
+    np.testing.assert_allclose(clouds.log_similarity(fresh), logs[4] - np.log(5 * 2 / 8), rtol=1e-4, atol=1e-4)
+    assert clouds.recognize(fresh[0]).responsibilities["point cloud"] == pytest.approx(1.0)
 
 
 def test_kernels_that_know_nothing_stay_equal():
@@ -107,15 +116,17 @@ def test_kernels_that_know_nothing_stay_equal():
     np.testing.assert_array_equal(aligned_weights(Blind(), described, np.arange(20) % 2), [0.5, 0.5])
 
 
-@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0, 0.0, 0.0), (1.0, -1.0, 1.0), (1.0, np.nan, 1.0)])
+@pytest.mark.parametrize("weights", [(1.0, 2.0), (0.0,) * 5, (1.0, -1.0, 1.0, 1.0, 1.0), (1.0, np.nan, 1.0, 1.0, 1.0)])
 def test_weights_that_cannot_be_are_refused(weights):
-    with pytest.raises(SpecificationError, match="3 numbers from 0, not all 0"):
+    with pytest.raises(SpecificationError, match="5 numbers from 0, not all 0"):
         Recognizer(weights=weights).fit(draw_shapes([1, 1]))
 
 
 def test_weights_need_the_arithmetic_mean():
     with pytest.raises(SpecificationError, match="mean='arithmetic', got them with mean='min'"):
-        Recognizer(mean="min", weights=(1, 1, 1)).fit(draw_shapes([1, 1]))
+        Recognizer(mean="min", weights=(1, 1, 1, 1, 1)).fit(draw_shapes([1, 1]))
     with pytest.raises(SpecificationError, match=r"weights.*'loud'"):
         Recognizer(weights="loud").fit(draw_shapes([1, 1]))
-    assert len(Recognizer(mean="min").fit(draw_shapes([8, 8])).representations_) == 3
+    with pytest.raises(SpecificationError, match="mean='arithmetic', got it with mean='min'"):
+        Recognizer(mean="min", weights="fitted").fit(draw_shapes([8, 8]))
+    np.testing.assert_allclose(Recognizer(mean="min").fit(draw_shapes([8, 8])).weights_, 0.2)

@@ -32,7 +32,7 @@ def make_victim(folder):
             places=list(map(str, range(6))),
         )
         library.learn(draw_movements(3, seed=1, ragged=True, labels=["wave"] * 3))
-        library.describe("wave", "with the hand", prototype=1, threshold=0.5)
+        library.annotate("wave", "with the hand", prototype=1, threshold=0.5)
         library.merge(["nod"], "bow")
         library.assign([2], "nod")
         library.delete([6])

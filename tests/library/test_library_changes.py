@@ -144,7 +144,7 @@ def test_any_text_is_a_name_and_only_a_name(library, name):
     library.delete("nod")
     library.rename(name + "!", name)
     library.assign([2], name + name)
-    library.describe(name, name)
+    library.annotate(name, name)
     assert library[name].description == name
     assert library[name + name].members.tolist() == [2]
     assert library.movements(name).labels.tolist() == [name] * 4
@@ -177,13 +177,25 @@ def test_merging_and_splitting_record_where_symbols_come_from(library):
     assert len(library["bow"]) == 7
 
 
+def test_annotations_were_called_descriptions(library):
+    with pytest.warns(DeprecationWarning, match=r"ActionLibrary\.describe is now ActionLibrary\.annotate"):
+        library.describe("wave", "with the hand", threshold=0.5)
+    assert (library["wave"].description, library["wave"].threshold) == ("with the hand", 0.5)
+
+
+def test_proposals_by_position_were_called_found(library):
+    proposals = library.propose(ids=library.ids())
+    with pytest.warns(DeprecationWarning, match=r"LibraryProposals\.found is now LibraryProposals\.by_position"):
+        assert proposals.found is proposals.by_position
+
+
 def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
     first = int(library["wave"].members[0])
-    library.describe("wave", "with the hand", prototype=first, threshold=0.5)
+    library.annotate("wave", "with the hand", prototype=first, threshold=0.5)
     assert (library["wave"].prototype, library["wave"].threshold) == (first, 0.5)
     library.split("wave", [first], "other")
     assert (library["wave"].prototype, library["wave"].description) == (None, "with the hand")
-    library.describe("other", prototype=first)
+    library.annotate("other", prototype=first)
     library.delete([first])
     assert library["other"].prototype is None
     assert library.verify() == []
@@ -192,7 +204,7 @@ def test_a_prototype_that_leaves_is_no_prototype_any_more(library):
 @pytest.mark.parametrize("leave", [lambda it: it.assign([1, 2], "nod"), lambda it: it.release([1, 2])])
 def test_a_prototype_that_shows_another_symbol_does_not_stand_for_the_first(library, leave):
     for name in ("wave", "nod", "bow"):
-        library.describe(name, prototype=int(library[name].members[0]))  # 1, 2, 3
+        library.annotate(name, prototype=int(library[name].members[0]))  # 1, 2, 3
     library.assign([1], "wave")  # where it is: nothing changes
     assert library["wave"].prototype == 1
     leave(library)
@@ -256,14 +268,14 @@ def test_history_says_what_was_done(library):
         ),
         (lambda it: it.delete([]), r"expected ids of movements, whole numbers, at least one, got \[\]"),
         (lambda it: it.delete([1.5]), r"expected ids of movements, whole numbers, at least one, got \[1.5\]"),
-        (lambda it: it.describe("wave", prototype=99), r"movements in the library, got 99"),
-        (lambda it: it.describe("wave", threshold=np.nan), r"expected threshold to be a number, got nan"),
-        (lambda it: it.describe("wave", name=""), r"expected what is described to be one of .* got 'name'"),
+        (lambda it: it.annotate("wave", prototype=99), r"movements in the library, got 99"),
+        (lambda it: it.annotate("wave", threshold=np.nan), r"expected threshold to be a number, got nan"),
+        (lambda it: it.annotate("wave", name=""), r"expected what is annotated to be one of .* got 'name'"),
         (lambda it: it.rename("wave", it["nod"].id), r"expected a name, got 'sym-\w+', which is the id of a symbol"),
         (lambda it: it.at("1"), r"expected a version from 0 to 1, got '1'"),
-        (lambda it: it.describe("wave", 5), r"expected a description, got 5"),
+        (lambda it: it.annotate("wave", 5), r"expected a description, got 5"),
         (
-            lambda it: it.describe("wave", "\ud800"),
+            lambda it: it.annotate("wave", "\ud800"),
             r"expected a description in Unicode, got '\\ud800', which",
         ),
         (lambda it: it.rename("wave", "\ud800"), r"expected a name in Unicode, got '\\ud800', which"),

@@ -23,7 +23,7 @@ def eventful(tmp_path_factory):
         library.rename("wave", "naïve 'wave'; --")
         library.merge(["nod", "bow"], "head")
         library.split("head", library["head"].members[:2], "tilt")
-        library.describe("tilt", "to the side", prototype=int(library["tilt"].members[0]), threshold=0.25)
+        library.annotate("tilt", "to the side", prototype=int(library["tilt"].members[0]), threshold=0.25)
         library.delete([4, 5])
     return folder
 

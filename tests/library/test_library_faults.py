@@ -337,7 +337,7 @@ def test_flipped_text_is_noticed_too(folder, query, table, read):
 
 def test_wherever_a_byte_is_flipped_what_is_read_is_right_or_refused(folder):
     with ActionLibrary(folder) as library:
-        library.describe("wave", "with the hand")
+        library.annotate("wave", "with the hand")
         expected = contents(library)
     whole = (folder / FILE).read_bytes()
     rng = np.random.default_rng(0)

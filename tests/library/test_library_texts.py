@@ -52,7 +52,7 @@ def test_a_text_that_no_library_holds_is_refused_before_it_is_stored(tmp_path):
             lambda: library.rename("wave", huge),
             lambda: library.learn(draw_movements(1, seed=1, n_samples=8), labels=[huge]),
             lambda: library.assign([1], huge),
-            lambda: library.describe("wave", 4 * huge),
+            lambda: library.annotate("wave", 4 * huge),
         ):
             with pytest.raises(SpecificationError, match=r"expected a (name|description) of at most [\d,]+ bytes, got"):
                 store()

@@ -6,6 +6,7 @@ import io
 import sys
 from types import SimpleNamespace
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -121,7 +122,8 @@ def test_it_has_a_picture(kind, rollout):
     figure = rollout.plot()
     assert isinstance(figure, Figure)
     assert {*AXES[kind], "time [s]"} <= {text for axes in figure.findobj(match=_is_axes) for text in _axis_labels(axes)}
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a", "b"]
+    ends = ["start", "end"] if len(AXES[kind]) in (2, 3) else []
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a", "b", *ends]
     figure.savefig(io.BytesIO())
 
 
@@ -151,7 +153,57 @@ def test_every_color_of_a_picture_has_a_name_or_there_is_one_color():
         figure = kineme.DMP().learn(demos).rollout().plot()
         lines = [line for axes in figure.findobj(match=_is_axes) for line in axes.lines]
         assert len({to_rgba(line.get_color()) for line in lines}) == max(n_named, 1)
-        assert sum(len(legend.get_texts()) for legend in figure.legends) == n_named
+        assert sum(len(legend.get_texts()) for legend in figure.legends) == n_named + len(["start", "end"])
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    if plt := sys.modules.get("matplotlib.pyplot"):
+        plt.close("all")
+
+
+def test_the_style_of_a_picture_is_its_own():
+    before = dict(mpl.rcParams)
+    discrete().rollout().plot()
+    assert dict(mpl.rcParams) == before
+
+
+def test_pyplot_knows_a_picture_where_it_is_imported(monkeypatch):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    rollout = discrete().rollout()
+    figure = rollout.plot()
+    assert plt.gcf() is figure
+    monkeypatch.setattr(mpl, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
+    with pytest.raises(NotImplementedError):  # so that IPython shows it as ever, and the end of the cell not again
+        figure._ipython_display_()
+    assert not plt.fignum_exists(figure.number)
+    monkeypatch.delitem(sys.modules, "matplotlib.pyplot")
+    assert type(rollout.plot()) is Figure
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_picture_is_drawn_into_axes_of_ones_own(make_movement, d):
+    rollout = kineme.DMP(n_basis=10).learn([make_movement(1, d)[1]]).rollout(goal=np.zeros((60, d)), n_samples=20)
+    flat, space = Figure().subplots(), Figure().subplots(subplot_kw={"projection": "3d"})
+    right, wrong = (space, flat) if d == 3 else (flat, space)
+    assert rollout.plot(ax=right) is right
+    assert right.get_title() == "30 of 60 movements"
+    assert len(right.lines) == (30 if d == 1 else 90)
+    assert (right.get_xlabel(), right.get_ylabel()) == (("time [s]", "x") if d == 1 else ("x", "y"))
+    legend = right.get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["start", "end"] if d > 1 else legend is None
+    right.figure.savefig(io.BytesIO())
+    with pytest.raises(kineme.SpecificationError, match=rf"expected ax with .* for {d} dimensions, got projection"):
+        rollout.plot(wrong)
+
+
+def test_axes_that_cannot_hold_a_picture_are_refused(make_movement):
+    rollout = kineme.DMP(n_basis=10).learn([make_movement(1, 4)[1]]).rollout()
+    with pytest.raises(kineme.SpecificationError, match="at most 3 dimensions for one ax, got 4; leave ax out"):
+        rollout.plot(Figure().subplots())
+    with pytest.raises(kineme.SpecificationError, match="expected ax to be an Axes of matplotlib, got Figure"):
+        rollout.plot(Figure())
 
 
 def test_a_movement_that_rests_has_a_picture_too(make_movement):

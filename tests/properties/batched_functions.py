@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from drawn_movements import poses, reaches, rhythms, rows
+from scipy.spatial.transform import Rotation
 
 from kineme import (
     DMP,
@@ -39,14 +40,16 @@ from kineme.comparison.alignment import moved as laid_onto
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import describe_rows, feature_rows
 from kineme.comparison.normalization import SCALES, Normalization
-from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
+from kineme.comparison.representation import ROW_REPRESENTATIONS
 from kineme.comparison.similarity import compare
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, MEANS, averaged
+from kineme.kernels.pair_distances import listed_distances, pair_distances, turning_bounds
 from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.shapes import shapes_of
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.primitives.discrete.basis import GATINGS
@@ -249,9 +252,9 @@ def described(scale: str, translation: bool, cutoff: float | None) -> Batched:
                 np.split(demos.positions / unit, demos.offsets[1:-1]),
                 times=np.split(demos.times, demos.offsets[1:-1]),
             )
-        specification = ComparisonSpecification(normalization=Normalization(translation, scale), cutoff=cutoff)
+        specification = ComparisonSpecification(ROW_REPRESENTATIONS, Normalization(translation, scale), cutoff)
         rows = feature_rows(demos, specification)
-        return each(len(demos), **{one.name: row for one, row in zip(DEFAULT_REPRESENTATIONS, rows, strict=True)})
+        return each(len(demos), **{one.name: row for one, row in zip(ROW_REPRESENTATIONS, rows, strict=True)})
 
     return Batched(f"feature_rows {scale} {translation} {cutoff}", call, 1e-8)
 
@@ -318,6 +321,34 @@ def procrustes_row(n_dims: int, max_angle: float, dtype: str) -> Batched:
 
     tolerance = 1e-10 if dtype == "float64" else 1e-5
     return Batched(f"Procrustes {n_dims} {max_angle:.2f} {dtype}", call, tolerance, draw=rows)
+
+
+def pairs_row(n_dims: int) -> Batched:
+    """Paths compared with others, each after the rotation that the other has."""
+
+    def sized(X: Any) -> Any:
+        x = (X / np.abs(X).max(axis=1, keepdims=True)).reshape(len(X), n_dims, -1)
+        x = x - x.mean(axis=2, keepdims=True)
+        return x / np.sqrt((x * x).sum(axis=1).mean(axis=1))[:, None, None]
+
+    reference = shapes_of(sized(np.random.default_rng(3).normal(size=(40, 12))))
+    turns = Rotation.random(40, random_state=0).as_matrix() if n_dims == 3 else np.ones((40, 2)) * 0.5**0.5
+
+    def call(X: Any) -> list[dict[str, Any]]:
+        shapes = shapes_of(sized(X))
+        room = shapes.empty(len(X))
+        for name, array in shapes.take(slice(None)).arrays().items():
+            room.arrays()[name][:] = array
+        R = np.broadcast_to(turns, (len(X), *turns.shape))
+        own = np.arange(len(X))
+        return each(
+            len(X),
+            squares=pair_distances(room, reference, R).transpose(1, 0, 2),
+            listed=listed_distances(shapes, reference, own, own * 0 + 3, R[:, 3]).T,
+            bounds=turning_bounds(shapes, reference),
+        )
+
+    return Batched(f"pair_distances {n_dims}", call, 2e-5, draw=rows)
 
 
 def binned(X: Any) -> list[dict[str, Any]]:
@@ -479,6 +510,8 @@ TABLE = [
         for d, angle in ((1, 0.0), (2, 1.0), (3, 1.0), (3, 4.0 * np.arctan(1.0)))
         for dtype in ("float64", "float32")
     ),
+    pairs_row(2),
+    pairs_row(3),
     Batched("RandomBinning", binned, 1e-12, draw=rows),
     *(rhythm_row(RhythmicDMP(fit=fit)) for fit in FITS),
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),

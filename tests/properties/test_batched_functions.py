@@ -22,6 +22,7 @@ TILES = {
     "kineme.comparison.scores._TILE_PAIRS": 100,
     "kineme.recognition.early.early._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
+    "kineme.kernels.pair_distances._TILE_PAIRS": 500,
     "kineme.primitives.pose.tangent._TILE_SAMPLES": 400,
     "kineme.primitives.rhythmic.encode._TILE_SAMPLES": 700,
 }

@@ -24,7 +24,7 @@ ATTRIBUTES = ["classes_", "demonstrations_", "representations_", "weights_", "wi
 
 @pytest.mark.parametrize("classifier", CLASSIFIERS)
 def test_of_two_classes_the_decision_is_one_number_positive_for_the_second(classifier):
-    demos, fresh = draw_shapes([4, 5], spread=0.6), draw_shapes([20, 20], spread=1.2)
+    demos, fresh = draw_shapes([4, 5], spread=0.6), draw_shapes([20, 20], spread=0.8)
     recognizer = Recognizer(classifier=classifier).fit(demos)
     decision, shares = recognizer.decision_function(fresh), recognizer.predict_proba(fresh)
     assert decision.shape == (40,)

@@ -13,6 +13,7 @@ from kineme import Demonstrations, Recognizer
 from kineme.comparison import stored_references
 from kineme.comparison.bounds import fit_bases, reduce_features
 from kineme.comparison.describe import feature_rows
+from kineme.comparison.representation import ROW_REPRESENTATIONS
 from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError
 from kineme.recognition import two_stage_search
@@ -37,7 +38,15 @@ def _two_stages(recognizer, order=None, n_reduced=12, blocks=2):
         return tuple(block[rows] for block in features)
 
     first = recognizer.references_.first
-    references = StoredReferences(bases, parts, np.argsort(order), first, fetch, lambda rows: demos[order[rows]])
+    references = StoredReferences(
+        bases,
+        parts,
+        np.argsort(order),
+        first,
+        recognizer.comparison_.specification,
+        fetch,
+        lambda rows: demos[order[rows]],
+    )
     return TwoStageSearch(recognizer.comparison_, recognizer.calibration(), recognizer.classes_, references), asked
 
 
@@ -85,7 +94,7 @@ def test_a_few_comparisons_give_the_label_and_the_p_values_of_all(d, n_classes, 
 
 @given(seed=st.integers(0, 1000))
 def test_the_nearest_movement_is_always_compared(seed):
-    recognizer = Recognizer(classifier="nearest").fit(draw_shapes([5] * 30, 2, seed))
+    recognizer = Recognizer(ROW_REPRESENTATIONS).fit(draw_shapes([5] * 30, 2, seed))
     two, _ = _two_stages(recognizer, n_reduced=3)
     asked = draw_shapes([1] * 30, 2, seed + 1)
     described = recognizer.describe(asked)
@@ -103,7 +112,7 @@ def test_the_nearest_movement_is_always_compared(seed):
 @given(seed=st.integers(0, 1000))
 def test_whoever_could_be_nearer_is_compared_too(seed):
     """However few the reduced features, and however few are compared first."""
-    recognizer = Recognizer(classifier="nearest", weights="equal").fit(draw_shapes([5] * 30, 2, seed, spread=0.3))
+    recognizer = Recognizer(ROW_REPRESENTATIONS).fit(draw_shapes([5] * 30, 2, seed, spread=0.3))
     asked = draw_shapes([1] * 30, 2, seed, spread=0.3)
     with pytest.MonkeyPatch.context() as patch:
         for name in ("_LEADING", "_BEST", "_CLASSES"):

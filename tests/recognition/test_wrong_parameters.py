@@ -18,17 +18,19 @@ def test_representations_that_are_none(given):
         Recognizer(representations=given).fit(DEMOS)
 
 
-@pytest.mark.parametrize("weights", [[0, 0, 0], [1, 1], [-1, 2, 2], [np.nan, 1, 1], [np.inf, 1, 1], {}, ["a"] * 3, 1j])
+@pytest.mark.parametrize(
+    "weights", [[0] * 5, [1, 1], [-1, 2, 2, 2, 2], [np.nan, 1, 1, 1, 1], [np.inf, 1, 1, 1, 1], {}, ["a"] * 5, 1j]
+)
 def test_weights_that_are_none(weights):
     with pytest.raises(
-        SpecificationError, match="expected weights to be 'auto', 'equal' or 3 numbers from 0, not all 0"
+        SpecificationError, match="expected weights to be 'auto', 'equal', 'fitted' or 5 numbers from 0, not all 0"
     ):
         Recognizer(weights=weights).fit(DEMOS)
 
 
 def test_only_the_ratio_of_weights_matters_however_large():
-    recognizer = Recognizer(weights=[1e308, 1e308, 0.5e308]).fit(DEMOS)
-    np.testing.assert_allclose(recognizer.weights_, [0.4, 0.4, 0.2])
+    recognizer = Recognizer(weights=[1e308, 1e308, 0.5e308, 1e308, 1e308]).fit(DEMOS)
+    np.testing.assert_allclose(recognizer.weights_, np.array([2, 2, 1, 2, 2]) / 9)
 
 
 @pytest.mark.parametrize("angle", ["wide", [1.0], np.nan, -0.1, 4.0])

@@ -68,16 +68,18 @@ def anchor(folder: Path, **options: Any) -> None:
     with ActionLibrary(folder, read_only=not writes) as library:
         # Movements that join a symbol are excluded in any case, so that a number means the same proposal when it is
         # listed and when it is accepted.
-        found = recognized(library.store) if options["join"] else Recognized()
-        proposals = propose(library.store, None, options["method"], options["clusters"], options["min_members"], found)
+        joining = recognized(library.store) if options["join"] else Recognized()
+        proposals = propose(
+            library.store, None, options["method"], options["clusters"], options["min_members"], joining
+        )
         accepted = _chosen(proposals, options["accept"], "--accept")
         rejected = _chosen(proposals, options["reject"], "--reject")
         if both := set(accepted) & set(rejected):
             raise click.UsageError(f"expected each proposal accepted or rejected, got both for {min(both)}")
         pictures = _draw(library, proposals, options["pictures"])
         data = {
-            "joined": assign_recognized(library.store, found) if writes else {},
-            "would_join": {} if writes else {name: len(ids) for name, ids in found.ids.items()},
+            "joined": assign_recognized(library.store, joining) if writes else {},
+            "would_join": {} if writes else {name: len(ids) for name, ids in joining.ids.items()},
             **_as_data(proposals),
             "pictures": [str(path) for path in pictures],
         }
@@ -110,10 +112,10 @@ def _names(path: Path | None) -> dict[int, str]:
         names = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(names, dict):
             raise ValueError("no numbers of proposals")
-        found = {int(number): check_name(name) for number, name in names.items()}
-        if min(found, default=1) < 1:
-            raise ValueError(f"proposals are counted from 1, got {min(found)}")
-        return found
+        by_number = {int(number): check_name(name) for number, name in names.items()}
+        if min(by_number, default=1) < 1:
+            raise ValueError(f"proposals are counted from 1, got {min(by_number)}")
+        return by_number
     except ValueError as error:
         raise DataError(
             f'expected {path} to hold names by the number of the proposal, as {{"1": "wave"}}, got something else '
@@ -132,8 +134,8 @@ def _draw(library: Any, proposals: Any, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     movements = library.movements(ids=proposals.ids)
     like = library.specification.comparison
-    paths = [save_figure(draw_proposals(movements, proposals.found, like), folder / "all.png")]
-    for number, one in enumerate(proposals.found.proposals, 1):
+    paths = [save_figure(draw_proposals(movements, proposals.by_position, like), folder / "all.png")]
+    for number, one in enumerate(proposals.by_position.proposals, 1):
         paths.append(save_figure(draw_proposal(movements, one, like=like), folder / f"proposal-{number}.png"))
     number = len(proposals) + 1
     while (stale := folder / f"proposal-{number}.png").exists():  # of an earlier run
@@ -197,13 +199,13 @@ def _text(data: dict[str, Any], alone: str) -> str:
 
     lines = [f"{counted(n, 'movement')} joined {printable(name)}" for name, n in data["joined"].items()]
     lines += [f"{counted(n, 'movement')} would join {printable(name)}" for name, n in data["would_join"].items()]
-    found = data["proposals"]
+    proposals = data["proposals"]
     rows = [
         (str(one["number"]), str(len(one["movements"])), f"{one['stability']:.2f}", f"{one['cohesion']:.2f}",
          "" if one["nearest"] is None else str(one["nearest"]))
-        for one in found
+        for one in proposals
     ]  # fmt: skip
-    title = f"{counted(len(found), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
+    title = f"{counted(len(proposals), 'proposal')}, {counted(len(data['left_over']), 'movement')} left over{alone}"
     lines.append(
         to_text(Table(title, ("number", "movements", "stability", "cohesion", "most like"), rows)) if rows else title
     )

@@ -1,4 +1,4 @@
-"""``kineme evaluate``: compare recognizers on a data set."""
+"""``kineme evaluate``: compare recognizers on data sets."""
 
 from __future__ import annotations
 
@@ -12,54 +12,97 @@ from kineme.cli.output import write
 
 # The names of the tables in kineme.experiments.evaluation, written out so that --help loads nothing; a test compares
 # them.
-PROTOCOL_NAMES = ("few-shot", "leave-one-out", "cross-validation", "robustness", "any-angle", "open-set", "earliness")
-METHOD_NAMES = (
-    "kineme", "paper", "paper-bio", "euclidean", "dtw", "gak-svm", "minirocket", "point-cloud", "hmm",
+PROTOCOL_NAMES = (
+    "few-shot", "leave-one-out", "cross-validation", "robustness", "any-angle", "open-set", "earliness",
+    "user-dependent", "user-independent", "open-set-by-person", "earliness-by-person", "spotting", "anchoring",
 )  # fmt: skip
-_QUICK_SPLITS = 2
+METHOD_NAMES = (
+    "kineme", "paper", "paper-bio", "euclidean", "dtw", "dtw-path", "gak-svm", "minirocket", "point-cloud",
+    "plus-cloud", "quick-cloud", "hmm",
+)  # fmt: skip
+_QUICK_SPLITS, _QUICK_SHOTS, _SLOW = 2, (1, 3), {"gak-svm", "hmm", "dtw-path"}
 
 
-@click.command(short_help="Compare recognizers on a data set.")
-@click.argument("data")
+@click.command(short_help="Compare recognizers on data sets.")
+@click.argument("data", nargs=-1, required=True)
 @click.option("--protocol", "protocols", multiple=True, type=click.Choice(PROTOCOL_NAMES),
-              help="Protocol; may be repeated.  [default: all but leave-one-out and cross-validation]")  # fmt: skip
+              help="Protocol; may be repeated.  [default: from user-dependent on where people are known; else those "
+              "before, without leave-one-out and cross-validation]")  # fmt: skip
 @click.option("--method", "methods", multiple=True, type=click.Choice(METHOD_NAMES),
               help="Method; may be repeated.  [default: all]")  # fmt: skip
-@click.option("--splits", type=whole(1), default=10, show_default=True, help="Random splits per protocol.")
-@click.option("--shots", multiple=True, type=whole(1), default=(1, 3, 5), show_default=True,
-              help="Training movements per class; may be repeated.")  # fmt: skip
+@click.option("--splits", type=whole(1), default=10, show_default=True,
+              help="Random splits per protocol, by person rounded up so that each has equally many.")  # fmt: skip
+@click.option(
+    "--shots",
+    multiple=True,
+    type=whole(1),
+    help="Training movements per class; may be repeated.  [default: 1, 3, 5; by person 1, 2, 3, 4, 8]",
+)
 @click.option("--seed", type=whole(0), default=0, show_default=True, help="Seed of splits and perturbations.")
 @click.option("--jobs", type=whole(1), default=None, help="Number of processes.  [default: one per processor]")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default="out", show_default=True,
-              help="Folder for evaluation.html and evaluation.json.")  # fmt: skip
-@click.option("--quick", is_flag=True, help="At most two splits, without slow rivals.")
-def evaluate(data: str, protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
-    """Evaluate recognition on DATA: lasa, lasa-letters, or a folder with one folder of recordings per label.
+              help="Folder for evaluation.html and evaluation.json of each data set, and results.csv, results.json and "
+              "ranks.png of all.")  # fmt: skip
+@click.option(
+    "--quick", is_flag=True, help="At most two splits, one and three shots, without gak-svm, hmm and dtw-path."
+)
+def evaluate(data: tuple[str, ...], protocols: tuple[str, ...], methods: tuple[str, ...], **options: Any) -> None:
+    """Evaluate recognition on DATA: lasa, lasa-letters, a folder of recordings, or a file.
 
-    Compares the default recognizer with the paper's configuration and with other methods, under the same splits and
-    perturbations. Rivals that are not installed are reported and left out: pip install 'kineme[rivals]'.
+    A folder has one folder of recordings per label, or one per person with those inside; a file is a table with a
+    column of labels, or an npz archive with positions, times, offsets, labels and people. Compares the default
+    recognizer with the paper's configuration and with other methods, under the same splits and perturbations. Several
+    data sets get a folder each. Rivals that are not installed are reported and left out: pip install 'kineme[rivals]'.
     """
     from kineme.experiments.evaluation.data import load_data
     from kineme.experiments.evaluation.methods import METHODS
-    from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings
+    from kineme.experiments.evaluation.protocols import PROTOCOLS
     from kineme.experiments.evaluation.run import Runner
     from kineme.experiments.evaluation.run import evaluate as run
-    from kineme.output.table import to_text
+    from kineme.experiments.evaluation.summary import summarize
+    from kineme.experiments.evaluation.trials import Settings
     from kineme.runtime.parallel import n_threads
 
-    quick = options["quick"]
-    asked = protocols or tuple(name for name, one in PROTOCOLS.items() if one.by_default)
-    contenders = methods or tuple(name for name, one in METHODS.items() if not (quick and one.slow))
+    quick, out = options["quick"], options["out"]
+    contenders = methods or tuple(name for name in METHODS if not (quick and name in _SLOW))
     splits = min(options["splits"], _QUICK_SPLITS) if quick else options["splits"]
-    settings = Settings(splits, options["seed"], tuple(options["shots"]))
-    read = load_data(data)
-    for name, reason in read.left_out.items():
+    settings = Settings(splits, options["seed"], tuple(options["shots"]) or (_QUICK_SHOTS if quick else ()))
+    sets = _numbered([load_data(one) for one in data])
+    for name, reason in ((name, reason) for one in sets for name, reason in one.left_out.items()):
         write(f"left out {name}: {reason}", err=True)
-    done = run(read, (asked, contenders), settings, options["out"], Runner(options["jobs"] or n_threads(), _progress))
-    write("\n\n".join(map(to_text, done.tables)))
-    for name, reason in (done.results.absent | done.results.skipped).items():
-        write(f"{name}: {reason}")
-    write(f"\nopen {done.files[0]}")
+    runner = Runner(options["jobs"] or n_threads(), _progress)
+    evaluations = []
+    for one in sets:
+        asked = protocols or tuple(name for name, each in PROTOCOLS.items() if each.runs_by_default(one))
+        evaluations.append(run(one, (asked, contenders), settings, out / one.name if len(sets) > 1 else out, runner))
+        _print(one.name if len(sets) > 1 else "", evaluations[-1])
+    _print_summary(summarize([one.name for one in sets], evaluations, out), evaluations[0].files[0])
+
+
+def _numbered(sets: list[Any]) -> list[Any]:
+    """Data sets with names of their own: those of one name are numbered."""
+    names = [one.name for one in sets]
+    return [
+        one._replace(name=f"{one.name}-{names[: k + 1].count(one.name)}") if names.count(one.name) > 1 else one
+        for k, one in enumerate(sets)
+    ]
+
+
+def _print(name: str, evaluation: Any) -> None:
+    from kineme.experiments.evaluation.conclusions import verdict
+    from kineme.output.table import to_text
+
+    write("\n\n".join([name] * bool(name) + list(map(to_text, evaluation.tables))))
+    for what, reason in (evaluation.results.absent | evaluation.results.skipped).items():
+        write(f"{what}: {reason}")
+    write(f"\n{verdict(evaluation.results)}\n")
+
+
+def _print_summary(summary: Any, page: Path) -> None:
+    from kineme.output.table import to_text
+
+    write(summary.ranks if isinstance(summary.ranks, str) else to_text(summary.ranks))
+    write(f"\nopen {page}")
 
 
 def _progress(items: Any, total: int) -> Any:

@@ -37,7 +37,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
     if label is not None and no_labels:
         raise click.UsageError("expected --label or --no-labels, not both")
-    found, problems = _read_all(recordings, options)
+    parsed, problems = _read_all(recordings, options)
     with ActionLibrary(folder, create=True) as library:
         before = library.version
         reports = [
@@ -48,7 +48,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
                 options,
                 [None if no_labels else each if label is None else label for each in one.labels],
             )
-            for root, one in found
+            for root, one in parsed
         ]
         data = {
             "library": str(folder),
@@ -67,20 +67,20 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     """Recordings with their folder, and problems; an error if nothing could be read."""
     from kineme.errors import DataError
 
-    found: list[tuple[Path, Any]] = []
+    parsed: list[tuple[Path, Any]] = []
     problems: list[str] = []
     first: DataError | None = None
     for path in paths:
         try:
             one = read(path, options)
-            found.append((path if path.is_dir() else path.parent, one))
+            parsed.append((path if path.is_dir() else path.parent, one))
             problems += map(str, one.problems)
         except DataError as error:
             first = first or error
             problems.append(str(error))
-    if not found and first is not None:
+    if not parsed and first is not None:
         raise first
-    return found, problems
+    return parsed, problems
 
 
 def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[str | None]) -> Any:

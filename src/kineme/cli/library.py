@@ -85,12 +85,18 @@ def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
 @click.argument("text")
 @library_option
 @json_option
-def describe(symbol: str, text: str, folder: Path, as_json: bool) -> None:
+def annotate(symbol: str, text: str, folder: Path, as_json: bool) -> None:
     """Set the description of a symbol."""
     with opened(folder, read_only=False) as actions:
-        actions.describe(symbol, text)
+        actions.annotate(symbol, text)
         data = {**brief(actions[symbol]), "version": actions.version}
     say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
+
+
+library.add_command(
+    click.Command("describe", params=annotate.params, callback=annotate.callback, help="Use annotate.", hidden=True,
+                  deprecated=True)
+)  # fmt: skip
 
 
 @library.command(short_help="Delete a symbol or movements; earlier versions keep them.")

@@ -47,21 +47,21 @@ def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_j
 def review(folder: Path, as_json: bool) -> None:
     """Find symbols that could be merged, and symbols that could be split."""
     with opened(folder) as actions:
-        found = actions.review()
+        suggested = actions.review()
     data = {
-        "merges": [one._asdict() for one in found.merges],
-        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in found.splits],
+        "merges": [one._asdict() for one in suggested.merges],
+        "splits": [{**one._asdict(), "parts": [part.tolist() for part in one.parts]} for one in suggested.splits],
     }
 
     def text() -> str:
         lines = [
             f"{printable(one.first)} and {printable(one.second)} could be one: they overlap by {one.overlap:.2f}"
-            for one in found.merges
+            for one in suggested.merges
         ]
         lines += [
             f"{printable(one.symbol)} could be two: {len(one.parts[0])} movements, and "
             + ", ".join(map(str, one.parts[1].tolist()))
-            for one in found.splits
+            for one in suggested.splits
         ]
         return "\n".join(lines) or "the symbols are well apart, and none falls into two clusters"
 

@@ -36,13 +36,13 @@ def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_js
     """
     from kineme.library.library import ActionLibrary
 
-    found = read(recordings, options)
+    parsed = read(recordings, options)
     with ActionLibrary(folder, read_only=True) as library:
-        answers = _recognized(library, found.demonstrations, error_rate)
+        answers = _recognized(library, parsed.demonstrations, error_rate)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
-        "movements": [_as_data(source, one, stored, top) for source, one in zip(found.sources, answers, strict=True)],
-        "problems": [str(problem) for problem in found.problems],
+        "movements": [_as_data(source, one, stored, top) for source, one in zip(parsed.sources, answers, strict=True)],
+        "problems": [str(problem) for problem in parsed.problems],
     }
     say(as_json, data, lambda: _text(data, error_rate))
 

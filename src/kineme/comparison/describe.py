@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from kineme.comparison.described import Described, Pairs
 from kineme.comparison.representation import PAIR_QUANTITIES
@@ -99,7 +99,7 @@ def feature_rows(movements: MovementsLike, specification: ComparisonSpecificatio
     rows = tuple(np.empty((len(demos), demos.n_dims * one.n_points)) for one in specification.by_rows)
 
     def fill(start: int, stop: int) -> None:
-        for block, tile in zip(rows, _tile_rows(demos, start, stop, specification)[1], strict=True):
+        for block, tile in zip(rows, _tile_rows(demos, start, stop, specification, np.float64)[1], strict=True):
             block[start:stop] = tile
 
     for_tiles(fill, len(demos), _tile_movements(demos.n_dims))
@@ -137,13 +137,20 @@ def for_described(
 
 def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, procrustes: Procrustes) -> Tile:
     """Describe movements start:stop, all at once."""
-    paths, rows = _tile_rows(demos, start, stop, like.specification)
+    how = like.specification
+    paths, rows = _tile_rows(demos, start, stop, how, _precision(how))
     return Tile(start, stop, paths, prepare(rows, like, procrustes))
 
 
 def describe_paths(paths: Array, like: Compares, procrustes: Procrustes) -> Described:
     """Describe smooth, evenly timed paths (n, d, T): relative ones, or recorded ones where position matters."""
-    return prepare(_path_rows(paths, like.specification), like, procrustes)
+    how = like.specification
+    return prepare(_path_rows(paths, how, _precision(how)), how, procrustes)
+
+
+def _precision(how: ComparisonSpecification) -> DTypeLike:
+    """Single is far finer than the widths, except for paths that are far from the origin for their size."""
+    return np.float32 if how.normalization.translation else np.float64
 
 
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
@@ -159,21 +166,22 @@ def recorded_paths(demos: Demonstrations, paths: Array, start: int = 0) -> Array
 
 
 def _tile_rows(
-    demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification
-) -> tuple[Array, tuple[Array, ...]]:
-    """Paths of movements start:stop, as `even_paths` gives them, and their feature rows."""
+    demos: Demonstrations, start: int, stop: int, how: ComparisonSpecification, dtype: DTypeLike
+) -> tuple[Array, tuple[NDArray[Any], ...]]:
+    """Paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
     relative = even_paths(demos, start, stop, how.cutoff)
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
-    return relative, _path_rows(paths, how)
+    return relative, _path_rows(paths, how, dtype)
 
 
-def _path_rows(paths: Array, how: ComparisonSpecification) -> tuple[Array, ...]:
-    normalized: dict[tuple[float, int], Array] = {}  # representations of equal phase share it
+def _path_rows(paths: Array, how: ComparisonSpecification, dtype: DTypeLike) -> tuple[NDArray[Any], ...]:
+    """Feature rows of paths (n, d, T) as `dtype`."""
+    normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
     for one in how.by_rows:
         phase = (one.arc_share, one.n_points)
         if phase not in normalized:
-            normalized[phase] = how.normalization.apply(one.along(paths))
+            normalized[phase] = how.normalization.apply(one.along(paths), dtype)
         rows.append(one.describe(normalized[phase], how.normalization.translation))
     return tuple(rows)
 

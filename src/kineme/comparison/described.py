@@ -103,6 +103,6 @@ class Described:
         )
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Typical size in each representation, (R,): the median norm of rows; 1 pair by pair, which has no unit."""
+        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents."""
         by_rows = [float(np.sqrt(np.median(block.squares))) for block in self.blocks]
-        return np.array(by_rows + [1.0] * (self.n_representations - len(by_rows)))
+        return np.array(by_rows + [2.0] * (self.n_representations - len(by_rows)))

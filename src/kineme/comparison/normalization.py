@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array, check_choice, check_switch
 
 SCALES = ("path", "per-dimension", "none")
 SMALLEST, LARGEST = 1e-15, 1e15  # range of sizes of movements that keep their size
+_OPERATIONS_PER_SAMPLE = 5
 _FLAT = 1e-6  # share of the whole extent; flatter dimensions are not scaled up
 
 
@@ -36,8 +41,16 @@ class Normalization:
         check_switch("translation", self.translation)
         check_choice("scale", self.scale, SCALES)
 
-    def apply(self, paths: Array) -> Array:
-        """Paths (n, d, T) minus their center, divided by their size."""
+    def apply(self, paths: Array, dtype: DTypeLike = np.float64) -> NDArray[Any]:
+        """Paths (n, d, T) minus their center, divided by their size, as `dtype`."""
+        if self.translation and self.scale != "none" and use_compiled(_OPERATIONS_PER_SAMPLE * paths.size):
+            least = _FLAT if self.scale == "per-dimension" else math.inf
+            normalized = np.empty(paths.shape, dtype)
+            compiled_module("kineme.comparison._compiled").fill_normalized(paths, least, normalized)
+            return normalized
+        return self._apply(paths).astype(dtype, copy=False)
+
+    def _apply(self, paths: Array) -> Array:
         centered = paths - self.center(paths)
         if self.scale == "none":
             _check_size(centered)

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.normalization import Normalization
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import resample_by_arc_length
 from kineme.movements.preparation.spline import spline_matrix
@@ -89,15 +93,16 @@ class Representation:
             return paths[:, :, ::every] if remainder == 0 else paths @ spline_matrix(paths.shape[2], self.n_points).T
         return resample_by_arc_length(paths, self.n_points, self.arc_share)
 
-    def describe(self, paths: Array, translation: bool = True) -> Array:
+    def describe(self, paths: NDArray[Any], translation: bool = True) -> NDArray[Any]:
         """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
 
-        Without `translation` the paths still have their position, and it is added to the forcing term: f itself does
-        not depend on it, so that movements at other positions would be similar in that representation.
+        In the precision of the paths. Without `translation` the paths still have their position, and it is added to the
+        forcing term: f itself does not depend on it, so that movements at other positions would be similar in that
+        representation.
         """
         described = paths
         if self.quantity == "forcing":
-            described = (paths.reshape(-1, self.n_points) @ _forcing_operator(self)).reshape(paths.shape)
+            described = (paths.reshape(-1, self.n_points) @ _forcing_operator(self, paths.dtype)).reshape(paths.shape)
             if not translation:
                 described += paths.mean(axis=2, keepdims=True)
         return described.reshape(len(paths), -1)
@@ -122,9 +127,10 @@ ROW_REPRESENTATIONS = (
 )
 
 
-def default_representations(translation: bool, scale: str) -> tuple[Representation, ...]:
+def default_representations(normalization: Normalization) -> tuple[Representation, ...]:
     """Those of a recognizer: of the whole shape, unless position or size distinguishes movements."""
-    return DEFAULT_REPRESENTATIONS if translation and scale != "none" else ROW_REPRESENTATIONS
+    shape_alone = normalization.translation and normalization.scale != "none"
+    return DEFAULT_REPRESENTATIONS if shape_alone else ROW_REPRESENTATIONS
 
 
 def check_representations(representations: Any) -> tuple[Representation, ...]:
@@ -148,7 +154,7 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
 
 
 @lru_cache(maxsize=32)
-def _forcing_operator(representation: Representation) -> Array:
+def _forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
     dmp = DMP(
         "bio-inspired",
@@ -160,5 +166,6 @@ def _forcing_operator(representation: Representation) -> Array:
     )
     operator = encoder(dmp, representation.n_points).weights @ forcing_matrix(dmp, representation.n_points).T / dmp.K
     operator[0] -= operator.sum(axis=0)  # (x - x0) E = x E - x0 (sum of the rows of E)
+    operator = operator.astype(dtype, copy=False)
     operator.setflags(write=False)
     return operator

@@ -59,6 +59,11 @@ class ComparisonSpecification:
         object.__setattr__(self, "representations", check_representations(self.representations))
         if self.max_angle is not None:
             check_number("max_angle", self.max_angle, least=0.0)
+        if self.prior is not None and not isinstance(self.prior, RotationPrior):
+            raise SpecificationError(
+                f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
+                "kineme.RotationPrior(concentration=0.03)"
+            )
 
     @property
     def by_rows(self) -> tuple[Representation, ...]:
@@ -77,6 +82,9 @@ class ComparisonSpecification:
 
     def procrustes(self, n_dims: int) -> Procrustes:
         """The distance between rows of movements of `n_dims` dimensions."""
+        if self.max_angle is not None and self.max_angle >= math.pi and n_dims in (2, 3):
+            check_number("max_angle", self.max_angle, most=math.pi + 1e-12)
+            return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
         if self.max_angle is not None:
             return Procrustes(n_dims, float(self.max_angle))
         if n_dims not in (2, 3):

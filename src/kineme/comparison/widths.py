@@ -62,9 +62,7 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
-    found = [
-        _share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
-    ]
+    found = [_share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
     return np.array([_NO_IMPOSTOR if width is None else width for width in found])
 
 

@@ -77,10 +77,10 @@ def _resources() -> dict[str, Path]:
         listed = files(_DISTRIBUTION) or []
     except PackageNotFoundError:
         listed = []
-    found = {file.stem: Path(str(file.locate())) for file in listed if file.suffix == ".mat"}
-    if not found:
+    by_shape = {file.stem: Path(str(file.locate())) for file in listed if file.suffix == ".mat"}
+    if not by_shape:
         raise DataError(f"expected the LASA recordings inside the package {_DISTRIBUTION}, found none{_ADVICE}")
-    return found
+    return by_shape
 
 
 def _read(path: Path) -> Demos:

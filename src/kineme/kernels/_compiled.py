@@ -156,3 +156,14 @@ def fill_products(few: Rows, many: Rows, products: Rows) -> None:
             for k in range(few.shape[1]):
                 total += few[i, k] * row[k]
             products[i, j] = total
+
+
+@jit
+def fill_pairs(rows: Rows, pairs: Rows) -> None:
+    """Rows x_1 ... x_S, y_1 ... y_S as x_1, y_1, x_2, y_2 ...; the twin is `procrustes.as_complex`."""
+    half = rows.shape[1] // 2
+    for i in range(len(rows)):
+        row, pair = rows[i], pairs[i]
+        for k in range(half):
+            pair[2 * k] = row[k]
+            pair[2 * k + 1] = row[half + k]

@@ -7,10 +7,11 @@ depends neither on its lane nor on the pairs beside it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
@@ -34,13 +35,16 @@ class _Integers(_Lanes):
 _floats, _integers = _Lanes("16 x float32", _FLOAT), _Integers("16 x int32", _INT)
 
 
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, lanes: _Lanes) -> None:
-        super().__init__(manager, lanes, lanes.vector)
+        super().__init__(manager, lanes, lanes.vector)  # type: ignore[no-untyped-call]
 
 
 register_model(_Lanes)(_Model)
 register_model(_Integers)(_Model)
+
+
+_operation: Callable[[Callable[..., Any]], Callable[..., Any]] = intrinsic
 
 
 def _constant(value: float | int, vector: ir.VectorType) -> ir.Constant:
@@ -60,7 +64,7 @@ def _row(context: Any, builder: Any, array: Any, row: Any) -> Any:
     return builder.bitcast(first, (_FLOAT if kind.dtype == types.float32 else _INT).as_pointer())
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def load(_context, array, row):  # type: ignore[no-untyped-def]
     """Row `row` of a C-contiguous array (n, 16), float32 or int32."""
 
@@ -72,7 +76,7 @@ def load(_context, array, row):  # type: ignore[no-untyped-def]
     return lanes(array, types.intp), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def store(_context, array, row, lanes):  # type: ignore[no-untyped-def]
     """Write `lanes` to row `row` of a C-contiguous array (n, 16)."""
 
@@ -83,20 +87,62 @@ def store(_context, array, row, lanes):  # type: ignore[no-untyped-def]
     return types.void(array, types.intp, lanes), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
+def transpose(_context, rows, chosen, column, factor, array, row):  # type: ignore[no-untyped-def]
+    """``array[row + k, lane] = factor rows[chosen[lane], column + k]`` for 16 k and 16 lanes.
+
+    `rows` (n, length) is C-contiguous, float32, `chosen` an array of 16 indices.
+    """
+
+    def code(context, builder, signature, values):  # type: ignore[no-untyped-def]
+        source = context.make_array(signature.args[0])(context, builder, values[0])
+        picked = context.make_array(signature.args[1])(context, builder, values[1]).data
+        length = builder.extract_value(source.shape, 1)
+        lanes = []
+        for lane in range(LANES):
+            index = builder.load(builder.gep(picked, [ir.Constant(ir.IntType(64), lane)]))
+            at = builder.gep(source.data, [builder.add(builder.mul(index, length), values[2])])
+            lanes.append(builder.load(builder.bitcast(at, _FLOAT.as_pointer()), align=4))
+        first, each = (
+            _row(context, builder, (signature.args[4], values[4]), values[5]),
+            _splat(builder, values[3], _FLOAT),
+        )
+        for k, vector in enumerate(_transposed(builder, lanes)):
+            at = builder.gep(first, [ir.Constant(ir.IntType(64), k)])
+            builder.store(builder.fmul(vector, each), at, align=4)
+        return context.get_dummy_value()
+
+    return types.void(rows, chosen, types.intp, types.float32, array, types.intp), code
+
+
+def _transposed(builder: Any, vectors: list[Any]) -> list[Any]:
+    """Blocks of 1, 2, 4, 8 lanes change places with those of the vector so many further on."""
+    vectors = list(vectors)
+    for size in (1, 2, 4, 8):
+        low = [lane if not lane & size else LANES + lane - size for lane in range(LANES)]
+        high = [lane + size if not lane & size else LANES + lane for lane in range(LANES)]
+        masks = [ir.Constant(_INT, mask) for mask in (low, high)]
+        for i in range(LANES):
+            if not i & size:
+                pair = vectors[i], vectors[i + size]
+                vectors[i], vectors[i + size] = (builder.shuffle_vector(*pair, mask) for mask in masks)
+    return vectors
+
+
+@_operation
 def load_vector(_context, array, row, dims):  # type: ignore[no-untyped-def]
     """As many rows of an array (n, 16), from `row` on, as the tuple `dims` is long, as a tuple."""
     return _load_tuple(array, dims, len(dims))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def load_matrix(_context, array, row, dims):  # type: ignore[no-untyped-def]
     """As many rows as the square of that."""
     return _load_tuple(array, dims, len(dims) ** 2)
 
 
 def _load_tuple(array: Any, dims: Any, n: int) -> Any:
-    vector = types.UniTuple(_floats, n)
+    vector = types.UniTuple(_floats, n)  # type: ignore[no-untyped-call]
 
     def code(context, builder, signature, values):  # type: ignore[no-untyped-def]
         first = _row(context, builder, (signature.args[0], values[0]), values[1])
@@ -105,7 +151,7 @@ def _load_tuple(array: Any, dims: Any, n: int) -> Any:
     return vector(array, types.intp, dims), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def store_vector(_context, array, row, vector):  # type: ignore[no-untyped-def]
     """Write the members of a tuple to an array (n, 16), from `row` on."""
 
@@ -119,7 +165,7 @@ def store_vector(_context, array, row, vector):  # type: ignore[no-untyped-def]
     return types.void(array, types.intp, vector), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def plus_squares(_context, total, vector, array, row):  # type: ignore[no-untyped-def]
     """``total + sum_k (vector[k] - array[row + k])^2``."""
 
@@ -134,7 +180,7 @@ def plus_squares(_context, total, vector, array, row):  # type: ignore[no-untype
     return _floats(total, vector, array, types.intp), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def product(_context, vector, array, row):  # type: ignore[no-untyped-def]
     """``sum_k vector[k] array[row + k]``."""
 
@@ -149,7 +195,7 @@ def product(_context, vector, array, row):  # type: ignore[no-untyped-def]
     return _floats(vector, array, types.intp), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def rotated(_context, matrix, vector):  # type: ignore[no-untyped-def]
     """``sum_h matrix[k d + h] vector[h]`` for each k, as a tuple."""
 
@@ -176,7 +222,7 @@ def _sum_of_products(builder: Any, a: list[Any], b: list[Any]) -> Any:
     return result
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def every(_context, value):  # type: ignore[no-untyped-def]
     """One float32 in every lane."""
 
@@ -186,7 +232,7 @@ def every(_context, value):  # type: ignore[no-untyped-def]
     return _floats(types.float32), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def bit(_context, position):  # type: ignore[no-untyped-def]
     """The integer with only bit `position` set, in every lane."""
 
@@ -197,25 +243,25 @@ def bit(_context, position):  # type: ignore[no-untyped-def]
     return _integers(types.intp), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def plus(_context, a, b):  # type: ignore[no-untyped-def]
     """A + b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fadd(v[0], v[1])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def minus(_context, a, b):  # type: ignore[no-untyped-def]
     """A - b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fsub(v[0], v[1])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def times(_context, a, b):  # type: ignore[no-untyped-def]
     """A b."""
     return _floats(a, b), lambda _c, builder, _s, v: builder.fmul(v[0], v[1])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def least(_context, a, b):  # type: ignore[no-untyped-def]
     """The smaller of a and b."""
 
@@ -225,7 +271,7 @@ def least(_context, a, b):  # type: ignore[no-untyped-def]
     return _floats(a, b), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def largest(_context, a, b):  # type: ignore[no-untyped-def]
     """The larger of a and b."""
 
@@ -235,7 +281,7 @@ def largest(_context, a, b):  # type: ignore[no-untyped-def]
     return _floats(a, b), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def root(_context, a):  # type: ignore[no-untyped-def]
     """Square root."""
 
@@ -247,7 +293,7 @@ def root(_context, a):  # type: ignore[no-untyped-def]
     return _floats(a), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def if_less(_context, a, b, yes, no):  # type: ignore[no-untyped-def]
     """`yes` where a < b, else `no`: integers."""
 
@@ -257,13 +303,13 @@ def if_less(_context, a, b, yes, no):  # type: ignore[no-untyped-def]
     return _integers(a, b, yes, no), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def union(_context, a, b):  # type: ignore[no-untyped-def]
     """Bits that are set in either integer."""
     return _integers(a, b), lambda _c, builder, _s, v: builder.or_(v[0], v[1])
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_operation
 def unless(_context, bits, one, value):  # type: ignore[no-untyped-def]
     """`value` where `bits` and `one` share no bit, else 0."""
 

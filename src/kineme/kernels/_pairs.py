@@ -1,36 +1,27 @@
-"""Compiled distances of pairs, twins of those in ``elastic.py`` and ``point_cloud.py``: 16 pairs at once.
-
-A block holds 16 movements, one in each lane. Its rows are, for each segment, tangent, midpoint and turning angle, and
-for each point, position, turning angle, tangent and half its squared length, each times the root of its weight. The
-tuple `dims` is as long as a movement has dimensions: its type tells the compiler that number.
-"""
+"""Compiled distances of pairs, twins of those in ``elastic.py`` and ``point_cloud.py``: 16 pairs at once."""
 
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
+from kineme.kernels._blocks import begins_of, new_work, pack, pack_everywhere, rotate, take_rotation
 from kineme.kernels._lanes import (
     LANES,
-    aligned,
     bit,
     every,
     if_less,
     largest,
     least,
     load,
-    load_matrix,
     load_vector,
     minus,
     plus,
     plus_squares,
     product,
     root,
-    rotated,
     store,
-    store_vector,
     times,
     union,
     unless,
@@ -41,40 +32,27 @@ _FAR = np.float32(3e38)
 _jit = partial(jit, reorder=False)
 
 
-class _Work(NamedTuple):
-    """Blocks and rows of vectors that one call uses again and again."""
-
-    a: Any  # block of the one movements
-    b: Any  # and of the others
-    turned: Any  # the others, rotated
-    rotation: Any  # (d^2, 16)
-    elastic: Any  # (n_segments + 1, 16): the row of the elastic distance's table
-    turning: Any  # the same of turning alone
-    rows: Any  # (n_points, 16): distance of each point of a to its nearest
-    columns: Any  # and of b
-    nearest: Any  # (n_points, 16), integers: the bit of the point of a that is nearest to each of b
-    squares: Any  # (3, 16): the result
-
-
 @_jit
 def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-untyped-def]
     """``squares[:, i, j]``, the three squared distances of every movement of A with every one of B.
 
-    `A` and `B` hold tangents, midpoints, turning angles, points, their tangents and turning angles, `weights` the roots by which rows of a block are multiplied,
-    `sizes` the numbers of segments, of the band, and of points, and `rotations` (n, m, r) the entries of matrices,
-    r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
+    `sides` are A and B, each with its tangents, midpoints, turning angles, points, their tangents and turning angles,
+    a movement's numbers in one row; `numbers` the roots of their weights, and the sizes: segments, band and points;
+    `rotations` (n, m, r) the entries of matrices, r = d^2, or cosine and sine, r = 2, or nothing, r = 0.
     """
-    (A, B), (weights, sizes) = sides, numbers
+    (A, B), (_, sizes) = sides, numbers
     n, m = squares.shape[1], squares.shape[2]
-    work = _work(dims, sizes)
+    work, second = new_work(dims, sizes), np.zeros(LANES, np.intp)
     for start in range(0, m, LANES):
         width = min(LANES, m - start)
         for lane in range(LANES):
-            _pack(dims, B, start + min(lane, width - 1), weights, work.b, lane)
+            second[lane] = start + min(lane, width - 1)
+        pack(dims, B, second, numbers, work.b)
         for i in range(n):
-            _pack_everywhere(dims, A, i, weights, work.a)
+            if n > 1 or start == 0:
+                pack_everywhere(dims, A, i, numbers, work.a)
             for lane in range(LANES):
-                _take_rotation(dims, rotations, i, start + min(lane, width - 1), work.rotation, lane)
+                take_rotation(dims, rotations, i, second[lane], work.rotation, lane)
             _compare(dims, sizes, work)
             for k in range(3):
                 for lane in range(width):
@@ -84,16 +62,17 @@ def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-unty
 @_jit
 def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignore[no-untyped-def]
     """``squares[:, k]`` of listed pairs, two arrays of indices; rotations (n_pairs, 1, r)."""
-    (A, B), (first, second), (weights, sizes) = sides, pairs, numbers
-    n_pairs = len(first)
-    work = _work(dims, sizes)
+    (A, B), (_, sizes) = sides, numbers
+    n_pairs = len(pairs[0])
+    work, first, second = new_work(dims, sizes), np.zeros(LANES, np.intp), np.zeros(LANES, np.intp)
     for start in range(0, n_pairs, LANES):
         width = min(LANES, n_pairs - start)
         for lane in range(LANES):
             k = start + min(lane, width - 1)
-            _pack(dims, A, first[k], weights, work.a, lane)
-            _pack(dims, B, second[k], weights, work.b, lane)
-            _take_rotation(dims, rotations, k, 0, work.rotation, lane)
+            first[lane], second[lane] = pairs[0][k], pairs[1][k]
+            take_rotation(dims, rotations, k, 0, work.rotation, lane)
+        pack(dims, A, first, numbers, work.a)
+        pack(dims, B, second, numbers, work.b)
         _compare(dims, sizes, work)
         for k in range(3):
             for lane in range(width):
@@ -101,121 +80,37 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
 
 
 @_jit
-def _work(dims, sizes):  # type: ignore[no-untyped-def]
-    d = len(dims)
-    n_segments, _, n_points = sizes
-    n_rows = n_segments * (2 * d + 1) + n_points * (2 * d + 2)
-    return _Work(
-        aligned(n_rows),
-        aligned(n_rows),
-        aligned(n_rows),
-        aligned(d * d),
-        aligned(n_segments + 1),
-        aligned(n_segments + 1),
-        aligned(n_points),
-        aligned(n_points),
-        np.zeros((n_points, LANES), np.int32),
-        aligned(3),
-    )
-
-
-@_jit
-def _pack(dims, shapes, i, weights, block, lane):  # type: ignore[no-untyped-def]
-    """Put movement i into a lane of a block."""
-    tangents, midpoints, turning, points, point_tangents, point_turning = shapes
-    position, turn, cloud_turn, line = weights
-    d, row = len(dims), 0
-    for p in range(tangents.shape[1]):
-        for k in range(d):
-            block[row + k, lane] = tangents[i, p, k]
-            block[row + d + k, lane] = midpoints[i, p, k] * position
-        block[row + 2 * d, lane] = turning[i, p] * turn
-        row += 2 * d + 1
-    for p in range(points.shape[1]):
-        half = np.float32(0)
-        for k in range(d):
-            block[row + k, lane] = points[i, p, k]
-            t = point_tangents[i, p, k] * line
-            block[row + d + 1 + k, lane] = t
-            half += t * t
-        block[row + d, lane] = point_turning[i, p] * cloud_turn
-        block[row + 2 * d + 1, lane] = np.float32(0.5) * line * line * half
-        row += 2 * d + 2
-
-
-@_jit
-def _pack_everywhere(dims, shapes, i, weights, block):  # type: ignore[no-untyped-def]
-    """Put movement i into every lane of a block."""
-    _pack(dims, shapes, i, weights, block, 0)
-    for row in range(len(block)):
-        store(block, row, every(block[row, 0]))
-
-
-@_jit
-def _take_rotation(dims, rotations, i, j, block, lane):  # type: ignore[no-untyped-def]
-    d = len(dims)
-    if rotations.shape[2] == 0:
-        for k in range(d * d):
-            block[k, lane] = k % (d + 1) == 0
-    elif rotations.shape[2] == d * d:
-        for k in range(d * d):
-            block[k, lane] = rotations[i, j, k]
-    else:
-        c, s = rotations[i, j, 0], rotations[i, j, 1]
-        block[0, lane], block[1, lane] = c, -s
-        block[2, lane], block[3, lane] = s, c
-
-
-@_jit
 def _compare(dims, sizes, work):  # type: ignore[no-untyped-def]
-    n_segments, band, n_points = sizes
-    _rotate(dims, n_segments, n_points, work)
-    _warp(dims, n_segments, band, work)
-    _match(dims, n_segments * (2 * len(dims) + 1), n_points, work)
+    rotate(dims, sizes, work)
+    _warp(dims, sizes, work)
+    _match(dims, sizes, work)
 
 
 @_jit
-def _rotate(dims, n_segments, n_points, work):  # type: ignore[no-untyped-def]
-    d, row = len(dims), 0
-    matrix, b, turned = load_matrix(work.rotation, 0, dims), work.b, work.turned
-    for _ in range(n_segments):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d, rotated(matrix, load_vector(b, row + d, dims)))
-        store(turned, row + 2 * d, load(b, row + 2 * d))
-        row += 2 * d + 1
-    for _ in range(n_points):
-        store_vector(turned, row, rotated(matrix, load_vector(b, row, dims)))
-        store_vector(turned, row + d + 1, rotated(matrix, load_vector(b, row + d + 1, dims)))
-        store(turned, row + d, load(b, row + d))
-        store(turned, row + 2 * d + 1, load(b, row + 2 * d + 1))
-        row += 2 * d + 2
-
-
-@_jit
-def _warp(dims, n_segments, band, work):  # type: ignore[no-untyped-def]
+def _warp(dims, sizes, work):  # type: ignore[no-untyped-def]
     """Dynamic time warping of both costs, row by row of their tables; column q is kept in row q + 1 of an array."""
-    a, b, elastic, turning = work.a, work.turned, work.elastic, work.turning
-    d, far = len(dims), every(_FAR)
+    a, b, turned, elastic, turning = work.a, work.b, work.turned, work.elastic, work.turning
+    (n_segments, band, _), d, far = sizes, len(dims), every(_FAR)
+    _, midpoints, angles = begins_of(dims, sizes)[:3]
     for q in range(n_segments + 1):
         store(elastic, q, far)
         store(turning, q, far)
     store(elastic, 0, every(np.float32(0)))
     store(turning, 0, every(np.float32(0)))
     for p in range(n_segments):
-        row = p * (2 * d + 1)
-        tangent, midpoint, turn = load_vector(a, row, dims), load_vector(a, row + d, dims), load(a, row + 2 * d)
+        tangent, midpoint = load_vector(a, p * d, dims), load_vector(a, midpoints + p * d, dims)
+        turn = load(a, angles + p)
         first, end = max(0, p - band), min(n_segments, p + band + 1)
         corner, corner_turning = load(elastic, first), load(turning, first)
         left, left_turning = far, far
         store(elastic, first, far)
         store(turning, first, far)
         for q in range(first, end):
-            other = q * (2 * d + 1)
-            difference = minus(turn, load(b, other + 2 * d))
+            difference = minus(turn, load(b, angles + q))
             cost = times(difference, difference)
             above, above_turning = load(elastic, q + 1), load(turning, q + 1)
             left_turning = plus(cost, least(least(above_turning, corner_turning), left_turning))
-            cost = plus_squares(plus_squares(cost, tangent, b, other), midpoint, b, other + d)
+            cost = plus_squares(plus_squares(cost, tangent, turned, q * d), midpoint, turned, midpoints + q * d)
             left = plus(cost, least(least(above, corner), left))
             store(elastic, q + 1, left)
             store(turning, q + 1, left_turning)
@@ -226,23 +121,22 @@ def _warp(dims, n_segments, band, work):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def _match(dims, begin, n_points, work):  # type: ignore[no-untyped-def]
+def _match(dims, sizes, work):  # type: ignore[no-untyped-def]
     """Distances of the points of each movement to their nearest, and of those that nobody matched."""
-    a, b, columns, nearest = work.a, work.turned, work.columns, work.nearest
-    d, zero, far = len(dims), every(np.float32(0)), every(_FAR)
+    a, b, turned, columns, nearest = work.a, work.b, work.turned, work.columns, work.nearest
+    n_points, d, zero, far = sizes[2], len(dims), every(np.float32(0)), every(_FAR)
+    points, tangents, angles, halves = begins_of(dims, sizes)[3:]
     for q in range(n_points):
         store(columns, q, far)
     matched = bit(0)
     for p in range(n_points):
-        row = begin + p * (2 * d + 2)
-        point, tangent = load_vector(a, row, dims), load_vector(a, row + d + 1, dims)
-        turn, half = load(a, row + d), load(a, row + 2 * d + 1)
+        point, tangent = load_vector(a, points + p * d, dims), load_vector(a, tangents + p * d, dims)
+        turn, half = load(a, angles + p), load(a, halves + p)
         smallest, at, own = far, bit(0), bit(p)
         for q in range(n_points):
-            other = begin + q * (2 * d + 2)
-            difference = minus(turn, load(b, other + d))
-            both = product(tangent, b, other + d + 1)
-            cost = plus_squares(plus(half, load(b, other + 2 * d + 1)), point, b, other)
+            difference = minus(turn, load(b, angles + q))
+            both = product(tangent, turned, tangents + q * d)
+            cost = plus_squares(plus(half, load(b, halves + q)), point, turned, points + q * d)
             cost = minus(plus(cost, times(difference, difference)), times(both, both))
             at = if_less(cost, smallest, bit(q), at)
             smallest = least(cost, smallest)

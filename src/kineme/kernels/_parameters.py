@@ -92,11 +92,11 @@ def _copy(value: Any) -> Any:
 def _nested(name: str, value: Any) -> dict[str, Any]:
     if isinstance(value, Parameters):
         return {f"{name}__{inner}": part for inner, part in value.get_params().items()}
-    found: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
     if isinstance(value, tuple):
         for i, part in enumerate(value):
-            found |= {f"{name}__{i}": part} | _nested(f"{name}__{i}", part)
-    return found
+            parameters |= {f"{name}__{i}": part} | _nested(f"{name}__{i}", part)
+    return parameters
 
 
 def _changed(value: Any, name: str, new: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.kernels.soft_rotation import CLOSE, STEPS, TIE, TIE_BREAK
+from kineme.kernels.soft_rotation import CLOSE, ROUNDING, STEPS, TIE, TIE_BREAK
 from kineme.runtime.compiled import jit
 
 _LANES = 32  # pairs at once: with fewer the processor waits for roots and divisions
@@ -121,7 +121,7 @@ def _solve(lanes):  # type: ignore[no-untyped-def]
             over = x * x - square[lane]
             slope = 4.0 * x * over - 8.0 * determinant[lane]
             value = over * over - 8.0 * x * determinant[lane] - last[lane]
-            goes_on = slope > 0.0 and value > CLOSE * x * slope
+            goes_on = slope > 0.0 and value > CLOSE * x * slope and value > ROUNDING * square[lane] * square[lane]
             step = value / slope if goes_on else 0.0
             top[lane] = x - step
             moving += step

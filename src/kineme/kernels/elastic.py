@@ -41,20 +41,21 @@ def elastic_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotat
     first, second : arrays (k,) of indices
     rotations : array (k, d, d), or None for none
     """
-    angles = A.turning[first, :, None].astype(float) - B.turning[second, None, :]
-    turning = A.elastic.turning_weight * angles**2
+    angles = A.turning[first, :, None].astype(np.float64) - B.turning[second, None, :]
+    turning: Array = A.elastic.turning_weight * angles**2
     costs = turning.copy()
     for weight, name in ((1.0, "tangents"), (A.elastic.position_weight, "midpoints")):
         a, b = getattr(A, name)[first].astype(float), rotated(getattr(B, name)[second], rotations)
         for k in range(A.n_dims):
             costs += weight * (a[:, :, None, k] - b[:, None, :, k]) ** 2
-    return np.stack([_warped(one, A.elastic.band) for one in (costs, turning)]) / A.elastic.n_segments
+    sums = (_warped(costs, A.elastic.band), _warped(turning, A.elastic.band))
+    return np.stack(sums) / A.elastic.n_segments
 
 
 def rotated(vectors: Floats, rotations: Array | None) -> Array:
     """Vectors (k, n, d), each pair's by its own rotation (k, d, d)."""
-    vectors = vectors.astype(float)
-    return vectors if rotations is None else np.asarray(vectors @ rotations.transpose(0, 2, 1))
+    double = vectors.astype(np.float64)
+    return double if rotations is None else np.asarray(double @ rotations.transpose(0, 2, 1))
 
 
 def _warped(costs: Array, band: int) -> Array:

@@ -24,7 +24,7 @@ from kineme.validation import Array
 RotationsOfTile = Callable[[slice, slice], NDArray[Any]]
 
 _TILE_ROWS, _TILE_PAIRS = 32, 4096  # the columns are packed once for so many rows; a tile takes about a millisecond
-_FEW_COLUMNS = 4  # with so few, most lanes of a row would be idle: its pairs are taken as a list
+_FEW_COLUMNS = 8  # with so few, most lanes of a row would be idle: its pairs are taken as a list
 _TWIN_PAIRS = 1000
 _PAIR_OPERATIONS, _BOUND_OPERATIONS = 10_000, 500  # elementary operations of the plain twins per pair
 
@@ -57,7 +57,7 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTi
     if n == 0 or m == 0:
         return squares
     fill = _filler(A, B, n * m)
-    rows = min(n, _TILE_ROWS)
+    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m))
     columns = max(16, _TILE_PAIRS // rows // 16 * 16)
     tiles = [
         (slice(i, min(i + rows, n)), slice(j, min(j + columns, m)))
@@ -200,14 +200,14 @@ def _matrices(entries: Floats, d: int) -> Array | None:
 
 
 def _arrays(shapes: Shapes, chosen: slice) -> tuple[Floats, ...]:
-    """What the compiled loops read, of some movements."""
+    """What the compiled loops read, of some movements: the numbers of each in one row."""
     s = shapes
     arrays = (s.tangents, s.midpoints, s.turning, s.points, s.point_tangents, s.point_turning)
-    return tuple(one[chosen] for one in arrays)
+    return tuple(one[chosen].reshape(-1, one[0].size if len(one) else 1) for one in arrays)
 
 
 def _numbers(shapes: Shapes) -> tuple[tuple[np.float32, ...], tuple[int, int, int]]:
-    """Roots of the weights, by which rows of a block are multiplied, and the numbers of segments, band and points."""
+    """Roots of the weights of those arrays, and the numbers of segments, band and points."""
     elastic, cloud = shapes.elastic, shapes.cloud
-    squares = (elastic.position_weight, elastic.turning_weight, cloud.turning_weight, cloud.line_weight**0.5)
-    return tuple(np.float32(one**0.5) for one in squares), (elastic.n_segments, elastic.band, cloud.n_points)
+    weights = (1.0, elastic.position_weight, elastic.turning_weight, 1.0, cloud.line_weight**0.5, cloud.turning_weight)
+    return tuple(np.float32(one**0.5) for one in weights), (elastic.n_segments, elastic.band, cloud.n_points)

@@ -14,6 +14,7 @@ from kineme.errors import SpecificationError
 from kineme.kernels.rotation import best_products, best_rotations, half_angle
 from kineme.kernels.soft_rotation import (
     RotationPrior,
+    limited,
     soft_products,
     soft_products_in_plane,
     soft_rotations,
@@ -95,8 +96,7 @@ class Procrustes:
         The products run in the rows' own precision, float64 or float32; the norms are float64.
         """
         in_plane = self.n_dims == 2 and self.max_angle > 0
-        squares = np.einsum("ij,ij->i", rows, rows, dtype=np.float64)
-        return Prepared(as_complex(rows) if in_plane else rows, squares)
+        return Prepared(as_complex(rows) if in_plane else rows, _squares(rows))
 
     def squared_distances(self, A: Prepared, B: Prepared) -> Array:
         """Squared distances (n, m) between prepared rows."""
@@ -119,6 +119,8 @@ class Procrustes:
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
         """The same, and the rotations that bring B closest to A.
 
+        Under a limit in space, these are the best free rotations, turned back to the limit.
+
         Returns
         -------
         alignment : ndarray of shape (n, m)
@@ -134,28 +136,27 @@ class Procrustes:
                 return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
             best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
             return best, np.stack((c, -s), -1).astype(np.float32)
-        fill = self._soft_filler if self.prior is not None else self._hard_filler
-        return _in_space(A, B, fill(len(A.rows) * len(B.rows), rotations=True), rotations=True)
+        n_pairs = len(A.rows) * len(B.rows)
+        best, rotations = _in_space(A, B, self._soft_filler(n_pairs, rotations=True), rotations=True)
+        if self.prior is None and rotations is not None:
+            return self.alignment(A, B), limited(rotations, self.max_angle)
+        return best, rotations
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
 
         Of several rotations that are equally good, as about the axis of a straight movement, the smallest is returned.
+        A prior decides how alike two movements are, not how one is best laid onto the other: it has no part here.
         """
         d = self.n_dims
         if self.max_angle == 0 or d not in (2, 3):
             return np.broadcast_to(np.eye(d), (len(B), d, d)).copy()
-        norms = np.sqrt(np.einsum("ij,ij->i", A, A)) * np.sqrt(np.einsum("ij,ij->i", B, B))
         if d == 2:
             product = np.einsum("ij,ij->i", *np.broadcast_arrays(as_complex(A), as_complex(B).conj()))
-            if self.prior is not None:
-                product = product + norms * np.trace(self.prior.matrix(2))
             angle = np.clip(np.angle(product), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
             return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
-        if self.prior is not None:
-            return soft_rotations(turned(C, norms, self.prior.matrix(3)))
         return best_rotations(C, self.max_angle)
 
     def _weights(self, A: Prepared, B: Prepared) -> Array:
@@ -163,24 +164,20 @@ class Procrustes:
         assert self.prior is not None
         return np.asarray(np.trace(self.prior.matrix(2)) * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
 
-    def _hard_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
-        """What writes the best products (n, m) of a block of products (3 n, 3 m), and rotations: compiled or plain."""
-        if not rotations and use_compiled(n_pairs * _PAIR_OPERATIONS):
+    def _hard_filler(self, n_pairs: int) -> Filler:
+        """What writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
+        if use_compiled(n_pairs * _PAIR_OPERATIONS):
             fill_best_products = compiled_module("kineme.kernels._rotation").fill_best_products
             return lambda products, a, b, best, R: fill_best_products(products, *half_angle(self.max_angle), best)
 
         def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
-            C = _covariances(products)
-            best[:] = best_products(C, self.max_angle).reshape(best.shape)
-            if rotations:
-                R[:] = best_rotations(C, self.max_angle).reshape(R.shape)
+            best[:] = best_products(_covariances(products), self.max_angle).reshape(best.shape)
 
         return fill
 
     def _soft_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
-        """The same under a prior."""
-        assert self.prior is not None
-        F = self.prior.matrix(3)
+        """The same under a prior, or under none, and rotations."""
+        F = np.zeros((3, 3)) if self.prior is None else self.prior.matrix(3)
         if use_compiled(_CALL_OPERATIONS + n_pairs * _PAIR_OPERATIONS):
             soft = compiled_module("kineme.kernels._soft_rotation")
             if rotations:
@@ -197,13 +194,26 @@ class Procrustes:
         return fill
 
 
+_ROWS_AT_ONCE = 256
 _MANY = 16  # rows from which on a product by BLAS is faster
+
+
+def _squares(rows: NDArray[Any]) -> Array:
+    """Squared norms (n,), in double precision."""
+    squares = np.empty(len(rows))
+    for start in range(0, len(rows), _ROWS_AT_ONCE):  # converted rows stay in the cache
+        some = rows[start : start + _ROWS_AT_ONCE].astype(np.float64, copy=False)
+        np.einsum("ij,ij->i", some, some, out=squares[start : start + _ROWS_AT_ONCE])
+    return squares
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     """Rows x_1 ... x_S, y_1 ... y_S as complex rows x + i y."""
     half = rows.shape[1] // 2
     pairs = np.empty((len(rows), half), np.result_type(rows, np.complex64))
+    if use_compiled(rows.size):
+        compiled_module("kineme.kernels._compiled").fill_pairs(rows, _as_real(pairs))
+        return pairs
     pairs.real, pairs.imag = rows[:, :half], rows[:, half:]
     return pairs
 

@@ -165,20 +165,22 @@ def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec
     steps = _unit(np.diff(points, axis=1))
     point_turning = np.zeros(points.shape[:2])
     point_turning[:, 1:-1] = _angles(steps[:, :-1], steps[:, 1:])
-    single = (
-        np.ascontiguousarray(array, np.float32)
-        for array in (
-            tangents,
-            0.5 * (ends[:, 1:] + ends[:, :-1]),
-            turning,
-            low,
-            high,
-            points,
-            _unit(np.gradient(points, axis=1)),
-            point_turning,
-        )
+    return Shapes(
+        tangents=_single(tangents),
+        midpoints=_single(0.5 * (ends[:, 1:] + ends[:, :-1])),
+        turning=_single(turning),
+        turning_low=_single(low),
+        turning_high=_single(high),
+        points=_single(points),
+        point_tangents=_single(_unit(np.gradient(points, axis=1))),
+        point_turning=_single(point_turning),
+        elastic=elastic,
+        cloud=cloud,
     )
-    return Shapes(*single, elastic=elastic, cloud=cloud)
+
+
+def _single(array: Array) -> Floats:
+    return np.ascontiguousarray(array, np.float32)
 
 
 def _even(paths: Array, n: int) -> Array:

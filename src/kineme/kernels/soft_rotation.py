@@ -27,6 +27,7 @@ from kineme.validation import Array, check_number
 
 STEPS = 40  # of Newton's, at most; five to eight in practice
 CLOSE = 1e-12  # relative step after which there are no more
+ROUNDING = 1e-15  # of |M|^4: the quartic is no more exact, and where two roots meet its slope is none at all
 TIE = 1e-5  # of the cube of the norm: smaller divisors have lost digits, since two rotations are about equally good
 #: Of the norm, added to the diagonal where rotations are equally good, so that one of them is better.
 TIE_BREAK = (3e-3, 2e-3, 1e-3)
@@ -112,6 +113,26 @@ def soft_rotations(M: Array) -> Array:
     return R
 
 
+def limited(R: NDArray[np.floating], max_angle: float) -> NDArray[np.float32]:
+    """Rotations R (..., 3, 3), those by more than `max_angle` turned back to it about their axes."""
+    R = np.asarray(R, dtype=np.float32).copy()
+    cosine = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    beyond = cosine < np.cos(max_angle)
+    if beyond.any():
+        far = R[beyond].astype(np.float64)
+        c = cosine[beyond, None, None]
+        # (R + R^T) / 2 - cos I = (1 - cos) u u^T: its longest column lies along the axis, up to the sign.
+        along = 0.5 * (far + far.transpose(0, 2, 1)) - c * np.eye(3)
+        longest = np.einsum("nij,nij->nj", along, along).argmax(axis=1)
+        u = along[np.arange(len(far)), :, longest]
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        skew = np.stack((far[:, 2, 1] - far[:, 1, 2], far[:, 0, 2] - far[:, 2, 0], far[:, 1, 0] - far[:, 0, 1]), -1)
+        u *= np.where(np.einsum("ni,ni->n", u, skew) < 0, -1.0, 1.0)[:, None]
+        K = np.cross(np.eye(3), u[:, None, :])  # K v = u x v
+        R[beyond] = np.eye(3) + np.sin(max_angle) * K + (1.0 - np.cos(max_angle)) * K @ K
+    return R
+
+
 def _rotations(M: Array) -> tuple[Array, Array]:
     """R and the divisor in it."""
     square, determinant, last, cofactors = _invariants(M)
@@ -138,7 +159,8 @@ def _largest_root(square: Array, determinant: Array, last: Array) -> Array:
         over = x * x - square
         slope = 4.0 * x * over - 8.0 * determinant
         value = over * over - 8.0 * x * determinant - last
-        step = np.where(slope > 0, np.maximum(value, 0.0) / np.where(slope > 0, slope, 1.0), 0.0)
+        moving = (value > ROUNDING * square * square) & (slope > 0)
+        step = np.where(moving, value / np.where(moving, slope, 1.0), 0.0)
         x = x - step
         if not (step > CLOSE * x).any():
             break

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, overload
+from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -295,9 +296,14 @@ class ActionLibrary:
         """Give a symbol another name; its id stays."""
         changes.rename(self.store, old, new)
 
-    def describe(self, who: str, text: str | None = None, **values: Any) -> None:
+    def annotate(self, who: str, text: str | None = None, **values: Any) -> None:
         """Set the description of a symbol, its ``prototype`` (id of a movement) or ``threshold``; None clears these."""
-        changes.describe(self.store, who, **({} if text is None else {"description": text}), **values)
+        changes.annotate(self.store, who, **({} if text is None else {"description": text}), **values)
+
+    def describe(self, who: str, text: str | None = None, **values: Any) -> None:
+        """Deprecated name of `annotate`."""
+        warn("ActionLibrary.describe is now ActionLibrary.annotate", DeprecationWarning, stacklevel=2)
+        self.annotate(who, text, **values)
 
     def delete(self, what: str | ArrayLike) -> None:
         """Delete a symbol, given by name or id, whose movements stay; or movements, given by their ids.

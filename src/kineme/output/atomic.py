@@ -113,7 +113,7 @@ def remove_leftovers(path: Path) -> None:
     pattern = re.compile(rf"\.{re.escape(path.name)}\.(\d+)(?:\.[0-9a-f]{{8}})?(?:-wal|-shm|-journal)?")
     with suppress(OSError):
         for entry in os.scandir(path.parent):
-            if (found := pattern.fullmatch(entry.name)) and not _is_at_work(int(found[1])):
+            if (match := pattern.fullmatch(entry.name)) and not _is_at_work(int(match[1])):
                 with suppress(OSError):
                     _remove_if_idle(Path(entry.path))
 

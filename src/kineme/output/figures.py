@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,28 @@ def new_figure(width: float, height: float) -> Figure:
 
     matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
     return Figure(figsize=(width, height), layout="constrained")
+
+
+class _PyplotFigure(Figure):
+    """A figure of pyplot that notebooks show once: not as the value of a cell and at the end of the cell, too."""
+
+    def _ipython_display_(self) -> None:
+        import matplotlib
+
+        if "inline" in matplotlib.get_backend():
+            sys.modules["matplotlib.pyplot"].close(self)
+        raise NotImplementedError  # IPython goes on as without this method
+
+
+def figure_to_show(width: float, height: float) -> Figure:
+    """As `new_figure`, but of `matplotlib.pyplot` where the caller has imported that, whose ``show`` then shows it."""
+    if (pyplot := sys.modules.get("matplotlib.pyplot")) is None:
+        return new_figure(width, height)
+    import matplotlib
+
+    matplotlib.rcParams.update(_RC)  # type: ignore[arg-type]
+    figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained", FigureClass=_PyplotFigure)
+    return figure
 
 
 #: What each file format needs to come out the same at every run.

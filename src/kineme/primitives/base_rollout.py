@@ -19,6 +19,7 @@ from kineme.primitives.batch import Batch
 from kineme.validation import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -110,20 +111,42 @@ class BaseRollout(ABC):
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.positions, dtype=dtype, copy=copy)
 
-    def plot(self) -> Figure:
+    @overload
+    def plot(self, ax: None = None) -> Figure: ...
+    @overload
+    def plot(self, ax: Axes) -> Axes: ...
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
         """A picture: each dimension over time, and the path where it has two or three dimensions.
 
-        Of more than 50 movements, some are drawn; the title says how many.
+        A circle is where a path starts, a star where it ends. Of more than 50 movements, some are drawn; the title says
+        how many.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Draw into these axes: the path of movements of two dimensions, of three if they are axes of projection
+            "3d", or the only dimension over time.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            Shown at once in a notebook; ``figure.savefig("movements.png")`` writes it to a file. It does not belong to
-            `matplotlib.pyplot`, whose ``show`` and ``savefig`` know nothing of it.
-        """
-        from kineme.primitives.rollout_figure import draw_rollout
+        matplotlib.figure.Figure or matplotlib.axes.Axes
+            `ax` if it was given; else a new figure, ``figure.savefig("movements.png")`` writes it to a file. If
+            `matplotlib.pyplot` has been imported, the figure belongs to it: ``plt.show()`` and notebooks show it, and
+            ``plt.close(figure)`` frees it.
 
-        return draw_rollout(self.times, self.positions, self.axis_names, self.labels)
+        Raises
+        ------
+        SpecificationError
+            Something else than axes, axes in the plane for movements in space or the reverse, or axes for movements
+            of more than three dimensions.
+        """
+        from kineme.primitives.rollout_figure import draw_rollout, draw_rollout_into
+
+        what = (self.times, self.positions, self.axis_names, self.labels)
+        if ax is None:
+            return draw_rollout(*what)
+        draw_rollout_into(ax, *what)
+        return ax
 
     def to_dataframe(self) -> Any:
         """All samples in one long table.

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
+import matplotlib
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from kineme.output.figures import BLUE, GREEN, ORANGE, PURPLE, new_figure
+from kineme.errors import SpecificationError
+from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, figure_to_show
 from kineme.output.text import drawable
 from kineme.validation import Array
 
@@ -18,49 +22,98 @@ _MOST = 50  # movements in one figure; more would be illegible
 _ROWS = 8  # dimensions below each other, before a second column begins
 _COLORS = (BLUE, ORANGE, GREEN, PURPLE)
 _NAMED = 30  # labels in the legend; with more of them all movements have one color
-_IN_A_ROW = 6  # labels in one row of the legend
+_IN_A_ROW = 6  # entries in one row of the legend
+_START, _END = ("o", 4), ("*", 8)  # markers and their sizes
 
 
-def draw_rollout(times: Array, positions: Array, axis_names: list[str], labels: NDArray[Any] | None) -> Figure:
+class _Drawn(NamedTuple):
+    """The movements that are drawn, and how."""
+
+    times: Array  # (k, T)
+    positions: Array  # (k, T, d)
+    axis_names: Sequence[str]
+    colors: list[Any]
+    alpha: float
+    key: list[Any]  # entries of the legend that name the colors
+    title: str  # empty if all are drawn
+
+
+def draw_rollout(times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None) -> Figure:
     """Each dimension over time, and the path where it has two or three dimensions.
 
     Parameters
     ----------
     times : ndarray of shape (n, T)
     positions : ndarray of shape (n, T, d)
-    axis_names : list of d str
+    axis_names : sequence of d str
     labels : ndarray of shape (n,) or None
         Each label has its color, named in a legend; with more than 30 labels all movements have one color.
     """
-    n, _, d = positions.shape
-    drawn = np.arange(0, n, math.ceil(n / _MOST))
-    distinct = [] if labels is None else list(dict.fromkeys(labels[drawn].tolist()))
-    palette = _palette(len(distinct))
-    colors = [palette[0 if labels is None else distinct.index(label)] for label in _labels(labels, drawn)]
-    n_rows, is_named = min(d, _ROWS), 1 < len(distinct) <= _NAMED
-    figure = new_figure(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * is_named * (len(distinct) // _IN_A_ROW))
-    over_time: Figure | SubFigure = figure
-    if d in (2, 3):
-        left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
-        _draw_paths(left, positions[drawn], axis_names, colors)
-    alpha = 1.0 if len(drawn) < 10 else 0.5
-    columns = math.ceil(d / n_rows)
-    grid = over_time.subplots(n_rows, columns, sharex=True, squeeze=False).T.ravel()
-    for k, axes in enumerate(grid[:d]):
-        for i, color in zip(drawn, colors, strict=True):
-            axes.plot(times[i], positions[i, :, k], color=color, alpha=alpha)
-        axes.set_ylabel(axis_names[k])
-        axes.margins(x=0.01)
-    over_time.align_ylabels()
-    for axes in grid[d:]:
-        axes.set_visible(False)
-    for axes in (grid[n_rows - 1], grid[d - 1]):
-        axes.set_xlabel("time [s]")
-    if len(drawn) < n:
-        figure.suptitle(f"{len(drawn)} of {n:,} movements", fontsize=9)
-    if is_named:
-        _add_legend(figure, distinct, palette)
+    d = positions.shape[2]
+    has_path, n_rows = d in (2, 3), min(d, _ROWS)
+    with matplotlib.rc_context():  # the style is this figure's, and none of what the caller draws next
+        drawn = _choose(times, positions, axis_names, labels)
+        key = drawn.key + (_ends() if has_path else [])
+        figure = figure_to_show(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * (len(key) // _IN_A_ROW))
+        over_time: Figure | SubFigure = figure
+        if has_path:
+            left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
+            path_axes: Any = left.subplots(subplot_kw=None if d == 2 else {"projection": "3d"})
+            _draw_paths(path_axes, drawn)
+            _fit_path(path_axes, drawn.positions)
+        _draw_over_time(over_time, drawn, n_rows)
+        figure.suptitle(drawn.title, fontsize=9)
+        if key:
+            figure.legend(handles=key, loc="outside lower center", ncols=min(len(key), _IN_A_ROW))
     return figure
+
+
+def draw_rollout_into(
+    axes: Axes, times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None
+) -> None:
+    """The path, or the only dimension over time, in axes of the caller's; parameters as for `draw_rollout`.
+
+    Raises
+    ------
+    SpecificationError
+        No axes of matplotlib, axes in the plane for a movement in space or the reverse, or more than three dimensions.
+    """
+    d = positions.shape[2]
+    if not isinstance(axes, Axes):
+        raise SpecificationError(f"expected ax to be an Axes of matplotlib, got {type(axes).__name__}; write plt.gca()")
+    if d > 3:
+        raise SpecificationError(f"expected movements of at most 3 dimensions for one ax, got {d}; leave ax out")
+    if (axes.name == "3d") != (d == 3):
+        projection = 'subplot_kw={"projection": "3d"}' if d == 3 else "no projection"
+        raise SpecificationError(f"expected ax with {projection} for {d} dimensions, got projection {axes.name!r}")
+    drawn = _choose(times, positions, axis_names, labels)
+    if d == 1:
+        _draw_dimension(axes, drawn, 0)
+        axes.set_xlabel("time [s]")
+    else:
+        _draw_paths(axes, drawn)
+    if drawn.title:
+        axes.set_title(drawn.title)
+    if key := drawn.key + (_ends() if d > 1 else []):
+        axes.legend(handles=key)
+
+
+def _choose(times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None) -> _Drawn:
+    n = len(positions)
+    chosen = np.arange(0, n, math.ceil(n / _MOST))
+    distinct = [] if labels is None else list(dict.fromkeys(labels[chosen].tolist()))
+    palette = _palette(len(distinct))
+    of_label = dict(zip(distinct, palette, strict=False))
+    colors = [palette[0]] * len(chosen) if labels is None else [of_label[label] for label in labels[chosen].tolist()]
+    return _Drawn(
+        times[chosen],
+        positions[chosen],
+        axis_names,
+        colors,
+        1.0 if len(chosen) < 10 else 0.5,
+        [_entry(drawable(str(label)), color) for label, color in of_label.items() if 1 < len(distinct) <= _NAMED],
+        f"{len(chosen)} of {n:,} movements" if len(chosen) < n else "",
+    )
 
 
 def _palette(n: int) -> list[Any]:
@@ -70,33 +123,54 @@ def _palette(n: int) -> list[Any]:
     return [_COLORS[0]] * n if n > _NAMED else list(colormaps["turbo"](np.linspace(0.03, 0.97, n)))
 
 
-def _labels(labels: NDArray[Any] | None, drawn: NDArray[np.intp]) -> list[Any]:
-    return [None] * len(drawn) if labels is None else labels[drawn].tolist()
+def _draw_over_time(figure: Figure | SubFigure, drawn: _Drawn, n_rows: int) -> None:
+    d = drawn.positions.shape[2]
+    grid = figure.subplots(n_rows, math.ceil(d / n_rows), sharex=True, squeeze=False).T.ravel()
+    for k, axes in enumerate(grid[:d]):
+        _draw_dimension(axes, drawn, k)
+        axes.margins(x=0.01)
+    figure.align_ylabels()
+    for axes in grid[d:]:
+        axes.set_visible(False)
+    for axes in (grid[n_rows - 1], grid[d - 1]):
+        axes.set_xlabel("time [s]")
 
 
-def _draw_paths(figure: SubFigure, paths: Array, axis_names: list[str], colors: list[Any]) -> None:
+def _draw_dimension(axes: Axes, drawn: _Drawn, k: int) -> None:
+    for times, x, color in zip(drawn.times, drawn.positions[:, :, k], drawn.colors, strict=True):
+        axes.plot(times, x, color=color, alpha=drawn.alpha)
+    axes.set_ylabel(drawn.axis_names[k])
+
+
+def _draw_paths(axes: Any, drawn: _Drawn) -> None:
     """The paths in the plane or in space: a circle where each starts, a star where it ends."""
-    flat = paths.shape[2] == 2
-    axes: Any = figure.subplots(subplot_kw=None if flat else {"projection": "3d"})
-    for path, color in zip(paths, colors, strict=True):
-        axes.plot(*path.T, color=color, alpha=1.0 if len(paths) < 10 else 0.5)
-        axes.plot(*path[:1].T, "o", color=color, markersize=4)
-        axes.plot(*path[-1:].T, "*", color=color, markersize=8)
-    names = dict(zip(("xlabel", "ylabel", "zlabel"), axis_names, strict=False))
-    axes.set(**names)
-    if flat:
+    for path, color in zip(drawn.positions, drawn.colors, strict=True):
+        axes.plot(*path.T, color=color, alpha=drawn.alpha)
+        for end, (marker, size) in ((path[:1], _START), (path[-1:], _END)):
+            axes.plot(*end.T, marker, color=color, markersize=size)
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), drawn.axis_names, strict=False)))
+
+
+def _fit_path(axes: Any, paths: Array) -> None:
+    """Equal scales of all dimensions."""
+    if paths.shape[2] == 2:
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
-    else:
-        extents = np.ptp(paths, axis=(0, 1))
-        axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
-        axes.locator_params(nbins=4)
+        return
+    extents = np.ptp(paths, axis=(0, 1))
+    axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
+    axes.locator_params(nbins=4)
 
 
-def _add_legend(figure: Figure, distinct: list[Any], palette: list[Any]) -> None:
+def _ends() -> list[Any]:
+    """Entries of the legend for the ends of paths."""
+    return [
+        _entry(name, GRAY, marker=marker, markersize=size, linestyle="none")
+        for name, (marker, size) in (("start", _START), ("end", _END))
+    ]
+
+
+def _entry(name: str, color: Any, **how: Any) -> Any:
     from matplotlib.lines import Line2D
 
-    handles = [
-        Line2D([], [], color=color, label=drawable(str(label))) for label, color in zip(distinct, palette, strict=False)
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), _IN_A_ROW))
+    return Line2D([], [], color=color, label=name, **how)

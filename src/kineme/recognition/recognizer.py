@@ -122,10 +122,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     @property
     def specification(self) -> ComparisonSpecification:
         """How movements are compared, by the parameters alone."""
-        given = self.representations
+        given, normalization = self.representations, Normalization(self.translation, self.scale)
         return ComparisonSpecification(
-            default_representations(self.translation, self.scale) if given is None else given,
-            Normalization(self.translation, self.scale),
+            default_representations(normalization) if given is None else given,
+            normalization,
             self.cutoff,
             self.max_angle,
             self.mean,

@@ -75,7 +75,10 @@ def map_onto(
     paths : ndarray of shape (n, d, T)
         Of the movements, where they were recorded.
     """
-    phases = np.array([one.arc_share for one in comparison.representations])[share.argmax(axis=0)]
+    # Of two representations that are equally alike, the one with the larger weight has the larger share.
+    weights = comparison.similarity.weights
+    alike = share if weights is None else share / np.maximum(weights, np.finfo(float).tiny)[:, None]
+    phases = np.array([one.arc_share for one in comparison.representations])[alike.argmax(axis=0)]
     used, which = np.unique(example, return_inverse=True)  # one example may be that of many
     stored = references[used]
     examples = recorded_paths(stored, even_paths(stored, 0, len(stored), comparison.cutoff))[which]

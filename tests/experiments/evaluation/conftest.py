@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import kineme
+from kineme.experiments.evaluation.data import DataSet
+
+_RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 @pytest.fixture(scope="session")
@@ -26,3 +32,22 @@ def make_small(make_movement):
 @pytest.fixture(scope="session")
 def small(make_small):
     return make_small()
+
+
+@pytest.fixture(scope="session")
+def of_people(make_small):
+    """Four classes by three people, four movements each; every person makes them a little differently."""
+    parts = [make_small(n_each=4) for _ in range(3)]
+    bends = [1.0, 1.1, 0.9]
+    arrays = [b * x.positions for part, b in zip(parts, bends, strict=True) for x in part]
+    demos = kineme.Demonstrations.from_arrays(arrays, np.concatenate([part.labels for part in parts]))
+    return DataSet("people", demos, {}, np.repeat(["ann", "bob", "cy"], len(parts[0])).astype(object))
+
+
+@pytest.fixture(scope="session")
+def development_data():
+    """The folder with recordings of people for development, which are no part of the project."""
+    folder = Path(os.environ.get("KINEME_RECORDINGS", _RECORDINGS))
+    if not (folder / "gestures3d.npz").is_file():
+        pytest.skip(f"no gestures3d.npz in {folder}; name the folder in the environment variable KINEME_RECORDINGS")
+    return folder

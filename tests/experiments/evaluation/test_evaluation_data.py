@@ -52,7 +52,9 @@ def test_what_is_no_recording_is_left_out_with_the_reason(folder, make_movement)
 
 
 def test_a_folder_that_is_not_there_is_refused():
-    with pytest.raises(kineme.DataError, match="expected lasa, lasa-letters or a folder, found no folder 'nowhere'"):
+    with pytest.raises(
+        kineme.DataError, match="expected lasa, lasa-letters, a folder or a file, found nothing at 'nowhere'"
+    ):
         load_data("nowhere")
 
 
@@ -76,3 +78,4 @@ def test_packaged_data(name, n_classes):
     read = load_data(name)
     assert len(np.unique(read.demonstrations.labels)) == n_classes
     assert len(read.demonstrations) == 7 * n_classes
+    assert read.people is None

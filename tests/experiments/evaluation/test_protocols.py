@@ -5,14 +5,20 @@ import pytest
 
 from kineme.experiments.evaluation import score_split as scoring
 from kineme.experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
+from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.methods import METHODS, Method, Options
-from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings, usable_shots
-from kineme.experiments.evaluation.score_split import classifies_partial, score_split
+from kineme.experiments.evaluation.protocols import PROTOCOLS, usable_shots
+from kineme.experiments.evaluation.score_split import does, score_split
+from kineme.experiments.evaluation.trials import TASKS, Settings
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.early import cut
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
-AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable(2)]
+AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable()]
+
+
+def data(demonstrations):
+    return DataSet("small", demonstrations, {})
 
 
 class Recording:
@@ -31,6 +37,14 @@ class Recording:
     def classify_partial(self, demonstrations):
         return self.classify(demonstrations)[0]
 
+    def spot(self, recording):
+        self.log.append((recording.positions.copy(), []))
+        return []
+
+    def cluster(self, demonstrations, n_clusters):
+        self.log.append((demonstrations.positions.copy(), demonstrations.labels))
+        return np.arange(len(demonstrations))
+
 
 @pytest.fixture
 def logs(monkeypatch):
@@ -43,8 +57,9 @@ def logs(monkeypatch):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("index", [0, 1])
-def test_every_method_sees_the_same_movements(small, logs, protocol, index):
-    scores = [score_split(small, protocol, method, index, SETTINGS) for method in logs]
+def test_every_method_sees_the_same_movements(small, of_people, logs, protocol, index):
+    one = of_people if PROTOCOLS[protocol].by_person else data(small)
+    scores = [score_split(one, protocol, method, index, SETTINGS) for method in logs]
     assert len(logs["one"]) == len(logs["other"]) >= 2
     for (x, labels), (y, others) in zip(logs["one"], logs["other"], strict=True):
         np.testing.assert_array_equal(x, y)
@@ -52,25 +67,35 @@ def test_every_method_sees_the_same_movements(small, logs, protocol, index):
     assert [one._replace(seconds=0) for one in scores[0]] == [one._replace(seconds=0) for one in scores[1]]
 
 
-@pytest.mark.parametrize("protocol", sorted(set(PROTOCOLS) - {"open-set"}))
-def test_who_knows_everything_is_always_right(small, logs, protocol):
-    assert all(one.values == {"accuracy": 1.0} for one in score_split(small, protocol, "one", 0, SETTINGS))
+@pytest.mark.parametrize(
+    "protocol", [name for name, one in PROTOCOLS.items() if name[:4] != "open" and one.task.startswith("classify")]
+)
+def test_who_knows_everything_is_always_right(of_people, logs, protocol):
+    scores = score_split(of_people, protocol, "one", 0, SETTINGS)
+    assert scores
+    assert all(one.values == {"accuracy": 1.0} for one in scores)
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
-@pytest.mark.parametrize("protocol", [name for name in PROTOCOLS if name != "earliness"])
-def test_every_method_goes_through_every_protocol_and_recognizes_what_is_easy(small, protocol, method):
-    scores = score_split(small, protocol, method, 0, SETTINGS)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_every_method_goes_through_every_protocol_and_recognizes_what_is_easy(of_people, protocol, method):
+    scores = score_split(of_people, protocol, method, 0, SETTINGS)
+    if not does(method, PROTOCOLS[protocol].task):
+        assert not scores
+        return
     assert scores
+    if protocol == "anchoring":
+        assert 0 <= scores[0].values["adjusted_rand_given"] <= 1
+        return
     assert all(0 <= value <= 1 for one in scores for value in one.values.values())
-    if protocol in {"few-shot", "cross-validation", "leave-one-out"}:
+    if protocol in {"few-shot", "cross-validation", "leave-one-out", "user-dependent", "user-independent"}:
         assert np.mean([one.values["accuracy"] for one in scores]) > 0.9
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
 def test_two_classes_one_movement_each(make_small, method):
     two = make_small(n_classes=2, n_each=2)
-    assert score_split(two, "few-shot", method, 0, Settings(1, 0, (1,)))[0].values["accuracy"] >= 0.5
+    assert score_split(data(two), "few-shot", method, 0, Settings(1, 0, (1,)))[0].values["accuracy"] >= 0.5
 
 
 @pytest.mark.parametrize("method", AVAILABLE)
@@ -82,41 +107,33 @@ def test_familiarity_is_higher_for_what_was_trained_on(small, method):
     assert np.median(familiarity[known]) > np.median(familiarity[~known])
 
 
-def test_robustness_grows_and_has_one_reference_of_each_kind():
+def test_robustness_grows():
     conditions = robustness_conditions(2)
     assert len(conditions) == 1 + 3 * len(STRENGTHS) + len(TOGETHER)
     for kind in [*STRENGTHS, "together"]:
-        own = [(one.strength, reference) for one, _, reference in conditions if one.varied == kind and one.strength > 0]
+        own = [one.strength for one, _ in conditions if one.varied == kind and one.strength > 0]
         assert own == sorted(own)
-        assert [reference for _, reference in own] == [False, True, False]
-    assert len({one for one, _, _ in conditions}) == len(conditions)
+        assert len(own) == 3
+    assert len({one for one, _ in conditions}) == len(conditions)
 
 
 @pytest.mark.parametrize("d", [1, 5])
 def test_other_dimensions_are_not_turned(make_small, d):
     conditions = robustness_conditions(d)
-    assert all(perturbation.rotation == 0 for _, perturbation, _ in conditions)
+    assert all(perturbation.rotation == 0 for _, perturbation in conditions)
     demos = make_small(n_dims=d)
-    assert "2 or 3 dimensions, these have" in PROTOCOLS["any-angle"].unsuitable(demos)
+    assert "2 or 3 dimensions, these have" in PROTOCOLS["any-angle"].unsuitable(data(demos))
     for protocol in ("robustness", "open-set"):
-        assert score_split(demos, protocol, "kineme", 0, SETTINGS)
+        assert score_split(data(demos), protocol, "kineme", 0, SETTINGS)
 
 
 def test_an_open_set_needs_two_known_and_two_unknown_classes(make_small):
-    assert PROTOCOLS["open-set"].unsuitable(make_small(3)) == "needs at least 4 classes, these are 3"
-    assert PROTOCOLS["open-set"].unsuitable(make_small(4)) == ""
+    assert PROTOCOLS["open-set"].unsuitable(data(make_small(3))) == "needs at least 4 classes, these are 3"
+    assert PROTOCOLS["open-set"].unsuitable(data(make_small(4))) == ""
 
 
 def test_shots_leave_every_class_something_to_test(small):
     assert usable_shots(small, (5, 1, 9)) == (1, 3)
-
-
-def test_slow_methods_take_the_reference_only(small, monkeypatch):
-    log = []
-    monkeypatch.setattr(scoring, "METHODS", {"slow": Method("slow", lambda _: Recording(log), slow=True)})
-    assert [one.condition.label for one in score_split(small, "few-shot", "slow", 0, SETTINGS)] == ["1 shot"]
-    labels = [one.condition.label for one in score_split(small, "robustness", "slow", 0, SETTINGS)]
-    assert labels == [one.label for one, _, reference in robustness_conditions(2) if reference]
 
 
 def test_beginnings_end_where_that_share_of_the_path_does(small):
@@ -132,5 +149,16 @@ def test_beginnings_end_where_that_share_of_the_path_does(small):
     np.testing.assert_array_equal(cut(small, 0.5).labels, small.labels)
 
 
-def test_rivals_do_not_answer_early():
-    assert not any(classifies_partial(name) for name in METHODS if name != "kineme")
+def test_who_answers_early():
+    assert all(does("kineme", task) for task in TASKS)
+    early = {name for name in AVAILABLE if does(name, "classify partial")}
+    assert {"kineme", "euclidean", "plus-cloud"} <= early
+    assert not early & {"paper", "paper-bio", "gak-svm", "hmm"}
+
+
+@pytest.mark.parametrize("method", ["euclidean", "plus-cloud"])
+def test_rivals_learn_the_beginnings_to_answer_early(small, method):
+    contender = METHODS[method].contender(Options(), "classify partial")
+    contender.fit(small[::4])
+    for share in (0.5, 0.7):
+        assert contender.classify_partial(cut(small[::4], share)).tolist() == small.labels[::4].tolist()

@@ -7,16 +7,21 @@ import pytest
 
 import kineme
 from kineme.experiments.evaluation import methods
+from kineme.experiments.evaluation.conclusions import conclusion, verdict
 from kineme.experiments.evaluation.conditions import UNTOUCHED
 from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.optional import optional_module, why_missing
-from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings
-from kineme.experiments.evaluation.report import rivals_ahead
+from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.results import Results
+from kineme.experiments.evaluation.rows import to_csv
 from kineme.experiments.evaluation.run import Runner, evaluate
+from kineme.experiments.evaluation.trials import Settings
 
-PLAN = ([name for name in PROTOCOLS if name != "earliness"], ["kineme", "euclidean", "paper"])
+PLAN = (
+    [name for name, one in PROTOCOLS.items() if name != "earliness" and not one.by_person],
+    ["kineme", "euclidean", "paper"],
+)
 
 
 def run(data, out, plan=PLAN, seed=0, processes=1):
@@ -67,7 +72,7 @@ def test_the_page_needs_no_other_file_and_escapes_names(done):
     assert "<simple>" not in html
     assert "<numbers>" not in html
     assert "expected &lt;numbers&gt;" in html
-    assert html.count("<img") == 2  # few shots and robustness
+    assert html.count("<img") == 3  # mean ranks, few shots and robustness
     for name in PLAN[0]:
         assert PROTOCOLS[name].title in html
     for name in PLAN[1]:
@@ -111,39 +116,88 @@ def test_the_group_to_install_is_named():
         optional_module("no_such_package.part")
 
 
-def test_the_point_cloud_is_for_the_plane(make_small, tmp_path):
-    result = run(DataSet("space", make_small(n_dims=3), {}), tmp_path, (["few-shot"], ["kineme", "point-cloud"]))
-    assert result.results.absent == {"point-cloud": "works in 2 dimensions only"}
-
-
 def test_a_protocol_that_nobody_can_answer_is_reported(data, tmp_path):
-    result = run(data, tmp_path, (["few-shot", "earliness"], ["euclidean"]))
-    assert result.results.skipped == {"earliness": "none of the methods classifies movements before their end"}
+    result = run(data, tmp_path, (["few-shot", "earliness"], ["paper"]))
+    assert result.results.skipped == {"earliness": "none of the methods can classify movements before their end"}
 
 
 def outcome(absent=None, **accuracies):
-    measured = {name: {UNTOUCHED: {"accuracy": [value]}} for name, value in accuracies.items()}
-    return Results({"few-shot": measured}, {}, absent or {}, {})
+    """Results of all methods that are not absent; what is not named is never right."""
+    absent = absent or {}
+    names = [name for name in METHODS if name not in absent]
+    measured = {name: {UNTOUCHED: {"accuracy": [accuracies.get(name, 0.0)]}} for name in names}
+    return Results({"few-shot": measured}, {}, absent, {})
 
 
 def test_a_rival_that_is_ahead_is_named():
-    said = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.95, euclidean=0.9))
-    assert said == "Ahead of kineme: DTW 1-NN, as recorded (0.950 over 0.900)."
-    equal = rivals_ahead("few-shot", outcome(kineme=0.9, dtw=0.9))
-    assert equal == "No rival is ahead of kineme anywhere in this table. Rivals here: DTW 1-NN."
-    assert rivals_ahead("few-shot", outcome(dtw=0.9)) == ""
+    found = outcome(kineme=0.9, dtw=0.95, euclidean=0.9, hmm=0.97)
+    assert conclusion("few-shot", found) == "Ahead of kineme: as recorded (0.900): HMM 0.970, DTW 1-NN 0.950."
+    assert verdict(found) == "A rival is ahead of kineme in 1 of 1 cells; each table lists its own."
+    del found.outcomes["few-shot"]["kineme"]
+    assert conclusion("few-shot", found) == ""
+    assert "Nothing is concluded" in verdict(found)
+
+
+def test_that_no_rival_is_ahead_is_said_only_if_all_ran():
+    found = outcome(kineme=0.9, dtw=0.9004)  # equal in three digits
+    assert conclusion("few-shot", found).startswith(
+        "No rival is ahead of kineme in this table. Rivals here: paper, original"
+    )
+    assert verdict(found) == "No rival is ahead of kineme in any of 1 cells."
+    del found.outcomes["few-shot"]["hmm"]
+    for said in (conclusion("few-shot", found), verdict(found)):
+        assert "No rival is ahead" not in said
+        assert "None of the rivals that took part is ahead" in said
+        assert "HMM (not asked for)" in said
 
 
 @pytest.mark.parametrize("theirs", [0.95, 0.8])
 def test_a_rival_that_did_not_take_part_is_named_beside_what_is_concluded(theirs):
     absent = {"dtw": "not installed: dtaidistance", "hmm": "not installed: hmmlearn"}
-    said = rivals_ahead("few-shot", outcome(absent, kineme=0.9, euclidean=theirs))
+    found = outcome(absent, kineme=0.9, euclidean=theirs)
+    said = conclusion("few-shot", found)
     assert ("Ahead of kineme" in said) is (theirs > 0.9)
-    assert ("No rival is ahead" in said) is (theirs < 0.9)
+    assert ("None of the rivals that took part is ahead" in said) is (theirs < 0.9)
     assert said.endswith(". Not compared: DTW 1-NN (not installed: dtaidistance); HMM (not installed: hmmlearn).")
-    alone = rivals_ahead("few-shot", outcome(absent, kineme=0.9))
-    assert alone.startswith("No rival took part. Not compared: DTW 1-NN")
-    assert rivals_ahead("few-shot", outcome(kineme=0.9)) == "No rival took part."
+    assert "Not all rivals ran everywhere: DTW 1-NN (not installed" in verdict(found)
+
+
+def test_rows_hold_every_value_with_the_person_who_is_tested(of_people, tmp_path):
+    done = run(
+        of_people, tmp_path, (["few-shot", "user-independent", "anchoring"], ["kineme", "euclidean", "plus-cloud"])
+    )
+    assert {row.person for row in done.rows if row.protocol == "user-independent"} == {"ann", "bob"}  # two splits
+    assert {row.person for row in done.rows if row.protocol == "few-shot"} == {""}
+    for row in done.rows:
+        [condition] = [one for one in done.results.conditions(row.protocol) if one.label == row.condition]
+        values = done.results.outcomes[row.protocol][row.method][condition][row.measure]
+        assert min(abs(row.value - value) for value in values) < 1e-5
+    n_values = sum(
+        len(values)
+        for by_method in done.results.outcomes.values()
+        for outcome in by_method.values()
+        for measures in outcome.values()
+        for values in measures.values()
+    )
+    assert len(done.rows) == n_values
+    head, *lines = to_csv(done.rows).splitlines()
+    assert head == "data,protocol,condition,varied,strength,measure,method,split,person,value"
+    assert len(lines) == len(done.rows)
+
+
+def test_what_no_rival_can_do_is_said_once():
+    found = outcome(kineme=0.9)
+    found.outcomes["spotting"] = {"kineme": {UNTOUCHED: {"recall": [0.5]}}}
+    said = conclusion("spotting", found)
+    assert said == "No rival took part. Rivals cannot find movements in a recording."
+    assert verdict(found).endswith("in any of 1 cells. No rival took part in: Spotting.")
+
+
+def test_the_number_of_clusters_is_not_a_race():
+    found = outcome(kineme=0.9)
+    both = {"kineme": {UNTOUCHED: {"clusters": [1.0]}}, "dtw": {UNTOUCHED: {"clusters": [3.0]}}}
+    found.outcomes["anchoring"] = both
+    assert "Ahead of kineme" not in conclusion("anchoring", found)
 
 
 def test_a_folder_that_cannot_be_written_is_found_out_first(data, tmp_path):

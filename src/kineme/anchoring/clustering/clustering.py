@@ -16,8 +16,8 @@ Clusters = NDArray[np.intp]
 
 def agglomerative(distances: Array, n_clusters: int, min_members: int) -> Clusters:
     """Average linkage cut into `n_clusters`; clusters of fewer than `min_members` are none, -1."""
-    found = cuts(average_linkage(distances), [min(n_clusters, len(distances))])[0]
-    return without_small(found, min_members)
+    clusters = cuts(average_linkage(distances), [min(n_clusters, len(distances))])[0]
+    return without_small(clusters, min_members)
 
 
 def hdbscan(distances: Array, n_clusters: int | None, min_members: int) -> Clusters:

@@ -48,16 +48,16 @@ def stabilities(
         From 0 to 1; Hennig takes 0.75 for a valid, stable cluster, and below 0.5 for none.
     """
     c = int(clusters.max(initial=-1)) + 1
-    found = np.full((repeats, c), np.nan)
+    coefficients = np.full((repeats, c), np.nan)
     for b, chosen in enumerate(subsets(len(distances), repeats, seed)):
         own, other = clusters[chosen], again(distances[np.ix_(chosen, chosen)])
         table = overlaps(own, other, c)
         sizes = np.bincount(own[own >= 0], minlength=c)
         union = sizes[:, None] + np.bincount(other[other >= 0], minlength=table.shape[1]) - table
         there = sizes > 0
-        found[b, there] = (table[there] / np.maximum(union[there], 1)).max(axis=1, initial=0.0)
-    known = np.isfinite(found)
-    return np.asarray(np.where(known, found, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+        coefficients[b, there] = (table[there] / np.maximum(union[there], 1)).max(axis=1, initial=0.0)
+    known = np.isfinite(coefficients)
+    return np.asarray(np.where(known, coefficients, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
 
 def overlaps(a: Clusters, b: Clusters, n_rows: int) -> NDArray[np.intp]:

@@ -77,14 +77,14 @@ class ConceptualSpace:
         if i == j:
             raise SpecificationError(f"expected two different symbols, got {a!r} twice")
         d, ab = self.distances, self.distances[i, j]
-        found = []
+        between_them = []
         for c in range(len(self.symbols)):
             ac, cb = d[i, c], d[c, j]
             if c in (i, j) or ac + cb > (1 + eps) * ab or max(ac, cb) >= ab:
                 continue
             share = 0.5 + 0.5 * (ac**2 - cb**2) / ab**2  # law of cosines
-            found.append(Between(self.symbols[c], float((ac + cb) / ab - 1.0), float(np.clip(share, 0.0, 1.0))))
-        return tuple(sorted(found, key=lambda one: one.excess))
+            between_them.append(Between(self.symbols[c], float((ac + cb) / ab - 1.0), float(np.clip(share, 0.0, 1.0))))
+        return tuple(sorted(between_them, key=lambda one: one.excess))
 
     def index(self, symbol: Any) -> int:
         """Index of a symbol among `symbols`.

@@ -103,8 +103,8 @@ def assign_described(
     """As `assign`, of movements that are described in the representations of what is known."""
     labels, p_values = open_set_labels(known, described, error_rate)
     unknown = np.flatnonzero([label is None for label in labels])
-    found = _among_unknown(known, described.take(unknown), min_members)
-    return Assignment(labels, p_values.max(axis=1), _at(unknown, found, len(described)))
+    proposals = _among_unknown(known, described.take(unknown), min_members)
+    return Assignment(labels, p_values.max(axis=1), _at(unknown, proposals, len(described)))
 
 
 def _among_unknown(known: KnownClasses, unknown: Described, min_members: int) -> Proposals:
@@ -116,8 +116,8 @@ def _among_unknown(known: KnownClasses, unknown: Described, min_members: int) ->
     if n <= limit:
         return _clustered(known.comparison, unknown, height, min_members)[1]
     sample, _ = subsample(unknown, limit)
-    K, found = _clustered(known.comparison, unknown.take(sample), height, min_members)
-    return extend(unknown, sample, K, found, similarity)
+    K, proposals = _clustered(known.comparison, unknown.take(sample), height, min_members)
+    return extend(unknown, sample, K, proposals, similarity)
 
 
 def _clustered(
@@ -132,10 +132,10 @@ def _clustered(
         return cut_at(average_linkage(distances), height)
 
     distances = 1.0 - 0.5 * (K + K.T)[np.ix_(order, order)]
-    found = without_small(cut(distances), min_members)
+    ordered = without_small(cut(distances), min_members)
     clusters = np.empty(len(described), dtype=np.intp)
-    clusters[order] = found
-    stable = stabilities(distances, found, cut, _REPEATS)
+    clusters[order] = ordered
+    stable = stabilities(distances, ordered, cut, _REPEATS)
     return K, describe_clusters(K, clusters, stable, comparison.similarity.widths)
 
 

@@ -88,8 +88,8 @@ def suggest_merges(
     within = np.maximum(np.where(several, np.diag(means), typical), np.finfo(float).tiny)
     overlap = means / np.sqrt(np.outer(within, within))
     pairs = np.argwhere(np.triu(overlap >= least, 1))
-    found = [Merge(names[i], names[j], float(overlap[i, j])) for i, j in pairs]
-    return tuple(sorted(found, key=lambda one: -one.overlap))
+    merges = [Merge(names[i], names[j], float(overlap[i, j])) for i, j in pairs]
+    return tuple(sorted(merges, key=lambda one: -one.overlap))
 
 
 def suggest_splits(
@@ -123,12 +123,12 @@ def suggest_splits(
     if len(names) < 2 and widths is None:
         return ()
     sigma = averaged(described, widths).widths
-    found = []
+    splits = []
     for k, name in enumerate(names):
         indices = np.flatnonzero(member == k)
         if len(indices) >= 2 * min_members and len(indices) > 3:
-            found.append(_in_two(name, described.take(indices), indices, sigma))
-    kept = (s for s in found if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members)
+            splits.append(_in_two(name, described.take(indices), indices, sigma))
+    kept = (s for s in splits if s.overlap <= most and s.stability >= _STABLE and min(map(len, s.parts)) >= min_members)
     return tuple(sorted(kept, key=lambda one: one.overlap))
 
 
@@ -141,13 +141,13 @@ def _in_two(name: Any, described: Described, indices: NDArray[np.intp], widths: 
     def halve(distances: Array) -> Clusters:
         return cuts(average_linkage(distances), [2])[0]
 
-    found = halve(1.0 - K)
-    stability = float(stabilities(1.0 - K, found, halve, _REPEATS).min())
-    a, b = K[found == 0], K[found == 1]
-    between = float(a[:, found == 1].mean())
-    within = _mean_within(a[:, found == 0]) * _mean_within(b[:, found == 1])
+    halves = halve(1.0 - K)
+    stability = float(stabilities(1.0 - K, halves, halve, _REPEATS).min())
+    a, b = K[halves == 0], K[halves == 1]
+    between = float(a[:, halves == 1].mean())
+    within = _mean_within(a[:, halves == 0]) * _mean_within(b[:, halves == 1])
     parts = np.empty(len(some), dtype=np.intp)
-    parts[order] = found
+    parts[order] = halves
     nearest = compare(averaged(described, widths), described, described.take(some)).argmax(axis=1)
     whole = parts[nearest]
     whole[some] = parts

@@ -95,12 +95,12 @@ def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, 
     sums = K @ H  # of each movement to each cluster
     between = (H.T @ sums) / np.maximum(np.outer(H.sum(0), H.sum(0)), 1.0)
     np.fill_diagonal(between, -1.0)
-    found = []
+    proposals = []
     for k in range(c):
         members, m = np.flatnonzero(ranked == k), sizes[order[k]]
         inside = sums[members, k] - 1.0
         near = int(between[k].argmax()) if c > 1 else None
-        found.append(
+        proposals.append(
             Proposal(
                 members,
                 int(members[inside.argmax()]),
@@ -110,7 +110,7 @@ def describe_clusters(K: Array, clusters: NDArray[np.intp], stabilities: Array, 
                 0.0 if near is None else float(between[k, near]),
             )
         )
-    return Proposals(tuple(found), ranked, widths)
+    return Proposals(tuple(proposals), ranked, widths)
 
 
 def check_members(proposal: Proposal, n: int) -> None:

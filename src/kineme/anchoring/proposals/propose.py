@@ -73,8 +73,8 @@ def propose(
         return _propose(K, similarity, method, n_clusters, min_members)
     sample, similarity = subsample(described, limit)
     K = similarities(described.take(sample), widths=similarity.widths)
-    found = _propose(K, similarity, method, n_clusters, min_members)
-    return extend(described, sample, K, found, similarity)
+    proposals = _propose(K, similarity, method, n_clusters, min_members)
+    return extend(described, sample, K, proposals, similarity)
 
 
 def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
@@ -99,9 +99,9 @@ def _propose(
     def again(some: Array) -> Clusters:
         return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
 
-    found = METHODS[method](distances, share, min_members)
-    clusters[order] = found
-    return describe_clusters(K, clusters, stabilities(distances, found, again, _REPEATS), similarity.widths)
+    ordered = METHODS[method](distances, share, min_members)
+    clusters[order] = ordered
+    return describe_clusters(K, clusters, stabilities(distances, ordered, again, _REPEATS), similarity.widths)
 
 
 def own_order(K: Array) -> NDArray[np.intp]:

@@ -54,41 +54,41 @@ def nearest_neighbors(
 
 
 def extend(
-    described: Described, sample: NDArray[np.intp], K: Array, found: Proposals, similarity: AveragedSimilarity
+    described: Described, sample: NDArray[np.intp], K: Array, of_sample: Proposals, similarity: AveragedSimilarity
 ) -> Proposals:
     """The proposals of a sample, with the movements within the radius of their nearest neighbor's cluster added."""
-    radius = np.append(radii(K, found), -np.inf)  # nothing is added to what was left over
+    radius = np.append(radii(K, of_sample), -np.inf)  # nothing is added to what was left over
     which, how = nearest_neighbors(similarity, described, described.take(sample))
-    clusters = found.clusters[which]
+    clusters = of_sample.clusters[which]
     clusters[1.0 - how > radius[clusters]] = -1
-    clusters[sample] = found.clusters
-    order = np.argsort(-np.bincount(clusters[clusters >= 0], minlength=len(found)), kind="stable")
+    clusters[sample] = of_sample.clusters
+    order = np.argsort(-np.bincount(clusters[clusters >= 0], minlength=len(of_sample)), kind="stable")
     rank = np.append(np.argsort(order), -1)
     clusters = rank[clusters]
     proposals = tuple(
         replace(
-            found[int(k)],
+            of_sample[int(k)],
             members=np.flatnonzero(clusters == i),
-            medoid=int(sample[found[int(k)].medoid]),
-            nearest=None if found[int(k)].nearest is None else int(rank[found[int(k)].nearest]),
+            medoid=int(sample[of_sample[int(k)].medoid]),
+            nearest=None if of_sample[int(k)].nearest is None else int(rank[of_sample[int(k)].nearest]),
         )
         for i, k in enumerate(order)
     )
-    return Proposals(proposals, clusters, found.widths)
+    return Proposals(proposals, clusters, of_sample.widths)
 
 
-def radii(K: Array, found: Proposals) -> Array:
+def radii(K: Array, proposals: Proposals) -> Array:
     """How far ``1 - K`` a movement of each cluster may be from its nearest member, shape (c,).
 
     As far as any member is from its nearest neighbor in the cluster, so that another movement of the same class is
     beyond it once in m + 1 times; but at least as far as 95 % of the members of all clusters, since the largest of few
     distances says little.
     """
-    same = (found.clusters[:, None] == found.clusters) & (found.clusters[:, None] >= 0)
+    same = (proposals.clusters[:, None] == proposals.clusters) & (proposals.clusters[:, None] >= 0)
     np.fill_diagonal(same, False)
     away = 1.0 - np.where(same, K, -np.inf).max(axis=1)
-    member = found.clusters >= 0
+    member = proposals.clusters >= 0
     if not member.any():
         return np.empty(0)
     common = float(np.quantile(away[member], _WITHIN))
-    return np.array([max(common, float(away[one.members].max())) for one in found.proposals])
+    return np.array([max(common, float(away[one.members].max())) for one in proposals.proposals])

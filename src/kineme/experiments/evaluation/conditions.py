@@ -28,7 +28,7 @@ class Condition(NamedTuple):
 
 UNTOUCHED = Condition("none", 0, "as recorded")
 
-#: Name of the perturbation -> strengths; the middle one is the reference.
+#: Name of the perturbation -> strengths.
 STRENGTHS: dict[str, tuple[float, float, float]] = {
     "shift": (0.5, 1.0, 2.0),  # extents
     "scale": (0.5, 1.0, 1.5),  # doublings
@@ -54,17 +54,17 @@ TOGETHER = (
 _TOGETHER_LABELS = ("weakly", "moderately", "strongly")
 
 
-def robustness_conditions(n_dims: int) -> list[tuple[Condition, Perturbation, bool]]:
-    """Each perturbation alone and all together at three strengths, and whether each is a reference condition."""
-    conditions = [(Condition("shift", 0.0, "as recorded"), Perturbation(), True)]
+def robustness_conditions(n_dims: int) -> list[tuple[Condition, Perturbation]]:
+    """Each perturbation alone and all together at three strengths."""
+    conditions = [(Condition("shift", 0.0, "as recorded"), Perturbation())]
     for varied, strengths in STRENGTHS.items():
         if varied == "rotation" and n_dims not in (2, 3):
             continue
-        for k, strength in enumerate(strengths):
+        for strength in strengths:
             amount = {"rotation": math.radians(strength), "noise": strength / 100}.get(varied, strength)
             condition = Condition(varied, strength, _LABELS[varied].format(strength))
-            conditions.append((condition, Perturbation(**{varied: amount}), k == 1))
+            conditions.append((condition, Perturbation(**{varied: amount})))
     for k, perturbation in enumerate(TOGETHER):
         condition = Condition("together", k + 1.0, f"all {_TOGETHER_LABELS[k]}")
-        conditions.append((condition, perturbation.in_dimensions(n_dims), k == 1))
+        conditions.append((condition, perturbation.in_dimensions(n_dims)))
     return conditions

@@ -1,16 +1,18 @@
-"""What an evaluation runs on: a packaged data set, or a folder of recordings."""
+"""What an evaluation runs on: a packaged data set, or recordings, with the people who made them where that is known."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.datasets.lasa import LASA_26, PAPER_LETTERS, load_lasa
 from kineme.errors import DataError
+from kineme.experiments.evaluation.people import people_of
 from kineme.files.recordings import read_recordings
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -20,18 +22,29 @@ PACKAGED = {"lasa": LASA_26, "lasa-letters": PAPER_LETTERS}
 
 
 class DataSet(NamedTuple):
-    """Labeled movements, and the files that were left out: file -> reason."""
+    """Labeled movements.
+
+    Attributes
+    ----------
+    name : str
+    demonstrations : Demonstrations
+    left_out : dict
+        File -> why it was left out.
+    people : ndarray of shape (n,), optional
+        Who made each movement.
+    """
 
     name: str
     demonstrations: Demonstrations
     left_out: dict[str, str]
+    people: NDArray[Any] | None = None
 
 
 def load_data(data: str) -> DataSet:
-    """A packaged data set by its name, or recordings with labels: a folder per label, or a column of a table.
+    """A packaged data set by its name, or recordings with labels: a folder per label, a column, or an array of labels.
 
-    What cannot be read, a movement of other dimensions than most, a movement without a label, and the only movement of
-    a class are left out, and the reason is kept.
+    People are read as `kineme.experiments.evaluation.people` says. What cannot be read, a movement of other dimensions
+    than most, a movement without a label, and the only movement of a class are left out, and the reason is kept.
 
     Raises
     ------
@@ -40,8 +53,9 @@ def load_data(data: str) -> DataSet:
     """
     if data in PACKAGED:
         return DataSet(data, load_lasa(PACKAGED[data]), {})
-    if not Path(data).exists():
-        raise DataError(f"expected {', '.join(PACKAGED)} or a folder, found no folder {data!r}")
+    path = Path(data)
+    if not path.exists():
+        raise DataError(f"expected {', '.join(PACKAGED)}, a folder or a file, found nothing at {data!r}")
     read = read_recordings(data)
     left_out: dict[str, str] = {}
     for problem in read.problems:
@@ -60,7 +74,9 @@ def load_data(data: str) -> DataSet:
         )
     labels = label_array([label for label, keep in zip(read.labels, kept, strict=True) if keep])
     chosen = read.demonstrations[np.flatnonzero(kept)].movements
-    return DataSet(Path(data).resolve().name, Demonstrations.of_movements(replace(chosen, labels=labels)), left_out)
+    people = people_of(path, [source for source, keep in zip(read.sources, kept, strict=True) if keep])
+    name = path.resolve().name if path.is_dir() else path.stem
+    return DataSet(name, Demonstrations.of_movements(replace(chosen, labels=labels)), left_out, people)
 
 
 def _only(label: str) -> str:

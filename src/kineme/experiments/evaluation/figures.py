@@ -9,6 +9,7 @@ from kineme.experiments.evaluation.methods import METHODS, OURS
 from kineme.experiments.evaluation.results import Results
 from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, PURPLE, encode_figure, new_figure
 
+_BLACK = "#222222"
 _AXES = {
     "shots": "movements per class",
     "shift": "shift [extents]",
@@ -22,8 +23,8 @@ _AXES = {
 _STYLES = dict(
     zip(
         METHODS,
-        [(BLUE, "-"), (PURPLE, "-"), (PURPLE, "--"), (GRAY, "-"), (ORANGE, "-"), (ORANGE, "--"), (GREEN, "-"),
-         (GREEN, "--"), (GRAY, "--")],
+        [(BLUE, "-"), (PURPLE, "-"), (PURPLE, "--"), (GRAY, "-"), (ORANGE, "-"), (ORANGE, ":"), (ORANGE, "--"),
+         (GREEN, "-"), (GREEN, "--"), (_BLACK, "-"), (_BLACK, "--"), (GRAY, "--")],
         strict=True,
     )
 )  # fmt: skip
@@ -35,7 +36,7 @@ def draw_protocol(protocol: str, results: Results) -> bytes | None:
     for condition in results.conditions(protocol):
         panels.setdefault(condition.varied, []).append(condition)
     panels = {name: conditions for name, conditions in panels.items() if name in _AXES and len(conditions) > 1}
-    if not panels or protocol == "open-set":
+    if not panels or protocol.startswith("open-set"):
         return None
     columns = min(3, len(panels))
     rows = math.ceil(len(panels) / columns)

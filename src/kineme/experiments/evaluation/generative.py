@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.experiments.evaluation.neighbors import standard_paths
 from kineme.experiments.evaluation.optional import optional_module
+from kineme.experiments.evaluation.paths import paths_over_length
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
@@ -42,7 +42,7 @@ class HiddenMarkov:
         model.startprob_ = np.eye(_N_STATES)[0]
         model.transmat_ = stay * np.eye(_N_STATES) + (1.0 - stay) * np.eye(_N_STATES, k=1)
         model.transmat_[-1, -1] = 1.0
-        parts = np.array_split(series, _N_STATES, axis=1)  # each state begins as an equal part of the time
+        parts = np.array_split(series, _N_STATES, axis=1)  # each state begins as an equal part of the path
         model.means_ = np.array([part.mean(axis=(0, 1)) for part in parts])
         model.covars_ = np.array([part.var(axis=(0, 1)) + _MIN_VARIANCE for part in parts])
         return model.fit(series.reshape(-1, d), [length] * n)
@@ -56,7 +56,7 @@ class HiddenMarkov:
 
 def _series(demonstrations: Demonstrations) -> Array:
     """Positions and their differences, scaled to the size of the positions: (n, T, 2 d)."""
-    paths = standard_paths(demonstrations, _N_POINTS)
+    paths = paths_over_length(demonstrations, _N_POINTS)
     steps = np.gradient(paths, axis=2)
     size = np.sqrt((steps**2).sum(axis=1, keepdims=True).mean(axis=2, keepdims=True))
     steps = steps / np.where(size > 0, size, 1.0)

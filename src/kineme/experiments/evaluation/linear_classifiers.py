@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.experiments.evaluation.neighbors import standard_paths
 from kineme.experiments.evaluation.optional import optional_module
+from kineme.experiments.evaluation.paths import paths_over_length
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.validation import Array
 
 _PENALTY = 1000.0  # of the SVM, as in the recognizer of this library: with 1 every multiplier is at its bound
-_N_POINTS = 100  # of GAK: its cost is quadratic
+_GAK_POINTS = 100  # its cost is quadratic
+_N_POINTS = 200
 
 
 def _familiarity(values: Array) -> Array:
@@ -50,7 +51,7 @@ class AlignmentSVM:
 
     @staticmethod
     def _series(demonstrations: Demonstrations) -> Array:
-        return np.ascontiguousarray(standard_paths(demonstrations, _N_POINTS).transpose(0, 2, 1))
+        return np.ascontiguousarray(paths_over_length(demonstrations, _GAK_POINTS).transpose(0, 2, 1))
 
 
 class MiniRocket:
@@ -65,10 +66,10 @@ class MiniRocket:
         self.model = aeon.MiniRocketClassifier(random_state=self.seed, n_jobs=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # many classes with few movements each are intended
-            self.model.fit(standard_paths(demonstrations), require_labels(demonstrations))
+            self.model.fit(paths_over_length(demonstrations, _N_POINTS), require_labels(demonstrations))
 
     def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and largest decision value of each movement."""
-        values = self.model.pipeline_.decision_function(standard_paths(demonstrations))
+        values = self.model.pipeline_.decision_function(paths_over_length(demonstrations, _N_POINTS))
         best = (values > 0).astype(int) if values.ndim == 1 else values.argmax(axis=1)
         return np.asarray(self.model.classes_)[best], _familiarity(values)

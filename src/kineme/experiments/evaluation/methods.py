@@ -6,13 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
+from kineme.anchoring import propose
+from kineme.experiments.evaluation.clouds import PlusCloud, PointCloud, QuickCloud
 from kineme.experiments.evaluation.generative import HiddenMarkov
 from kineme.experiments.evaluation.linear_classifiers import AlignmentSVM, MiniRocket
-from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures, PointCloud
+from kineme.experiments.evaluation.measures import Stretch
+from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures
 from kineme.experiments.evaluation.optional import why_missing
-from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.early.early import cut
 from kineme.recognition.recognizer import Recognizer
 from kineme.validation import Array
 
@@ -48,23 +54,45 @@ class Method:
         Options -> contender.
     needs : str
         Optional module that the method imports; "" for none.
-    only_dims : int or None
-        The only number of dimensions that it works in.
-    slow : bool
-        Runs only at the reference strength of protocols that have several strengths.
+    learns_beginnings : bool
+        Whether it is given the beginnings of the training movements too where beginnings are to be classified.
     """
 
     title: str
     make: Callable[[Options], Contender]
     needs: str = ""
-    only_dims: int | None = None
-    slow: bool = False
+    learns_beginnings: bool = False
 
-    def unavailable(self, n_dims: int) -> str:
+    def contender(self, options: Options, task: str = "classify") -> Contender:
+        """A contender for a trial of that task."""
+        made = self.make(options)
+        return LearnsBeginnings(made) if self.learns_beginnings and task == "classify partial" else made
+
+    def unavailable(self) -> str:
         """Why the method cannot take part, or ""."""
-        if self.only_dims not in (None, n_dims):
-            return f"works in {self.only_dims} dimensions only"
         return why_missing(self.needs) if self.needs else ""
+
+
+class LearnsBeginnings:
+    """A contender that also learns the beginnings of its training movements, so that it can classify beginnings."""
+
+    def __init__(self, contender: Contender) -> None:
+        self.contender = contender
+
+    def fit(self, demonstrations: Demonstrations) -> None:
+        """Learn from labeled movements and their beginnings."""
+        parts = [one for share in _SHARES for one in cut(demonstrations, share)]
+        labels = np.tile(require_labels(demonstrations), len(_SHARES))
+        arrays, times = [one.positions for one in parts], [one.times for one in parts]
+        self.contender.fit(Demonstrations.from_arrays(arrays, labels, times))
+
+    def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
+        """The class of each movement, and its familiarity."""
+        return self.contender.classify(demonstrations)
+
+    def classify_partial(self, demonstrations: Demonstrations) -> NDArray[Any]:
+        """Class of each movement of which only the beginning is given."""
+        return self.contender.classify(demonstrations)[0]
 
 
 class DefaultRecognizer:
@@ -85,20 +113,40 @@ class DefaultRecognizer:
         """Class of each movement of which only the beginning is given."""
         return self.recognizer.predict_partial(demonstrations)
 
+    def spot(self, recording: Trajectory) -> list[Stretch]:
+        """The stretches of known classes in a recording."""
+        return [Stretch(*one[:3]) for one in self.recognizer.spot(recording) if one.label is not None]
+
+    def cluster(self, demonstrations: Demonstrations, n_clusters: int | None) -> NDArray[Any]:
+        """Cluster of each movement, -1 for none."""
+        return propose(demonstrations, n_clusters=n_clusters, like=self.recognizer).clusters
+
 
 OURS = "kineme"
+_SHARES = np.arange(3, 11) / 10  # of the path, of the beginnings that are learned
 
 #: The paper's configuration is 1-NN on the shape-attractor of the original, or on f of the bio-inspired formulation.
 METHODS: dict[str, Method] = {
     OURS: Method("kineme, defaults", lambda options: DefaultRecognizer(options.max_angle)),
     "paper": Method("paper, original form", lambda _: PaperFeatures("original", "shape-attractor")),
     "paper-bio": Method("paper, bio-inspired form", lambda _: PaperFeatures("bio-inspired", "forcing")),
-    "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor()),
-    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim"),
+    "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor(), learns_beginnings=True),
+    "dtw": Method("DTW 1-NN", lambda _: DTWNeighbor(), needs="dtaidistance.dtw_ndim", learns_beginnings=True),
+    "dtw-path": Method(
+        "DTW 1-NN, arc length",
+        lambda _: DTWNeighbor(along_path=True),
+        needs="dtaidistance.dtw_ndim",
+        learns_beginnings=True,
+    ),
     "gak-svm": Method("GAK-SVM", lambda options: AlignmentSVM(options.seed), needs="tslearn.metrics"),
     "minirocket": Method(
-        "MiniRocket + ridge", lambda options: MiniRocket(options.seed), needs="aeon.classification.convolution_based"
+        "MiniRocket + ridge",
+        lambda options: MiniRocket(options.seed),
+        needs="aeon.classification.convolution_based",
+        learns_beginnings=True,
     ),
-    "point-cloud": Method("$P point cloud", lambda _: PointCloud(), needs="dollarpy", only_dims=2, slow=True),
+    "point-cloud": Method("$P (our code)", lambda _: PointCloud(), learns_beginnings=True),
+    "plus-cloud": Method("$P+ (our code)", lambda _: PlusCloud(), learns_beginnings=True),
+    "quick-cloud": Method("$Q (our code)", lambda _: QuickCloud(), learns_beginnings=True),
     "hmm": Method("HMM", lambda options: HiddenMarkov(options.seed), needs="hmmlearn.hmm"),
-}
+}  # fmt: skip

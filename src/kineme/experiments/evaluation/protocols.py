@@ -3,86 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 
 from kineme.experiments.evaluation.conditions import TOGETHER, UNTOUCHED, Condition, robustness_conditions
-from kineme.experiments.evaluation.splits import Split, few_shot, folds, half_unknown, one_left_out
+from kineme.experiments.evaluation.data import DataSet
+from kineme.experiments.evaluation.person_protocols import PERSON_PROTOCOLS
+from kineme.experiments.evaluation.splits import few_shot, folds, half_unknown, one_left_out
+from kineme.experiments.evaluation.trials import Protocol, Settings, Trial, shots_label
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 
+_SHOTS = (1, 3, 5)
 _FOLDS = 5
 _OPEN_SET_SHOTS = 5
 _EARLY_SHOTS = 3
 _FRACTIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _EARLY_PERTURBATION = Perturbation(shift=1.0, scale=1.0, rotation=math.radians(30))
-
-
-class Settings(NamedTuple):
-    """The options of the command."""
-
-    splits: int = 10
-    seed: int = 0
-    shots: tuple[int, ...] = (1, 3, 5)
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Training and test movements under one condition.
-
-    With `fractions`, only these shares of the test movements' paths are classified. Slow methods run in reference
-    trials only.
-    """
-
-    condition: Condition
-    demonstrations: Demonstrations
-    split: Split
-    max_angle: float | None = None
-    fractions: tuple[float, ...] = ()
-    reference: bool = True
-
-
-Trials = Callable[[Demonstrations, Settings, int], Iterator[Trial]]
-
-
-@dataclass(frozen=True)
-class Protocol:
-    """One row of `PROTOCOLS`.
-
-    Attributes
-    ----------
-    title, description : str
-        Texts of the report.
-    trials : callable
-        (demonstrations, settings, index of the split) -> trials.
-    n_splits : callable
-        (demonstrations, settings) -> number of splits.
-    rotates : bool
-        Needs movements of two or three dimensions, which can be rotated.
-    min_classes : int
-        Smallest number of classes.
-    by_default : bool
-        Whether the protocol runs if none is named.
-    """
-
-    title: str
-    description: str
-    trials: Trials
-    n_splits: Callable[[Demonstrations, Settings], int] = lambda _, settings: settings.splits
-    rotates: bool = False
-    min_classes: int = 2
-    by_default: bool = True
-
-    def unsuitable(self, demonstrations: Demonstrations) -> str:
-        """Why the data do not allow this protocol, or ""."""
-        if self.rotates and demonstrations.n_dims not in (2, 3):
-            return f"needs movements of 2 or 3 dimensions, these have {demonstrations.n_dims}"
-        n_classes = len(np.unique(require_labels(demonstrations)))
-        few = n_classes < self.min_classes
-        return f"needs at least {self.min_classes} classes, these are {n_classes}" if few else ""
 
 
 def usable_shots(demonstrations: Demonstrations, shots: tuple[int, ...]) -> tuple[int, ...]:
@@ -91,57 +29,64 @@ def usable_shots(demonstrations: Demonstrations, shots: tuple[int, ...]) -> tupl
     return tuple(sorted({min(k, largest) for k in shots}))
 
 
-def _few_shot(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
+def _few_shot(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
     labels = require_labels(demos)
-    for k, shots in enumerate(usable_shots(demos, settings.shots)):
+    for shots in usable_shots(demos, settings.shots or _SHOTS):
         split = few_shot(labels, shots, settings.seed, index)
-        yield Trial(Condition("shots", shots, f"{shots} shot" + "s" * (shots > 1)), demos, split, reference=k == 0)
+        yield Trial(shots_label(shots), demos, split)
 
 
-def _leave_one_out(demos: Demonstrations, _: Settings, index: int) -> Iterator[Trial]:
+def _leave_one_out(data: DataSet, _: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
     yield Trial(UNTOUCHED, demos, one_left_out(require_labels(demos), index))
 
 
-def _cross_validation(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
+def _cross_validation(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
     n_folds = min(_FOLDS, int(np.unique(require_labels(demos), return_counts=True)[1].min()))
     for split in folds(require_labels(demos), n_folds, settings.seed, index):
         yield Trial(UNTOUCHED, demos, split)
 
 
-def _robustness(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
-    split = few_shot(require_labels(demos), usable_shots(demos, settings.shots)[0], settings.seed, index)
-    for condition, perturbation, reference in robustness_conditions(demos.n_dims):
+def _robustness(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
+    split = few_shot(require_labels(demos), usable_shots(demos, settings.shots or _SHOTS)[0], settings.seed, index)
+    for condition, perturbation in robustness_conditions(demos.n_dims):
         perturbed = perturbation.apply(demos, [settings.seed, index])
-        yield Trial(condition, perturbed, split, reference=reference)
+        yield Trial(condition, perturbed, split)
 
 
-def _any_angle(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
-    split = few_shot(require_labels(demos), usable_shots(demos, settings.shots)[0], settings.seed, index)
+def _any_angle(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
+    split = few_shot(require_labels(demos), usable_shots(demos, settings.shots or _SHOTS)[0], settings.seed, index)
     turned = Perturbation(rotation=math.pi).apply(demos, [settings.seed, index])
     yield Trial(Condition("rotation", 180, "any angle"), turned, split, max_angle=math.pi)
 
 
-def _open_set(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
+def _open_set(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
     shots = usable_shots(demos, (_OPEN_SET_SHOTS,))[0]
     split = half_unknown(require_labels(demos), shots, settings.seed, index)
-    yield Trial(UNTOUCHED, demos, split, reference=False)
+    yield Trial(UNTOUCHED, demos, split)
     perturbation = TOGETHER[1].in_dimensions(demos.n_dims)
     perturbed = perturbation.apply(demos, [settings.seed, index])
     yield Trial(Condition("together", 2, "perturbed"), perturbed, split)
 
 
-def _early(demos: Demonstrations, settings: Settings, index: int) -> Iterator[Trial]:
+def _early(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
+    demos = data.demonstrations
     split = few_shot(require_labels(demos), usable_shots(demos, (_EARLY_SHOTS,))[0], settings.seed, index)
     perturbation = _EARLY_PERTURBATION.in_dimensions(demos.n_dims)
     moved = perturbation.apply(demos, [settings.seed, index])
-    yield Trial(Condition("path", 100, "whole path"), moved, split, fractions=_FRACTIONS, reference=False)
+    yield Trial(Condition("path", 100, "whole path"), moved, split, "classify partial", fractions=_FRACTIONS)
 
 
 PROTOCOLS: dict[str, Protocol] = {
     "few-shot": Protocol("Few shots", "A few random movements of each class train, all others test.", _few_shot),
     "leave-one-out": Protocol(
         "Leave one out", "Each movement tests once, all others train.", _leave_one_out,
-        lambda demos, _: len(demos), by_default=False,
+        lambda data, _: len(data.demonstrations), by_default=False,
     ),
     "cross-validation": Protocol(
         "Cross-validation", "Each class is spread over five parts, each of which tests once.", _cross_validation,
@@ -161,6 +106,6 @@ PROTOCOLS: dict[str, Protocol] = {
     ),
     "earliness": Protocol(
         "Early", "Up to three shots; only the first part of each test movement's path is given, and position, "
-        "size and direction within 30 degrees are unknown.", _early,
+        "size and direction within 30 degrees are unknown.", _early, task="classify partial",
     ),
-}  # fmt: skip
+} | PERSON_PROTOCOLS  # fmt: skip

@@ -1,20 +1,24 @@
-"""The report: tables, figures, and where a rival is ahead, in one self-contained HTML file."""
+"""The report: tables, figures, and conclusions, in one self-contained HTML file."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from kineme.experiments.evaluation.conclusions import MEASURES, columns, conclusion, verdict
 from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.figures import draw_protocol
-from kineme.experiments.evaluation.methods import METHODS, OURS
+from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.protocols import PROTOCOLS
+from kineme.experiments.evaluation.rank_figure import draw_ranks
+from kineme.experiments.evaluation.ranks import Ranks, rank_sentence
 from kineme.experiments.evaluation.results import Results
 from kineme.movements.trajectories.demonstrations import require_labels
+from kineme.output.figures import encode_figure
 from kineme.output.page import page, picture
 from kineme.output.table import Table, mean_and_range, to_html
 from kineme.output.text import in_markup
 
-_MEASURES = {"accuracy": "accuracy", "auroc": "AUROC", "rejected": "unknown rejected"}
+_MOST_COLUMNS, _WIDEST = 6, 120  # of a table with a method per row; characters of its heads
 
 
 def make_tables(results: Results) -> dict[str, Table]:
@@ -24,28 +28,23 @@ def make_tables(results: Results) -> dict[str, Table]:
 
 def _table(protocol: str, results: Results) -> Table:
     outcomes = results.outcomes[protocol]
-    columns = _columns(protocol, results)
-    several = len({measure for _, measure in columns}) > 1
-    heads = [f"{one.label}: {_MEASURES[measure]}" if several else one.label for one, measure in columns]
+    shown = columns(protocol, results)
+    several = len({measure for _, measure in shown}) > 1
+    heads = [f"{one.label}: {MEASURES[measure]}" if several else one.label for one, measure in shown]
     rows = [
         (
             METHODS[method].title,
-            *(_cell(outcome.get(condition, {}).get(measure), len(columns)) for condition, measure in columns),
+            *(_cell(outcome.get(condition, {}).get(measure), len(shown)) for condition, measure in shown),
         )
         for method, outcome in outcomes.items()
     ]
     # With many conditions, one row per condition is easier to read.
     cells = [("", *heads), *rows]
-    if len(heads) > len(rows) or len(heads) > 6:
+    if len(heads) > min(len(rows), _MOST_COLUMNS) or sum(map(len, heads)) > _WIDEST:
         cells = list(zip(*cells, strict=True))
     head = ("method" if cells[0][1:] == tuple(heads) else "condition", *cells[0][1:])
     chosen = PROTOCOLS[protocol]
-    return Table(chosen.title, head, cells[1:], f"{chosen.description} {rivals_ahead(protocol, results)}")
-
-
-def _columns(protocol: str, results: Results) -> list[tuple[Any, str]]:
-    fullest = max(results.outcomes[protocol].values(), key=len)
-    return [(condition, measure) for condition, measures in fullest.items() for measure in measures]
+    return Table(chosen.title, head, cells[1:], f"{chosen.description} {conclusion(protocol, results)}")
 
 
 def _cell(values: list[float] | None, n_columns: int) -> str:
@@ -54,36 +53,15 @@ def _cell(values: list[float] | None, n_columns: int) -> str:
     return mean_and_range(values) if n_columns <= 6 else f"{sum(values) / len(values):.3f}"
 
 
-def rivals_ahead(protocol: str, results: Results) -> str:
-    """Where a rival's mean is above ours, among the rivals that took part; and which rivals did not."""
-    if OURS not in results.outcomes[protocol]:
-        return ""
-    rivals = [name for name in results.outcomes[protocol] if name != OURS]
-    if not rivals:
-        return f"No rival took part. {_not_compared(results)}".rstrip()
-    ahead = []
-    for condition, measure in _columns(protocol, results):
-        ours = results.mean(protocol, OURS, condition, measure)
-        for rival in rivals:
-            theirs = results.mean(protocol, rival, condition, measure)
-            if ours is not None and theirs is not None and round(theirs, 3) > round(ours, 3):
-                what = "" if measure == "accuracy" else f" in {_MEASURES[measure]}"
-                ahead.append(f"{METHODS[rival].title}, {condition.label}{what} ({theirs:.3f} over {ours:.3f})")
-    named = f"Ahead of kineme: {'; '.join(ahead)}."
-    names = "; ".join(METHODS[rival].title for rival in rivals)
-    none = f"No rival is ahead of kineme anywhere in this table. Rivals here: {names}."
-    return f"{named if ahead else none} {_not_compared(results)}".rstrip()
-
-
-def _not_compared(results: Results) -> str:
-    """The rivals that the conclusion leaves out, and why."""
-    absent = [f"{METHODS[name].title} ({why})" for name, why in results.absent.items() if name != OURS]
-    return f"Not compared: {'; '.join(absent)}." if absent else ""
-
-
-def write_report(data: DataSet, results: Results, tables: dict[str, Table], facts: dict[str, Any]) -> str:
-    """HTML with tables and figures."""
-    parts = [f'<p class="lead">{in_markup(_lead(data))}</p>']
+def write_report(
+    data: DataSet, results: Results, tables: dict[str, Table], ranks: Ranks | str, facts: dict[str, Any]
+) -> str:
+    """HTML with tables and figures; `ranks` is a text that says why where there are none."""
+    parts = [f'<p class="lead">{in_markup(_lead(data))}</p>', f"<p>{in_markup(verdict(results))}</p>"]
+    if isinstance(ranks, str):
+        parts.append(f"<p>{in_markup(ranks)}</p>")
+    else:
+        parts.append(picture(encode_figure(draw_ranks(ranks), "svg"), rank_sentence(ranks)))
     for name, table in tables.items():
         drawn = draw_protocol(name, results)
         shown = "" if drawn is None else picture(drawn, f"{PROTOCOLS[name].title}: mean over splits.")
@@ -103,5 +81,6 @@ def _lead(data: DataSet) -> str:
     return (
         f"{len(data.demonstrations)} movements of {len(labels)} classes in {data.demonstrations.n_dims} dimensions. "
         "All methods see the same splits and the same perturbed movements. Numbers are means over splits, with their "
-        "range where there is room. Rivals get positions that are centered and scaled."
+        "range where there is room. Rivals get positions that are centered, scaled, smoothed and even along the path; "
+        "plain DTW gets them even in time."
     )

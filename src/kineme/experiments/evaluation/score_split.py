@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from kineme.experiments.evaluation.concatenated import concatenated
 from kineme.experiments.evaluation.conditions import Condition
-from kineme.experiments.evaluation.measures import accuracy, open_set
+from kineme.experiments.evaluation.data import DataSet
+from kineme.experiments.evaluation.measures import accuracy, clustered, open_set, spotted
 from kineme.experiments.evaluation.methods import METHODS, Contender, Options
-from kineme.experiments.evaluation.protocols import PROTOCOLS, Settings, Trial
+from kineme.experiments.evaluation.protocols import PROTOCOLS
+from kineme.experiments.evaluation.trials import TASKS, Settings, Trial
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.recognition.early.early import cut
 
@@ -22,24 +28,26 @@ class Scores(NamedTuple):
     seconds: float
 
 
-def score_split(
-    demonstrations: Demonstrations, protocol: str, method: str, index: int, settings: Settings
-) -> list[Scores]:
+def score_split(data: DataSet, protocol: str, method: str, index: int, settings: Settings) -> list[Scores]:
     """The scores of all trials of a split; empty for a method that cannot do what the protocol asks."""
-    scores = []
-    for trial in PROTOCOLS[protocol].trials(demonstrations, settings, index):
-        if trial.reference or not METHODS[method].slow:
-            contender = METHODS[method].make(Options(trial.max_angle, settings.seed))
-            scores += list(_score_early(contender, trial) if trial.fractions else _score_whole(contender, trial))
+    scores: list[Scores] = []
+    if not does(method, PROTOCOLS[protocol].task):
+        return scores
+    for trial in PROTOCOLS[protocol].trials(data, settings, index):
+        contender = METHODS[method].contender(Options(trial.max_angle, settings.seed), trial.task)
+        if trial.task == "spot":
+            scores += _spot(contender, trial, [settings.seed, index])
+        else:
+            scores += _SCORED[trial.task](contender, trial)
     return scores
 
 
-def classifies_partial(method: str) -> bool:
-    """Whether a method can classify movements that are not over yet."""
-    return callable(getattr(METHODS[method].make(Options()), "classify_partial", None))
+def does(method: str, task: str) -> bool:
+    """Whether a method can do a task of `TASKS`."""
+    return callable(getattr(METHODS[method].contender(Options(), task), TASKS[task].method, None))
 
 
-def _score_whole(contender: Contender, trial: Trial) -> Iterator[Scores]:
+def _whole(contender: Contender, trial: Trial) -> Iterator[Scores]:
     train, test = trial.demonstrations[trial.split.train], trial.demonstrations[trial.split.test]
     began = time.perf_counter()
     contender.fit(train)
@@ -50,9 +58,7 @@ def _score_whole(contender: Contender, trial: Trial) -> Iterator[Scores]:
     yield Scores(trial.condition, values, seconds)
 
 
-def _score_early(contender: Any, trial: Trial) -> Iterator[Scores]:
-    if not callable(getattr(contender, "classify_partial", None)):
-        return
+def _partial(contender: Any, trial: Trial) -> Iterator[Scores]:
     test = trial.demonstrations[trial.split.test]
     contender.fit(trial.demonstrations[trial.split.train])
     for fraction in trial.fractions:
@@ -61,3 +67,29 @@ def _score_early(contender: Any, trial: Trial) -> Iterator[Scores]:
         values = accuracy(contender.classify_partial(partial), require_labels(test))
         condition = Condition(trial.condition.varied, 100 * fraction, f"{100 * fraction:.0f} %")
         yield Scores(condition, values, time.perf_counter() - began)
+
+
+def _spot(contender: Any, trial: Trial, seed: list[int]) -> Iterator[Scores]:
+    recordings = concatenated(trial.demonstrations[trial.split.test], trial.rest, seed)
+    began = time.perf_counter()
+    contender.fit(trial.demonstrations[trial.split.train])
+    found = [contender.spot(one.recording) for one in recordings]
+    seconds = time.perf_counter() - began
+    yield Scores(trial.condition, spotted(found, [one.stretches for one in recordings]), seconds)
+
+
+def _cluster(contender: Any, trial: Trial) -> Iterator[Scores]:
+    movements = trial.demonstrations[trial.split.test]
+    labels = require_labels(movements)
+    unlabeled = Demonstrations.of_movements(replace(movements.movements, labels=None))
+    began = time.perf_counter()
+    found = contender.cluster(unlabeled, None)
+    given = contender.cluster(unlabeled, len(np.unique(labels)))
+    yield Scores(trial.condition, clustered(found, given, labels), time.perf_counter() - began)
+
+
+_SCORED: dict[str, Callable[[Any, Trial], Iterator[Scores]]] = {
+    "classify": _whole,
+    "classify partial": _partial,
+    "cluster": _cluster,
+}

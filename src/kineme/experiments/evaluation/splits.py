@@ -58,3 +58,40 @@ def _shuffled(labels: NDArray[Any], seed: int, index: int) -> list[Indices]:
     """Shuffled indices of each class, classes sorted."""
     random = np.random.default_rng([0, seed, index])
     return [random.permutation(np.flatnonzero(labels == label)) for label in np.unique(labels)]
+
+
+def within_person(labels: NDArray[Any], tested: NDArray[np.bool_], shots: int, seed: int, draw: int) -> Split:
+    """`shots` random movements of every class by the tested person train, all others by this person test.
+
+    Classes of which the person made no more than `shots` movements are left out. More shots add movements to those of
+    fewer.
+    """
+    own = np.flatnonzero(tested)
+    by_class = [own[one] for one in _shuffled(labels[own], seed, draw) if len(one) > shots]
+    train = _sorted([one[:shots] for one in by_class])
+    test = _sorted([one[shots:] for one in by_class])
+    return Split(train, test, np.ones(len(test), bool))
+
+
+def one_person_out(
+    labels: NDArray[Any], tested: NDArray[np.bool_], shots: int, seed: int, draw: int, unknown: bool = False
+) -> Split:
+    """`shots` random movements of every class by all other people train; those of the tested person test.
+
+    Classes of which the others made fewer than `shots` movements are left out. With `unknown`, a random half of the
+    classes trains, and the movements of the others are unknown. More shots add movements to those of fewer.
+    """
+    others = np.flatnonzero(~tested)
+    by_class = [others[one] for one in _shuffled(labels[others], seed, draw) if len(one) >= shots]
+    classes = [labels[one[0]] for one in by_class]
+    known = by_class
+    if unknown:
+        order = np.random.default_rng([1, seed, draw]).permutation(len(by_class))
+        known = [by_class[k] for k in order[: (len(by_class) + 1) // 2]]
+    test = np.flatnonzero(tested & np.isin(labels, classes))
+    train = _sorted([one[:shots] for one in known])
+    return Split(train, test, np.isin(labels[test], labels[train]))
+
+
+def _sorted(parts: list[Indices]) -> Indices:
+    return np.sort(np.concatenate([np.empty(0, dtype=np.intp), *parts]))

@@ -76,7 +76,7 @@ def elements(data: memoryview, order: str) -> Iterator[Element]:
 
 def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matrix]:
     """The variables with these names; others are neither decompressed nor read."""
-    found = {}
+    variables = {}
     for element in elements(memoryview(data)[HEADER:], order):
         if element.type == _COMPRESSED:
             matrix = _expanded(element.data, order, wanted)
@@ -85,8 +85,8 @@ def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matri
         else:
             raise ValueError(f"an element of type {element.type} in place of a variable")
         if matrix.name in wanted:
-            found[matrix.name] = matrix
-    return found
+            variables[matrix.name] = matrix
+    return variables
 
 
 def _expanded(packed: memoryview, order: str, wanted: Container[str]) -> Matrix:

@@ -49,15 +49,15 @@ def read_demos(data: bytes) -> Demos:
         raise DataError("expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7")
     try:
         order = byte_order(data)
-        found = matrices(data, order, ("demos", "name"))
-        if "demos" not in found:
+        variables = matrices(data, order, ("demos", "name"))
+        if "demos" not in variables:
             raise ValueError("none of that name")
-        pairs = list(_pairs(found["demos"], order))
+        pairs = list(_pairs(variables["demos"], order))
         if not pairs:
             raise ValueError("none in it")
         check_expanded(sum(8 * math.prod(one.dims) for pair in pairs for one in pair))
         demos = [_arrays(numbers(t, order), numbers(x, order)) for t, x in pairs]
-        name = text(found["name"], order) if "name" in found else None
+        name = text(variables["name"], order) if "name" in variables else None
     except (ValueError, struct.error, zlib.error) as error:
         raise DataError(f"expected a MATLAB file with 'demos', got {error}") from error
     return Demos([t for t, _ in demos], [x for _, x in demos], name or None)

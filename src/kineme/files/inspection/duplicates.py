@@ -22,10 +22,10 @@ def duplicates_among(demonstrations: Demonstrations) -> list[list[int]]:
     group = group.ravel()
     candidates = np.flatnonzero(size[group] > 1)
     candidates = candidates[np.argsort(group[candidates], kind="stable")]
-    found = []
+    groups = []
     for alike in np.split(candidates, np.flatnonzero(np.diff(group[candidates])) + 1):
-        found += _equal(demonstrations, alike.tolist())
-    return sorted(found)
+        groups += _equal(demonstrations, alike.tolist())
+    return sorted(groups)
 
 
 def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:

@@ -12,36 +12,36 @@ from kineme.output.text import counted, printable
 _SHOWN = 20  # lines of a list; the rest is counted
 
 
-def as_data(found: Inspection) -> dict[str, Any]:
+def as_data(inspection: Inspection) -> dict[str, Any]:
     """Nested lists and dictionaries; units as the fields of `Inspection` and `LabelSummary` say."""
     return {
-        "movements": found.movements,
-        "files": found.files,
-        "dimensions": found.dimensions,
+        "movements": inspection.movements,
+        "files": inspection.files,
+        "dimensions": inspection.dimensions,
         "labels": [
             {name: value._asdict() if isinstance(value, Range) else value for name, value in one._asdict().items()}
-            for one in found.labels
+            for one in inspection.labels
         ],
-        "detected": [{**how._asdict(), "files": n} for how, n in found.detected],
-        "duplicates": [list(group) for group in found.duplicates],
-        "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in found.problems],
-        "notes": list(found.notes),
+        "detected": [{**how._asdict(), "files": n} for how, n in inspection.detected],
+        "duplicates": [list(group) for group in inspection.duplicates],
+        "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in inspection.problems],
+        "notes": list(inspection.notes),
     }
 
 
-def as_words(found: Inspection) -> str:
+def as_words(inspection: Inspection) -> str:
     """A table of labels, how files were read, duplicates, and what could not be read."""
-    rows = [_row(one) for one in found.labels]
+    rows = [_row(one) for one in inspection.labels]
     title = (
-        f"{counted(found.movements, 'movement')} of {counted(found.dimensions, 'dimension')} "
-        f"in {counted(found.files, 'file')}"
+        f"{counted(inspection.movements, 'movement')} of {counted(inspection.dimensions, 'dimension')} "
+        f"in {counted(inspection.files, 'file')}"
     )
     heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
     parts = [to_text(Table(title, heads, rows))]
-    parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in found.detected])
-    parts += _listed("the same movement more than once", [" = ".join(group) for group in found.duplicates])
-    parts += _listed("not read", list(map(str, found.problems)))
-    parts += _listed("note", list(found.notes))
+    parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
+    parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
+    parts += _listed("not read", list(map(str, inspection.problems)))
+    parts += _listed("note", list(inspection.notes))
     return "\n\n".join(parts)
 
 

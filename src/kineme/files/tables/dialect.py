@@ -71,9 +71,9 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
     gap = re.compile(r"\s+" if separator is None else end)
     line = line.strip() if separator is None else line
     cells, at = [], 0
-    while found := cell.match(line, at):
-        cells.append(found[3] if found[1] is None else found[1].replace('""', '"') + (found[2] or ""))
-        if (between := gap.match(line, found.end())) is None:
+    while match := cell.match(line, at):
+        cells.append(match[3] if match[1] is None else match[1].replace('""', '"') + (match[2] or ""))
+        if (between := gap.match(line, match.end())) is None:
             break
         at = between.end()
     return cells

@@ -56,9 +56,9 @@ def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
     """The ids, if all movements are stored and those with labels have symbols, so that nothing changes; else None."""
     with store.reading() as connection:
         stored = find_stored(connection, batch)
-        found = [stored.id_of(batch, i) for i in range(len(batch.digests))]
-        ids = [key for key in found if key is not None]
-        if len(ids) < len(found) or _without_symbol(connection, batch, ids):
+        keys = [stored.id_of(batch, i) for i in range(len(batch.digests))]
+        ids = [key for key in keys if key is not None]
+        if len(ids) < len(keys) or _without_symbol(connection, batch, ids):
             return None
         return np.array(ids, dtype=np.int64)
 
@@ -69,12 +69,12 @@ def _keys(change: Change, batch: Batch, stored: Stored) -> tuple[list[int], dict
     keys: list[int] = []
     new: dict[int, int] = {}
     for i in range(len(batch.digests)):
-        found = stored.id_of(batch, i)
-        if found is None:
-            found = key + len(new)
-            new[found] = i
-            stored.remember(batch, i, found)
-        keys.append(found)
+        movement = stored.id_of(batch, i)
+        if movement is None:
+            movement = key + len(new)
+            new[movement] = i
+            stored.remember(batch, i, movement)
+        keys.append(movement)
     return keys, new
 
 

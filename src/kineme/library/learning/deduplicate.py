@@ -34,8 +34,8 @@ class Stored:
 
     def id_of(self, batch: Batch, i: int) -> int | None:
         """The id of movement i of the batch; None if it is new."""
-        found, where = self.by_digest.get(batch.digests[i]), self.place_of(batch, i)
-        return self.by_place.get(where) if found is None and where is not None else found
+        key, where = self.by_digest.get(batch.digests[i]), self.place_of(batch, i)
+        return self.by_place.get(where) if key is None and where is not None else key
 
     def place_of(self, batch: Batch, i: int) -> tuple[int, str] | None:
         """(source, position in it) of movement i, if its source is stored."""

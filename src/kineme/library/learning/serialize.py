@@ -75,12 +75,12 @@ def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
     positions, row = np.ascontiguousarray(demos.positions).data.cast("B"), 8 * demos.n_dims
     relative = None if even.all() else _relative_times(demos).data.cast("B")
     durations, offsets = demos.durations.tobytes(), demos.offsets.tolist()
-    found = []
+    parts = []
     for i, (a, b) in enumerate(pairwise(offsets)):
         digest = hashlib.blake2b(positions[a * row : b * row], digest_size=8)
         digest.update(durations[8 * i : 8 * i + 8] if relative is None or even[i] else relative[8 * a : 8 * b])
-        found.append(digest.digest())
-    return np.frombuffer(b"".join(found), np.int64).tolist()
+        parts.append(digest.digest())
+    return np.frombuffer(b"".join(parts), np.int64).tolist()
 
 
 def _relative_times(demos: Demonstrations) -> Array:

@@ -38,8 +38,8 @@ class LibraryRecognizer:
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
-        found = self._named(self.model().recognize(X, error_rate))
-        return found[0] if is_one(X) else found
+        answers = self._named(self.model().recognize(X, error_rate))
+        return answers[0] if is_one(X) else answers
 
     def model(self) -> KnownClasses | TwoStageSearch:
         """What recognizes the symbols as they are now: by all of their movements, or in two stages."""
@@ -59,16 +59,16 @@ class LibraryRecognizer:
         self._ids = self._reduced.ids
         return two_stages(self.store, self._reduced, members)
 
-    def _named(self, found: list[Answer]) -> list[Answer]:
+    def _named(self, answers: list[Answer]) -> list[Answer]:
         """The answers with ids and names of movements instead of rows."""
-        ids = np.unique([self._ids[near.index] for answer in found for near in answer.nearest])
+        ids = np.unique([self._ids[near.index] for answer in answers for near in answer.nearest])
         names = {one["id"]: one["name"] for one in read.records(self.store, ids)}
 
         def name(near: Neighbor) -> Neighbor:
             key = int(self._ids[near.index])
             return Neighbor(key, names[key], near.similarity)
 
-        return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in found]
+        return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in answers]
 
 
 def known_members(store: Store, members: Members) -> KnownClasses:

@@ -17,7 +17,7 @@ from kineme.library.storage.versions import Change
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
-_SAID = ("description", "prototype", "threshold")  # the columns that `describe` changes
+_SAID = ("description", "prototype", "threshold")  # the columns that `annotate` changes
 
 
 def rename(store: Store, old: str, new: str) -> None:
@@ -29,10 +29,10 @@ def rename(store: Store, old: str, new: str) -> None:
         _replace_state(change, state, name=new)
 
 
-def describe(store: Store, who: str, **values: Any) -> None:
+def annotate(store: Store, who: str, **values: Any) -> None:
     """Change description, prototype (id of a movement) and threshold of a symbol."""
     for name in values:
-        check_choice("what is described", name, _SAID)
+        check_choice("what is annotated", name, _SAID)
     if (prototype := values.get("prototype")) is not None:
         values["prototype"] = int(as_ids(store, prototype)[0])
     if (threshold := values.get("threshold")) is not None:
@@ -42,7 +42,7 @@ def describe(store: Store, who: str, **values: Any) -> None:
         if not isinstance(values["description"], str):
             raise SpecificationError(f"expected a description, got {values['description']!r}")
         check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, in JSON
-    with store.writing("describe", {"symbol": who, **values}) as change:
+    with store.writing("annotate", {"symbol": who, **values}) as change:
         _replace_state(change, state_of(change.connection, who, NOW), **values)
 
 

@@ -112,14 +112,14 @@ def _check_definitions(connection: sqlite3.Connection, path: Path, version: int)
     """
     encoding = connection.execute("PRAGMA encoding").fetchone()[0]
     expected = _definitions(_statements(version))
-    found = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
-    if found == expected and encoding == "UTF-8":
+    stored = connection.execute(f"{_DEFINITIONS} LIMIT {len(expected) + 1}").fetchall()
+    if stored == expected and encoding == "UTF-8":
         return
-    strange = [one for one in found if one not in expected]
+    strange = [one for one in stored if one not in expected]
     got = f"the {strange[0][0]} {strange[0][1]!r}, which is none of them" if strange else "fewer"
     raise DataError(
         f"expected {path} to define the tables and indexes of a library and nothing else, got "
-        f"{got if found != expected else f'texts in {encoding}'}; do not use this file: take it from a backup or an "
+        f"{got if stored != expected else f'texts in {encoding}'}; do not use this file: take it from a backup or an "
         "export that you trust"
     )
 

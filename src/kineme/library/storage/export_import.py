@@ -108,9 +108,9 @@ def _check_structure(beside: Path, source: Path, wait: float) -> None:
     with closing(connect(beside, "ro", wait)) as copy, limited(copy, beside):
         defend_foreign(copy, beside)
         check_kind(copy, source)
-        found = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
-        if found != "ok":
-            raise _refusal(source, 1, f"the file: {' '.join(found.split())}")
+        verdict = copy.execute("PRAGMA integrity_check(1)").fetchone()[0]
+        if verdict != "ok":
+            raise _refusal(source, 1, f"the file: {' '.join(verdict.split())}")
 
 
 def _check(beside: Path, source: Path, wait: float) -> None:
@@ -124,9 +124,9 @@ def _check(beside: Path, source: Path, wait: float) -> None:
 
 
 def _refusal(source: Path, n: int, first: str) -> DataError:
-    found = "1 problem" if n == 1 else f"{n} problems, the first"
+    shown = "1 problem" if n == 1 else f"{n} problems, the first"
     return DataError(
-        f"expected {source} as it was exported, got damaged bytes, or values that no library holds ({found}: {first}); "
+        f"expected {source} as it was exported, got damaged bytes, or values that no library holds ({shown}: {first}); "
         "nothing was imported: export it again, or take it from a backup that you trust"
     )
 

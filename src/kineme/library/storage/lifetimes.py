@@ -60,8 +60,8 @@ def _named(connection: sqlite3.Connection) -> Whole:
     """As `_columns`, with the names numbered."""
     rows = connection.execute(f"SELECT id, name, added, coalesce(removed, {LARGEST_ID}) FROM symbol_state").fetchall()
     numbers: dict[str, int] = {}
-    found = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
-    table = np.array(found, dtype=np.int64).reshape(-1, 4)
+    lives = [(key, numbers.setdefault(name, len(numbers)), *life) for key, name, *life in rows]
+    table = np.array(lives, dtype=np.int64).reshape(-1, 4)
     return table[np.lexsort((table[:, 3], table[:, 2], table[:, 1]))]
 
 
@@ -88,8 +88,10 @@ def _within(table: str, rows: Whole, owners: Whole, whose: str) -> Found:
     place = np.searchsorted(owners[:, 1], rows[:, 1])
     there: Any = np.zeros(len(rows), dtype=bool)
     known = place < len(owners)
-    found = owners[place[known]]
+    referred = owners[place[known]]
     part = rows[known]
     never = part[:, 2] == part[:, 3]
-    there[known] = (found[:, 1] == part[:, 1]) & (never | ((found[:, 2] <= part[:, 2]) & (part[:, 3] <= found[:, 3])))
+    there[known] = (referred[:, 1] == part[:, 1]) & (
+        never | ((referred[:, 2] <= part[:, 2]) & (part[:, 3] <= referred[:, 3]))
+    )
     yield from ((table, int(key), f"is there when {whose} is not") for key in rows[~there, 0])

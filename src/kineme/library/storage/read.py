@@ -50,11 +50,11 @@ def count(store: Store) -> int:
 
 def _column(connection: sqlite3.Connection, query: str, version: int, expected: int) -> Ids:
     """Ids from a query; refused if their number is wrong."""
-    found = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
+    ids = np.array([key for (key,) in connection.execute(query, {"v": version})], dtype=np.int64)
     last, n = connection.execute("SELECT coalesce(max(id), 0), count(*) FROM movement").fetchone()
-    if len(found) != expected or last != n or (np.diff(found) <= 0).any():
-        raise damage(f"{expected} ids of {last} movements, each once", f"{len(found)} of {n}: damaged bytes")
-    return found
+    if len(ids) != expected or last != n or (np.diff(ids) <= 0).any():
+        raise damage(f"{expected} ids of {last} movements, each once", f"{len(ids)} of {n}: damaged bytes")
+    return ids
 
 
 def as_ids(store: Store, ids: Any) -> Ids:
@@ -119,10 +119,10 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
         done = part.stop
     times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
     _check_increasing(times, offsets, wanted)
-    found = Movements(positions, offsets, durations, times, None, _names(about))
+    stored = Movements(positions, offsets, durations, times, None, _names(about))
     if not np.array_equal(wanted, ids):
-        found = found.take(order)
-    return Demonstrations.of_movements(replace(found, labels=_labels(labels)))
+        stored = stored.take(order)
+    return Demonstrations.of_movements(replace(stored, labels=_labels(labels)))
 
 
 def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
@@ -162,13 +162,13 @@ def features(store: Store, ids: Ids) -> NDArray[np.float32]:
     """Rows of all representations, concatenated, shape (k, sum of d * S)."""
     wanted, order = _sorted(ids)
     width, done = sum(store.specification.widths(store.n_dims or 0)), 0
-    found = np.empty((len(wanted), width), dtype=np.float32)
+    result = np.empty((len(wanted), width), dtype=np.float32)
     for rows in _chunks(store, "feature", "movement", wanted):
-        block = found[done : done + len(rows)]
+        block = result[done : done + len(rows)]
         block[:] = _concatenated("feature", rows, 1, np.float32, width)
         _check_finite("feature", rows, block)
         done += len(rows)
-    return found if np.array_equal(wanted, ids) else found[order]
+    return result if np.array_equal(wanted, ids) else result[order]
 
 
 def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = None) -> Primitives:
@@ -220,8 +220,8 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
         members = select(connection, "member", f"{among('movement')} AND {ALIVE}", keys)
     if lost := {row[2] for row in members} - names.keys():
         raise damaged("symbol", (min(lost),))
-    found = {row[1]: names[row[2]] for row in members}
-    return [found.get(key) for key in ids.tolist()]
+    name_of = {row[1]: names[row[2]] for row in members}
+    return [name_of.get(key) for key in ids.tolist()]
 
 
 def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:

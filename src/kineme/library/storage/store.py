@@ -151,8 +151,8 @@ class Store:
     def n_dims(self) -> int | None:
         """Dimensions that all movements share; None before the first one."""
         with self.reading() as connection:
-            found = select(connection, "meta", "key = 'n_dims'")
-        return as_n_dims(found[0][1], self.path) if found else None
+            rows = select(connection, "meta", "key = 'n_dims'")
+        return as_n_dims(rows[0][1], self.path) if rows else None
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:

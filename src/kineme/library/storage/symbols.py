@@ -111,11 +111,11 @@ def state_of(connection: sqlite3.Connection, who: str, version: int) -> Row:
     conditions = ("name = :who", "symbol IN (SELECT key FROM symbol WHERE id = :who)")
     for condition in conditions if isinstance(who, str) else ():
         try:
-            found = select(connection, "symbol_state", f"{condition} AND {ALIVE}", {"who": who, "v": version})
+            states = select(connection, "symbol_state", f"{condition} AND {ALIVE}", {"who": who, "v": version})
         except UnicodeEncodeError:
             break
-        if found:
-            return found[0]
+        if states:
+            return states[0]
     names = [name for (name,) in connection.execute(f"SELECT name FROM symbol_state WHERE {ALIVE}", {"v": version})]
     like = difflib.get_close_matches(str(who)[:_ALIKE], [name[:_ALIKE] for name in names], 3) or sorted(names)[:5]
     known = f"there are {len(names)}, such as {', '.join(map(repr, like))}" if names else "the library has none"
@@ -178,14 +178,14 @@ def keys_by_name(change: Change, names: Iterable[str]) -> tuple[dict[str, int], 
     """Name or id -> key of its symbol, and the names whose symbols were created."""
     names = list(names)
     known = "FROM symbol_state JOIN symbol ON symbol.key = symbol_state.symbol WHERE removed IS NULL"
-    found: dict[str, int] = {}
+    keys: dict[str, int] = {}
     for column in ("symbol.id", "name"):  # a name takes precedence over an id, as in `state_of`
         query = f"SELECT {column}, symbol.key {known} AND {among(column)}"
-        found |= dict(change.connection.execute(query, {"keys": listed(names)}))
-    made = tuple(name for name in names if name not in found)
+        keys |= dict(change.connection.execute(query, {"keys": listed(names)}))
+    made = tuple(name for name in names if name not in keys)
     for name in made:
-        found[name] = make(change, name)
-    return found, made
+        keys[name] = make(change, name)
+    return keys, made
 
 
 def make(change: Change, name: str, parents: Sequence[str] = ()) -> int:

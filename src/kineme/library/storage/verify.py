@@ -67,15 +67,15 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
 
 def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
     """All problems that a check finds; an error that stops it is one too."""
-    found: list[Problem] = []
+    problems: list[Problem] = []
     try:
         for problem in check(connection):
-            found.append(problem)
-            if len(found) >= _SHOWN:
+            problems.append(problem)
+            if len(problems) >= _SHOWN:
                 break
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        found.append(Problem("", None, f"the file cannot be read to the end ({error})"))
-    return found
+        problems.append(Problem("", None, f"the file cannot be read to the end ({error})"))
+    return problems
 
 
 def _structure(connection: sqlite3.Connection) -> Iterator[Problem]:
@@ -126,8 +126,8 @@ def _strange(connection: sqlite3.Connection, table: str, key: Any) -> Iterator[P
 def _contents(connection: sqlite3.Connection, table: str, rows: list[Row], store: Store) -> Iterator[Problem]:
     if not rows:
         return
-    found = samples(connection, rows, store.n_dims or 0) if table == "raw" else CONTENTS.get(table, _nothing)(rows)
-    yield from (Problem(table, key, f"{row_name(table, key)}: holds {words}") for key, words in found)
+    invalid = samples(connection, rows, store.n_dims or 0) if table == "raw" else CONTENTS.get(table, _nothing)(rows)
+    yield from (Problem(table, key, f"{row_name(table, key)}: holds {words}") for key, words in invalid)
 
 
 def _nothing(rows: Sequence[Row]) -> Iterator[tuple[Any, str]]:

@@ -34,30 +34,36 @@ class LibraryProposals:
     ----------
     ids : ndarray of shape (n,)
         The movements that were considered.
-    found : Proposals
+    by_position : Proposals
         The same with positions among `ids`, for the pictures of `kineme.anchoring`.
     """
 
     ids: Ids
-    found: Proposals
+    by_position: Proposals
 
     def __len__(self) -> int:
-        return len(self.found)
+        return len(self.by_position)
 
     def __getitem__(self, index: int) -> Proposal:
-        one = self.found[index]
+        one = self.by_position[index]
         return replace(one, members=self.ids[one.members], medoid=int(self.ids[one.medoid]))
 
     @property
     def left_over(self) -> Ids:
         """Movements in no proposal."""
-        return self.ids[self.found.left_over]
+        return self.ids[self.by_position.left_over]
 
     def movements(self, library: Any) -> Demonstrations:
         """Deprecated: ``library.movements(ids=proposals.ids)``."""
         warn("LibraryProposals.movements is now library.movements(ids=proposals.ids)", DeprecationWarning, stacklevel=2)
-        found: Demonstrations = library.movements(ids=self.ids)
-        return found
+        movements: Demonstrations = library.movements(ids=self.ids)
+        return movements
+
+    @property
+    def found(self) -> Proposals:
+        """Deprecated name of `by_position`."""
+        warn("LibraryProposals.found is now LibraryProposals.by_position", DeprecationWarning, stacklevel=2)
+        return self.by_position
 
     def __repr__(self) -> str:
         clusters = "1 cluster" if len(self) == 1 else f"{len(self)} clusters"
@@ -70,7 +76,7 @@ def propose(
     method: str | None = None,
     n_clusters: int | None = None,
     min_members: int = 3,
-    found: Recognized | None = None,
+    joining: Recognized | None = None,
 ) -> LibraryProposals:
     """Propose symbols for movements; see `ActionLibrary.propose`.
 
@@ -78,15 +84,15 @@ def propose(
     ----------
     store : Store
     ids : array_like of int, optional
-        By default the movements without a symbol that are not in `found`.
+        By default the movements without a symbol that are not in `joining`.
     method, n_clusters, min_members
         As for `kineme.anchoring.propose`.
-    found : Recognized, optional
+    joining : Recognized, optional
         Movements to leave out, and what is known of the symbols.
     """
-    found = Recognized() if found is None else found
+    joining = Recognized() if joining is None else joining
     chosen = (
-        np.setdiff1d(read.unlabeled_ids(store), found.all_ids())
+        np.setdiff1d(read.unlabeled_ids(store), joining.all_ids())
         if ids is None
         else np.unique(np.asarray(ids, dtype=np.int64))
     )
@@ -94,7 +100,7 @@ def propose(
         return LibraryProposals(chosen, Proposals((), np.full(len(chosen), -1, dtype=np.intp), np.empty(0)))
     chosen = read.as_ids(store, chosen)
     by_symbols = ids is None and method is None and n_clusters is None
-    known = found.known or known_symbols(store) if by_symbols else None
+    known = joining.known or known_symbols(store) if by_symbols else None
     if known is not None:
         members = described(store, chosen, known.comparison)
         proposals = assign_described(members, known, min_members=min_members).proposals
@@ -119,9 +125,9 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
     said = {} if description is None else {"description": description}
     changes.assign(store, members, name, "anchored")
     if new and proposal.medoid in members:
-        changes.describe(store, name, **said, prototype=proposal.medoid)
+        changes.annotate(store, name, **said, prototype=proposal.medoid)
     elif said:
-        changes.describe(store, name, **said)
+        changes.annotate(store, name, **said)
 
 
 def reject(store: Store, proposal: Proposal) -> None:
@@ -136,17 +142,17 @@ def _rejected_before(store: Store, ids: Ids) -> list[NDArray[np.intp]]:
     return [np.flatnonzero(np.isin(ids, one)) for one in rejected]
 
 
-def _without(found: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
+def _without(proposed: Proposals, rejected: list[NDArray[np.intp]]) -> Proposals:
     """The proposals that do not repeat a rejected one, renumbered."""
     kept = [
         k
-        for k, one in enumerate(found.proposals)
+        for k, one in enumerate(proposed.proposals)
         if not any(np.isin(one.members, positions).mean() >= _SAME for positions in rejected)
     ]
-    number = np.full(len(found) + 1, -1, dtype=np.intp)
+    number = np.full(len(proposed) + 1, -1, dtype=np.intp)
     number[kept] = np.arange(len(kept))
     proposals = tuple(
         replace(one, nearest=None if one.nearest is None or number[one.nearest] < 0 else int(number[one.nearest]))
-        for one in (found.proposals[k] for k in kept)
+        for one in (proposed.proposals[k] for k in kept)
     )
-    return Proposals(proposals, number[found.clusters], found.widths)
+    return Proposals(proposals, number[proposed.clusters], proposed.widths)

@@ -58,8 +58,8 @@ def recognized(store: Store, error_rate: float = 0.05) -> Recognized:
     return Recognized(ids, known)
 
 
-def assign_recognized(store: Store, found: Recognized) -> dict[str, int]:
+def assign_recognized(store: Store, joining: Recognized) -> dict[str, int]:
     """Assign movements to the symbols that they are recognized as; how many to each."""
-    for name, members in found.ids.items():
+    for name, members in joining.ids.items():
         changes.assign(store, members, name, "recognized")
-    return {name: len(members) for name, members in found.ids.items()}
+    return {name: len(members) for name, members in joining.ids.items()}

@@ -92,11 +92,14 @@ def _load(parameter, positions, offsets, scales, first, knots):  # type: ignore[
         longest = max(longest, offsets[i + 1] - offsets[i])
     for lane in range(n_lanes):
         i, k = divmod(first + lane, n_dims)
-        start, last = offsets[i], offsets[i + 1] - offsets[i] - 1
+        own, path = parameter[offsets[i] : offsets[i + 1]], positions[offsets[i] : offsets[i + 1], k]
+        last, scale, u, start = len(own) - 1, scales[i], own[0], path[0]
         for j in range(last):
-            knots[j + _BEFORE].gap[lane] = (parameter[start + j + 1] - parameter[start + j]) * scales[i]
-            knots[j + _BEFORE].x[lane] = positions[start + j, k] - positions[start, k]
-        knots[last + _BEFORE].x[lane] = positions[start + last, k] - positions[start, k]
+            following = own[j + 1]
+            knots[j + _BEFORE].gap[lane] = (following - u) * scale
+            knots[j + _BEFORE].x[lane] = path[j] - start
+            u = following
+        knots[last + _BEFORE].x[lane] = path[last] - start
         for j in range(last, longest + _BEHIND):
             knots[j + _BEFORE].gap[lane] = _FAR
             knots[j + _BEFORE + 1].x[lane] = 0.0

@@ -22,17 +22,17 @@ class Step(Protocol):
 def check_steps(steps: Iterable[Step]) -> tuple[Step, ...]:
     """Refuse anything but an iterable of steps; the class of a step, without parentheses, is not a step."""
     try:
-        found = tuple(steps)
+        checked = tuple(steps)
     except TypeError:
         raise SpecificationError(
             f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {steps!r}"
         ) from None
-    wrong = [step for step in found if isinstance(step, type) or not callable(getattr(step, "apply", None))]
+    wrong = [step for step in checked if isinstance(step, type) or not callable(getattr(step, "apply", None))]
     if wrong:
         raise SpecificationError(
             f"expected a tuple of steps such as (kineme.TrimRest(), kineme.Smooth()), got {wrong[0]!r}"
         )
-    return found
+    return checked
 
 
 def preprocess(movements: MovementsLike, steps: Iterable[Step]) -> Demonstrations:

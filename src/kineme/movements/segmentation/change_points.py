@@ -71,12 +71,12 @@ class ChangePoints:
         if self.n_pieces == 1:
             return np.zeros(0, dtype=np.intp)
         if self.n_pieces is not None:
-            found = detector.predict(n_bkps=self.n_pieces - 1)
+            breakpoints = detector.predict(n_bkps=self.n_pieces - 1)
         else:
             acceleration = np.gradient(velocity, t, axis=0)
             characteristic = np.sqrt((velocity**2).sum() / (acceleration**2).sum())
-            found = detector.predict(pen=self.penalty * float(characteristic) / even[1])
-        rows = np.searchsorted(t, even[np.array(found[:-1], dtype=np.intp)])
+            breakpoints = detector.predict(pen=self.penalty * float(characteristic) / even[1])
+        rows = np.searchsorted(t, even[np.array(breakpoints[:-1], dtype=np.intp)])
         return np.unique(rows[(rows > 0) & (rows < len(t) - 1)])
 
     def pieces(self, motion: Motion) -> Rows:

@@ -51,11 +51,11 @@ def _crossings(motion: Motion, t: Array, speed: Array, pieces: Rows) -> Rows:
 
 def _last(where: NDArray[np.bool_], pieces: Rows) -> Rows:
     """Last row of each piece where the condition holds, else the row before it."""
-    found = np.maximum.reduceat(np.where(where, np.arange(len(where)), -1), pieces[:, 0])
-    return np.maximum(found, pieces[:, 0] - 1)
+    rows = np.maximum.reduceat(np.where(where, np.arange(len(where)), -1), pieces[:, 0])
+    return np.maximum(rows, pieces[:, 0] - 1)
 
 
 def _first(where: NDArray[np.bool_], pieces: Rows) -> Rows:
     """First row of each piece where the condition holds, else its first row."""
-    found = np.minimum.reduceat(np.where(where, np.arange(len(where)), len(where)), pieces[:, 0])
-    return np.asarray(np.where(found < pieces[:, 1], found, pieces[:, 0]))
+    rows = np.minimum.reduceat(np.where(where, np.arange(len(where)), len(where)), pieces[:, 0])
+    return np.asarray(np.where(rows < pieces[:, 1], rows, pieces[:, 0]))

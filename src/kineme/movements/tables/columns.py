@@ -123,10 +123,10 @@ def _time(
     if layout.time is not None:
         return _number(heads, layout.time)
     free = [k for k in range(len(heads)) if k not in taken]
-    found = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] != "text"][:1]
-    if len(found) == 1:
-        return found[0]
-    if isinstance(layout.units, float | int) and not found:
+    of_time = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] != "text"][:1]
+    if len(of_time) == 1:
+        return of_time[0]
+    if isinstance(layout.units, float | int) and not of_time:
         return None
     if not named:
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
@@ -152,10 +152,10 @@ def _named_as(head: str, kind: frozenset[str]) -> bool:
 def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
     if layout.label is not None:
         return _number(heads, layout.label)
-    found = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
-    if len(found) > 1:
-        raise DataError(f"expected one column of labels, got {[heads[k] for k in found]}; say which with label=")
-    return found[0] if found else None
+    of_labels = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
+    if len(of_labels) > 1:
+        raise DataError(f"expected one column of labels, got {[heads[k] for k in of_labels]}; say which with label=")
+    return of_labels[0] if of_labels else None
 
 
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""What is found in a table or in arrays: movements as a block, not yet checked, and how they were understood."""
+"""What is parsed from a table or from arrays: movements as a block, not yet checked, and how they were understood."""
 
 from __future__ import annotations
 

@@ -69,8 +69,8 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
     steps = np.abs(np.diff(finite))
     steps = steps[steps > 0]
     step = float(np.median(steps)) if len(steps) else 0.0
-    found = next((unit for unit, least in _STEPS if step >= least), None)
-    return (found, "by its steps") if found else ("s", "assumed")
+    by_step = next((unit for unit, least in _STEPS if step >= least), None)
+    return (by_step, "by its steps") if by_step else ("s", "assumed")
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:

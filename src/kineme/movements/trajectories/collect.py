@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names
+from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import (
     Array,
@@ -114,6 +115,10 @@ def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[s
 
 
 def _from_list(arrays: Sequence[ArrayLike], names: Sequence[str | None] | None) -> tuple[Array, NDArray[np.intp]]:
+    arrays = list(arrays)
+    plain = plain_block(arrays)
+    if plain is not None:
+        return plain
     known = tuple(names) if names is not None and len(names) == len(arrays) else None
     return _concatenate(_check_each(as_positions, (arrays,), known), known)
 
@@ -173,6 +178,9 @@ def _concatenate_times(
     _check_sized(times, "times as a list of (T,) arrays or one (T,) array")
     if len(times) != n:
         raise TrajectoryError(f"expected times for each of the {n} movements, got {len(times)}")
-    stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
+    times = list(times)
+    stamps = plain_stamps(times, lengths)
+    if stamps is None:
+        stamps = np.concatenate(_check_each(as_times, (times, lengths.tolist()), tuple(names) if names else None))
     check_times(stamps, offsets, names)
     return stamps

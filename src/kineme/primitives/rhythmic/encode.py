@@ -39,12 +39,12 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
     starts = demos.positions[first]
     extents = np.maximum.reduceat(demos.positions, first) - np.minimum.reduceat(demos.positions, first)
     check_movement(demos, starts, extents)
-    found = periodicity(dmp, demos)
+    estimated = periodicity(dmp, demos)
     coefficients = np.empty((n, n_dims, H + 1), dtype=complex)
     phases, explained, aligned_on = np.empty(n), np.empty(n), np.empty(n, dtype=np.intp)
 
     def fold_tile(chosen: NDArray[np.intp], rows: Array) -> None:
-        one = fold(rows, found.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
+        one = fold(rows, estimated.cycles[chosen], demos.lengths[chosen], H, dmp.align_on)
         coefficients[chosen], phases[chosen], aligned_on[chosen], explained[chosen] = one
 
     _for_even_rows(demos, fold_tile)
@@ -54,7 +54,7 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
         "scaled_weights": series @ encoder(dmp),
         "baselines": starts + series[:, :, 0],
         "amplitudes": np.ptp(shape, axis=2).max(axis=1) / 2,
-        "periods": demos.durations / found.cycles,
+        "periods": demos.durations / estimated.cycles,
         "phases": phases,
         "aligned_on": aligned_on,
         "explained": explained,
@@ -93,24 +93,25 @@ def periodicity(dmp: RhythmicSpecification, demos: Demonstrations) -> Periodicit
             )
         _check_samples(demos, dmp.period)
         return Periodicity(cycles, np.ones(n))
-    found = Periodicity(np.empty(n), np.empty(n))
+    estimated = Periodicity(np.empty(n), np.empty(n))
 
     def search_tile(chosen: NDArray[np.intp], rows: Array) -> None:
-        found.cycles[chosen], found.explained[chosen] = find_cycles(rows, demos.lengths[chosen])
+        estimated.cycles[chosen], estimated.explained[chosen] = find_cycles(rows, demos.lengths[chosen])
 
     _for_even_rows(demos, search_tile)
-    aperiodic = ~(found.explained >= _LEAST_EXPLAINED)
+    aperiodic = ~(estimated.explained >= _LEAST_EXPLAINED)
     if aperiodic.any() and dmp.aperiodic == "raise":
-        _refuse(demos, found, aperiodic)
-    return Periodicity(np.where(np.isnan(found.cycles), 1.0, found.cycles), found.explained)
+        _refuse(demos, estimated, aperiodic)
+    return Periodicity(np.where(np.isnan(estimated.cycles), 1.0, estimated.cycles), estimated.explained)
 
 
-def _refuse(demos: Demonstrations, found: Periodicity, aperiodic: np.ndarray) -> NoReturn:
+def _refuse(demos: Demonstrations, estimated: Periodicity, aperiodic: np.ndarray) -> NoReturn:
     i = int(np.argmax(aperiodic))
     best = (
         "nothing in it repeats"
-        if np.isnan(found.cycles[i])
-        else f"the best, {demos.durations[i] / found.cycles[i]:.4g} s, explains {max(found.explained[i], 0.0):.0%}"
+        if np.isnan(estimated.cycles[i])
+        else f"the best, {demos.durations[i] / estimated.cycles[i]:.4g} s, explains "
+        f"{max(estimated.explained[i], 0.0):.0%}"
     )
     raise TrajectoryError(
         f"{describe(i, demos.names)}: expected a movement of at least {FEWEST_CYCLES:g} periods, found no period: "

@@ -126,16 +126,16 @@ def find_cycles(rows: Array, lengths: NDArray[np.intp]) -> Periodicity:
     lengths : ndarray of shape (n,)
         Recorded samples of each; bounds the harmonics that can be seen.
     """
-    found = candidates(rows, lengths)
-    chosen = np.isfinite(found)
+    rough = candidates(rows, lengths)
+    chosen = np.isfinite(rough)
     owner, column = np.nonzero(chosen)
     result = Periodicity(np.full(len(rows), np.nan), np.zeros(len(rows)))
     if len(owner) == 0:
         return result
     centered = rows - rows.mean(axis=2, keepdims=True)
     with single_threaded_blas():  # products this small take many times as long in two threads
-        cycles, left = refine(centered[owner], found[chosen], lengths[owner])
-    residuals, refined = np.full(found.shape, np.inf), found.copy()
+        cycles, left = refine(centered[owner], rough[chosen], lengths[owner])
+    residuals, refined = np.full(rough.shape, np.inf), rough.copy()
     residuals[owner, column] = left / np.maximum(1 - 1 / cycles, 1e-3) + _ROUNDING
     refined[owner, column] = cycles
     good = residuals * _MUCH_BETTER <= residuals.min(axis=1, keepdims=True)

@@ -15,7 +15,7 @@ from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.early.evidence import begun, log_evidence
+from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -35,7 +35,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
     paths = even_paths(demos, 0, len(demos), comparison.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
-    logs = stored.log_classes(log_evidence(stored, begun(stored, paths, starts, demos.durations)))
+    logs = stored.log_classes(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
     shares = np.exp(logs - logs.max(axis=1, keepdims=True))
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 

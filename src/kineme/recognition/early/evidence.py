@@ -1,4 +1,4 @@
-"""The evidence for hypotheses about a movement of which the beginning is known: cheap for all, then in full for a few."""
+"""The evidence for hypotheses about a movement that has begun: roughly for all of them, then in full for a few."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Begun(NamedTuple):
     durations: Array
 
 
-def begun(stored: Hypotheses, paths: Array, starts: Array, durations: Array) -> Begun:
+def describe_begun(stored: Hypotheses, paths: Array, starts: Array, durations: Array) -> Begun:
     """Describe the smooth, evenly timed paths (n, d, T), relative to their first recorded positions (n, d)."""
     prefixes = beginnings(paths, _WHOLE)
     where = paths if stored.comparison.normalization.translation else paths + starts[:, :, None]
@@ -108,9 +108,7 @@ def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None
     return np.asarray(_ROTATION * (product - np.trace(F)))
 
 
-def _add_whole(
-    stored: Hypotheses, path: Array, evidence: Array, chosen: NDArray[np.intp], near: Array
-) -> None:
+def _add_whole(stored: Hypotheses, path: Array, evidence: Array, chosen: NDArray[np.intp], near: Array) -> None:
     """Add the evidence for the hypotheses among the chosen that the movement is over, in place.
 
     It is the geometric mean of that for a beginning and the recognizer's similarity, which is at most 1, of the whole.

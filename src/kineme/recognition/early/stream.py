@@ -15,7 +15,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
-from kineme.recognition.early.evidence import begun, log_evidence
+from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.forecast import forecast
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
@@ -121,9 +121,7 @@ class Live:
 
     def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
         elapsed = float(kept[-1, 0] - kept[0, 0])
-        so_far = begun(
-            self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed])
-        )
+        so_far = describe_begun(self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed]))
         evidence = log_evidence(self._hypotheses, so_far)
         logs = self._hypotheses.log_classes(evidence)[0]
         shares = np.exp(logs - logs.max())

@@ -1,0 +1,65 @@
+"""Who made each movement: from an array beside the labels, or from the folder above that of the label."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.files.arrays.npz import Npz
+from kineme.files.merge_files import Source
+
+#: Names of an array (n,) of people in an npz archive, one for each of its n movements.
+NAMES = ("people", "person", "subjects", "subject")
+_DEPTH = 3  # person/label/recording
+
+
+def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
+    """The person of each movement, shape (n,), or None where any of them is unknown.
+
+    In an npz archive, an array named as in `NAMES`, one entry for each movement. Else the folder above that of the
+    label: ``person/label/recording``; where all these folders are one, nothing tells people apart.
+
+    Parameters
+    ----------
+    path : Path
+        The folder or file that was read.
+    sources : sequence of Source
+        Of the movements.
+
+    Raises
+    ------
+    DataError
+        Not one person for each movement of a file.
+    """
+    of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
+    people = [_person(source, of_file(source.path)) for source in sources]
+    if None in people or len(set(people)) < 2:
+        return None
+    named = np.empty(len(people), dtype=object)
+    named[:] = people
+    return named
+
+
+def _person(source: Source, listed: list[str] | None) -> str | None:
+    if listed is None:
+        folders = PurePosixPath(source.path).parts
+        return folders[-_DEPTH] if len(folders) >= _DEPTH else None
+    index = int(source.place or 0)
+    if index >= len(listed):
+        raise DataError(f"expected a person for each movement in {source.path}, got {len(listed)}; add the others")
+    return listed[index]
+
+
+def _people_in(file: Path) -> list[str] | None:
+    """The people named in a file, or None."""
+    if file.suffix.lower() != ".npz":
+        return None
+    arrays = Npz(file.read_bytes(), file)
+    name = next((one for one in NAMES if one in arrays), None)
+    return None if name is None else [str(one) for one in np.atleast_1d(arrays[name]).tolist()]
