@@ -24,7 +24,6 @@ from kineme.recognition.transform import Transform, map_onto
 from kineme.validation import Array
 
 _SHOWN = 3  # demonstrations named in an answer
-_DECIMALS = 4  # of a confidence; later ones depend on how many movements are compared at a time
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ class Answer:
         The best-ranked class whose p-value is above the error rate, or the best-ranked of all if there is none; None,
         unknown, if `p_known` is not above the error rate.
     confidence : float
-        Probability that the label is right if the movement is of a known class, see `class_probabilities`, to four
-        decimals: of answers with 0.9 nine in ten are right. On recordings that it was not fitted to, confidence and
+        Probability that the label is right if the movement is of a known class, see `class_probabilities`: of
+        answers with 0.9 nine in ten are right. On recordings that it was not fitted to, confidence and
         share differ by 0.03 or less on average (``python -m bench --only open_set``). If unknown, 1 minus `p_known`:
         the share of known movements that are less novel, and no probability, since it is not known how many movements
         are of no class.
@@ -197,7 +196,7 @@ def verdicts_of(
     names = [one.name for one in compared.comparison.representations]
     known = np.array([label is not None for label in labels])
     right = class_probabilities(compared.nearest)[np.arange(len(shown)), shown]
-    confidence = np.round(np.where(known, right, 1.0 - p_known), _DECIMALS).tolist()
+    confidence = np.where(known, right, 1.0 - p_known).tolist()
     return [
         Verdict(
             labels[i],
