@@ -68,7 +68,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         the nearest.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
-        right angle costs 0.06 of the inner product of two equal paths, and none is forbidden. Pass
+        right angle costs 0.06 of the inner product of two equal paths in the plane and 0.2 in space, and none is
+        forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
         is the default of earlier versions, ``max_angle=pi/3``.
 
