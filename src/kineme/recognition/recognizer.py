@@ -297,25 +297,29 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
 
-        The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all
-        are recognized in one batch, and the chain of candidates that do not overlap with the largest summed score is
-        chosen. A candidate of similarity K scores its duration times ``1 - log K / log K_impostor``, less a fixed cost.
+        Windows of the recording, from half the shortest demonstrated duration to three times the longest, are compared
+        with all demonstrations. They start and end at rests, at minima of speed and, where these are far apart, at even
+        times. Chosen is the chain of windows that do not overlap with the largest summed score; a window scores its
+        duration, less the more it differs from the class: in the averaged kernel, and in duration and size, given the
+        tempo and the size of the whole recording, which are estimated from what is found. Then its ends are moved to
+        where it fits best.
 
         Parameters
         ----------
         recording : Trajectory or array_like of shape (T, d)
             Unlabeled; pass a `Trajectory`, the time stamps matter.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. Cutting adds errors of its own, and fewer than
-            ``1 / error_rate - 1`` demonstrations cannot tell so small a share.
+            The smaller, the more a movement may differ from the demonstrations. Not the share of movements that are
+            missed: a movement in a recording is cut by the search itself, see `kineme.recognition.window_scores`.
         max_pieces : int, default 8
-            Most pieces that one movement may consist of; cost grows with it.
+            Most stretches between rests that one movement may consist of.
 
         Returns
         -------
         list of Spotted
             ``(start, end, label, confidence)`` in order of time; label None is motion of no known class. Rests are left
-            out. A movement is looked for between a third and three times the durations demonstrated for it.
+            out. Without time stamps in fit, movements are looked for between a quarter of the typical stretch between
+            rests and four times it.
         """
         from kineme.recognition.spotting import spot
 
