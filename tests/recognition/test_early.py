@@ -196,8 +196,8 @@ def test_few_hypotheses_compared_in_full_say_what_all_of_them_say(monkeypatch):
     np.testing.assert_allclose(few, every, atol=0.05)
 
 
-@pytest.mark.parametrize(("concentration", "used"), [(0.03, 0.1), (0.1, 0.1), (0.5, 0.5)])
-def test_beginnings_are_rotated_less_readily_than_whole_movements(concentration, used):
+@pytest.mark.parametrize(("concentration", "used"), [(None, 0.1), (0.0, 0.0), (0.5, 0.5)])
+def test_beginnings_have_a_rotation_prior_of_their_own_unless_one_is_given(concentration, used):
     whole = Procrustes(3, math.pi, RotationPrior(concentration))
     assert beginning_procrustes(whole, None).prior.concentration == used
     assert beginning_procrustes(whole, 0.5) == Procrustes(3, 0.5)

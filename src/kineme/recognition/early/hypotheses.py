@@ -22,7 +22,7 @@ from kineme.validation import Array, check_count, check_number
 _LOG_UNKNOWN = -0.5 / SHARE**2 - 1.5
 _EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
 _MOST_PROGRESS = 1000  # beginnings of one movement
-_CONCENTRATION = 0.1  # of the rotation prior: a beginning says less about a rotation than a whole movement
+_CONCENTRATION = 0.1  # of the rotation prior, where none is given
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
 
 
@@ -156,13 +156,13 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
 
 
 def beginning_procrustes(whole: Procrustes, max_angle: float | None) -> Procrustes:
-    """How beginnings are rotated: by at most an angle, or as whole movements, but less readily.
+    """How beginnings are rotated: by at most an angle, or as whole movements, by default less readily in the plane.
 
     A beginning is often nearly straight, and the same as any other one if it may be rotated freely.
     """
     if max_angle is not None:
         return Procrustes(whole.n_dims, max_angle)
-    if whole.prior is None or whole.prior.concentration >= _CONCENTRATION:
+    if whole.prior is None or whole.prior.concentration is not None:
         return whole
     return replace(whole, prior=replace(whole.prior, concentration=_CONCENTRATION))
 
