@@ -28,6 +28,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
+from kineme.recognition.left_out import check_groups
 from kineme.validation import Array, check_choice
 
 if TYPE_CHECKING:
@@ -133,7 +134,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self.rotation_prior,
         )
 
-    def fit(self, X: MovementsLike, y: ArrayLike | None = None) -> Self:
+    def fit(self, X: MovementsLike, y: ArrayLike | None = None, groups: ArrayLike | None = None) -> Self:
         """Describe and store the demonstrations.
 
         Parameters
@@ -142,22 +143,29 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             Whatever `Demonstrations.of` accepts.
         y : array_like of shape (n,), optional
             Labels; by default those of the demonstrations.
+        groups : array_like of shape (n,), optional
+            Who did each movement, or what else makes some more alike than new ones will be. The calibration of the
+            unknown then compares no demonstration with another of its group, so that it holds for people who showed
+            nothing. Without, it holds for more movements by the same people.
 
         Raises
         ------
         SpecificationError
             A parameter out of its range, demonstrations that are all the same, or an SVM of one class.
         TrajectoryError
-            Not one label for each movement.
+            Not one label, or not one group, for each movement.
         """
         specification = self.specification
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
+        order = np.argsort(labels, kind="stable")
+        numbers = None if groups is None else check_groups(groups, len(demos))[order]
         comparison, references = fit_comparison(specification, demos, labels, self.weights)
         classifier = fit_classifier(self.classifier, comparison, references)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
+        self._groups: NDArray[np.intp] | None = numbers
         self._calibration: Calibration | None = None  # these two are made when first asked for
         self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self
@@ -243,7 +251,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         error_rate : float, default 0.05
             Share of known movements that may be called unknown. It holds if the answer is `calibrated`, which takes at
             least ``1 / error_rate - 1`` demonstrations of classes with two or more. With one demonstration of each
-            class p-values are a guess, and the share may be anything; see `Calibration`.
+            class p-values are a guess, and the share may be anything; see `Calibration`. An answer's `rule` and
+            `promise` say what it rests on.
 
         Returns
         -------
@@ -267,12 +276,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Labels as from `predict`, among the classes whose p-value is above `error_rate`.
 
-        None, for unknown, if no class has a p-value above it.
+        None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
         check_error_rate(error_rate)
         similarities, scores = self._score(X, nearest, self._classifier_scores)
-        p_values = self.calibration().p_values(similarities, error_rate)
-        return known_labels(self.classes_, scores, p_values, error_rate)
+        return known_labels(self.classes_, scores, similarities, self.calibration(), error_rate)
 
     def novelty(self, X: MovementsLike) -> Array:
         """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
@@ -281,9 +289,10 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def calibration(self) -> Calibration:
         """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
-        if self._calibration is None:
-            self._calibration = calibrate(comparison.similarity, references)
-        return self._calibration
+        made = self._calibration
+        if made is None or "own_novelties" not in vars(made):  # by an earlier version
+            self._calibration = made = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+        return made
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
