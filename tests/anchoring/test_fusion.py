@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import adjusted_rand_score
 
+from kineme import Demonstrations
 from kineme.anchoring.clustering import fusion
 from kineme.anchoring.clustering.fusion import fuse, groups, set_apart
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
@@ -147,6 +148,23 @@ def test_representations_in_which_nothing_differs_are_left_out():
     one, both = squares_of(x, x), squares_of(x, x, np.zeros_like(x))
     np.testing.assert_array_equal(fuse(both), fuse(one))
     np.testing.assert_array_equal(groups(both), groups(one))
+
+
+def draw_people(n_classes, n_people, each, seed, own=0.15, spread=0.04):
+    """Movements of people, each of whom has an own way of every class, four times as different as repetitions are."""
+    rng, shape = np.random.default_rng(seed), (n_classes, n_people, each, 2, 5)
+    sines = np.sin(np.pi * np.linspace(0, 1, 60) * np.arange(1, 6)[:, None])
+    classes, ways, repeats = (rng.normal(size=(*shape[:k], *(1,) * (3 - k), 2, 5)) for k in (1, 2, 3))
+    paths = ((classes + own * ways + spread * repeats) / np.arange(1, 6) ** 0.5) @ sines
+    return Demonstrations.from_arrays(
+        paths.reshape(-1, 2, 60).transpose(0, 2, 1), np.repeat(np.arange(n_classes).astype(str), n_people * each)
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_as_many_classes_as_are_asked_for_are_found_across_people(seed):
+    demos = draw_people(6, 4, 5, seed)
+    assert recovered(demos.labels, propose(demos, n_clusters=6)) == 1.0
 
 
 @pytest.fixture(scope="module")

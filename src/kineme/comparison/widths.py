@@ -13,7 +13,6 @@ from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
 SHARE = 0.4
-BEGUN_SHARE = 0.35  # the same for beginnings
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
 _SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
 _COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
@@ -62,9 +61,7 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
-    found = [
-        _share_of_median(one, 0.0, BEGUN_SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
-    ]
+    found = [_share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
     return np.array([_NO_IMPOSTOR if width is None else width for width in found])
 
 
