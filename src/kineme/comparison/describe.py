@@ -85,7 +85,8 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean)
     r = next(r for r, one in enumerate(how.by_rows) if one.quantity == "positions" and one.arc_share == 1)
-    shapes = shapes_of(rows[r].reshape(len(rows[r]), procrustes.n_dims, -1))
+    # From single precision here too, so that rows that were stored in it say the same as the movements.
+    shapes = shapes_of(np.asarray(rows[r], dtype=np.float32).reshape(len(rows[r]), procrustes.n_dims, -1))
     measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
     return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures))
 
