@@ -20,6 +20,7 @@ SUBJECTS = (
     "recognize",
     "recognize_files",
     "one_shot",
+    "open_set",
     "defaults",
     "library",
     "binning",

@@ -1,4 +1,7 @@
-"""Anchoring: whether the kinds that are proposed without labels are those that people drew."""
+"""Anchoring: whether the clusters that are proposed without labels are the classes that people drew.
+
+By several people: gestures in space from the folder that KINEME_RECORDINGS names, see `bench.by_person`.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kineme
+from bench.by_person import FOLDER
 from bench.rows import Row
 from kineme.anchoring import propose
+from kineme.anchoring.proposals.propose import DEFAULT_METHOD
+from kineme.experiments.evaluation.data import load_data
 from kineme.movements.preparation.perturbations import Perturbation
 
 #: All perturbations of one-shot recognition together.
@@ -22,7 +28,7 @@ def measure(quick: bool) -> list[Row]:
     lasa = kineme.load_lasa()
     seeds = range(2 if quick else 10)
     rows = []
-    for method in ("agglomerative", "hdbscan"):
+    for method in ("spectral", "agglomerative", "hdbscan"):
         started = perf_counter()
         clean = _score(lasa, lasa.labels, method)
         seconds = perf_counter() - started
@@ -40,11 +46,32 @@ def measure(quick: bool) -> list[Row]:
             Row(f"{method}: ARI, all perturbed, least", "", float(np.min(perturbed)), target=(">=", 0.9)),
             Row(f"{method}: {len(lasa)} movements", "s", seconds),
         ]
+    return rows + _by_people()
+
+
+def _by_people() -> list[Row]:
+    """Digits and solids by all people at once, and by each alone; of the default method."""
+    path = FOLDER / "gestures3d.npz"
+    if not path.is_file():
+        print(f"anchoring: no {path.name} in {FOLDER}; name the folder in KINEME_RECORDINGS")
+        return []
+    data = load_data(str(path))
+    people = np.asarray(data.people)
+    digits = np.char.isdigit(np.asarray(data.demonstrations.labels, dtype=str))
+    rows = []
+    for name, chosen in (("digits", digits), ("solids", ~digits)):
+        own = [data.demonstrations[np.flatnonzero(chosen & (people == one))] for one in np.unique(people)]
+        scores = [_score(some, some.labels, DEFAULT_METHOD) for some in own]
+        rows.append(Row(f"{name}: ARI, one person, mean", "", float(np.mean(scores)), target=(">=", 0.95)))
+        some = data.demonstrations[np.flatnonzero(chosen)]
+        found = len(propose(some))
+        score = _score(some, some.labels, DEFAULT_METHOD)
+        rows.append(Row(f"{name}: ARI, {len(own)} people", "", score, target=(">=", 0.9), details={"found": found}))
     return rows
 
 
 def _score(movements: Any, labels: NDArray[Any], method: str) -> float:
-    """Adjusted Rand index; every movement that is left over counts as a kind of its own."""
+    """Adjusted Rand index; every movement that is left over counts as a class of its own."""
     from sklearn.metrics import adjusted_rand_score
 
     clusters = propose(movements, method).clusters.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import warnings
@@ -19,6 +20,7 @@ from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
 from kineme.primitives.styles.figure import draw_morph
 
 _COLORS = 128  # of a picture of the tutorial
+_FEWEST = 20  # answers that a point of the reliability diagram stands for
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
 LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
 
@@ -99,8 +101,34 @@ def styles() -> Figure:
     return draw_morph(kineme.DMP().learn(kineme.load_lasa(["Multi_Models_3"])))
 
 
+def reliability() -> Figure:
+    """Confidence against the share of right answers, as `python -m bench --only open_set` measured it."""
+    measured = Path(__file__).parents[1] / "bench" / "results" / "open_set.json"
+    rows = json.loads(measured.read_text(encoding="utf-8"))["rows"]
+    shown = {
+        "gestures3d, same person": ("20 gestures, same person", BLUE, "-"),
+        "gestures3d, other people": ("20 gestures, other people", ORANGE, "-"),
+        "LASA, severely": ("LASA, perturbed severely", GREEN, "--"),
+    }
+    figure = new_figure(4.6, 3.8)
+    axes = figure.subplots()
+    axes.plot((0, 1), (0, 1), color=GRAY, linewidth=4, alpha=0.4)
+    for row in rows:
+        name, _, what = row["what"].partition(": ")
+        if name in shown and what.startswith("expected calibration error"):
+            title, color, line = shown[name]
+            enough = np.array(row["details"]["number"]) >= _FEWEST
+            said, right = (np.array(row["details"][key])[enough] for key in ("said", "right"))
+            error = f"{title} ({row['ours']:.3f})"
+            axes.plot(said, right, line, color=color, marker="o", markersize=4, label=error)
+    axes.set(xlabel="confidence", ylabel="share of right answers", xlim=(0, 1), ylim=(0, 1), aspect="equal")
+    axes.legend(title="expected calibration error", fontsize="small", loc="upper left")
+    return figure
+
+
 FIGURES = {
     "around-obstacles": around_obstacles,
+    "reliability": reliability,
     "styles": styles,
     "three-issues": three_issues,
     "many-goals": many_goals,

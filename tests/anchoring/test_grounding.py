@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import kineme
 from kineme.anchoring.grounding.ground import SymbolName, ground
 from kineme.anchoring.grounding.grounding_io import grounding_schema, primitive_from
+from kineme.anchoring.grounding.prototypes import medoid_of
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from unlabeled_samples import draw_kinds
 
@@ -162,3 +163,10 @@ def test_what_cannot_be_grounded():
         ground(WAVE, primitives, by="best")
     with pytest.raises(kineme.DataError, match=r"expected a grounding, a mapping .* got 'list'"):
         primitive_from([])
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_the_medoid_is_not_the_one_that_differs(d):
+    """Movements of one dimension do not differ in turning angles; the other representations tell."""
+    demos = draw_kinds([1, 5], d, 0, spread=0.05)
+    assert medoid_of(demos) > 0

@@ -21,7 +21,7 @@ from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
 from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
-METHODS = ("agglomerative", "hdbscan")
+METHODS = ("spectral", "agglomerative", "hdbscan")
 seeds = st.integers(0, 10_000)
 quick = settings(max_examples=5, deadline=None, derandomize=True)
 
@@ -97,7 +97,7 @@ def test_the_clusters_are_those_of_scikit_learn(seed):
     demos = draw_kinds([5, 4, 6, 3], 2, seed, spread=0.2)
     model = AgglomerativeClustering(n_clusters=5, metric="precomputed", linkage="average")
     expected = model.fit_predict(1.0 - similarities(demos))
-    found = propose(demos, n_clusters=5, min_members=2)
+    found = propose(demos, "agglomerative", n_clusters=5, min_members=2)
     large = {frozenset(np.flatnonzero(expected == k).tolist()) for k in range(5)}
     assert partition(found) == {one for one in large if len(one) >= 2}
 
@@ -162,9 +162,9 @@ def test_what_was_not_sampled_joins_its_kind_or_none():
 
 
 def test_the_averaged_kernel_is_the_recognizers():
-    """At the recognizer's widths it is the recognizer's, entry by entry."""
+    """At the recognizer's widths and with equal weights it is the recognizer's, entry by entry."""
     demos = draw_kinds([4, 4, 4], 2, 0)
-    fitted = Recognizer().fit(demos)
+    fitted = Recognizer(weights="equal").fit(demos)
     ours = similarities(describe(demos), widths=fitted.widths_)
     np.testing.assert_allclose(ours, np.exp(fitted.log_similarity(fitted.demonstrations_)), atol=1e-5)
 
@@ -178,7 +178,7 @@ def test_widths_without_labels_are_near_those_with_labels():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"method": "k-means"}, r"expected method to be one of \['agglomerative', 'hdbscan'\], got 'k-means'"),
+        ({"method": "k-means"}, r"method to be one of \['spectral', 'agglomerative', 'hdbscan'\], got 'k-means'"),
         ({"min_members": 1}, "expected min_members to be a whole number of at least 2, got 1"),
         ({"n_clusters": 0}, "expected n_clusters to be a whole number of at least 1, got 0"),
         ({"n_clusters": 13}, "expected n_clusters of at most 12, the number of movements, got 13"),
@@ -197,9 +197,9 @@ def test_movements_that_cannot_be_told_apart():
         propose(demos[:2])
     with pytest.raises(kineme.SpecificationError, match="got copies of one movement"):
         propose(demos[[0, 0, 0, 0]])
-    with pytest.raises(kineme.SpecificationError, match=r"expected widths to be 3 numbers above 0.* got \[1.0, -1.0\]"):
+    with pytest.raises(kineme.SpecificationError, match=r"expected widths to be 5 numbers above 0.* got \[1.0, -1.0\]"):
         similarities(demos, widths=[1.0, -1.0])
-    with pytest.raises(kineme.TrajectoryError, match=r"expected feature rows of shape \(n, 600\).* got shape \(8, 5\)"):
+    with pytest.raises(kineme.TrajectoryError, match=r"expected feature rows of shape \(n, 400\).* got shape \(8, 5\)"):
         describe_rows(np.zeros((8, 5)), 2)
     with pytest.raises(IndexError, match="one of 2 proposals, got 2"):
         propose(demos)[2]

@@ -17,9 +17,9 @@ def described(monkeypatch):
     """Counts the movements that are described."""
     counted, tile_rows = [], describe._tile_rows
 
-    def count(demos, start, stop, *options):
+    def count(demos, start, stop, *how):
         counted.append(stop - start)
-        return tile_rows(demos, start, stop, *options)
+        return tile_rows(demos, start, stop, *how)
 
     monkeypatch.setattr(describe, "_tile_rows", count)
 

@@ -228,6 +228,7 @@ def as_numbers(demos: Demonstrations, given: list[Answer]) -> list[dict[str, Any
         {
             "label": np.array(-1 if one.label is None else int(one.label)),
             "confidence": np.array(one.confidence),
+            "p_known": np.array(one.p_known),
             "p_values": np.array(list(one.p_values.values())),
             "ranked": np.array(one.ranked).astype(int),
             "nearest": np.array([near.index for near in one.nearest]),

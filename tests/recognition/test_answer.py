@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from kineme import Demonstrations, Recognizer, Trajectory
 from kineme.comparison.log_averages import LOG_MEANS
+from kineme.recognition.conformal import RULES
 from movement_samples import draw_shapes, turn
 
 any_seed = given(seed=st.integers(0, 10**6))
@@ -86,20 +87,41 @@ def test_a_stranger_is_unknown_and_the_answer_says_what_it_is_most_like():
     u = np.linspace(0, 1, 90)
     answer = Recognizer().fit(demos).recognize(np.column_stack((np.sin(40 * u), np.cos(31 * u))))
     assert answer.label is None
-    assert answer.confidence == 1 - max(answer.p_values.values())
+    assert answer.confidence == pytest.approx(1 - answer.p_known, abs=1e-4)
+    assert answer.p_known <= 0.05
     assert {demos.labels[near.index] for near in answer.nearest} == {answer.ranked[0]}
     assert "label=None" in repr(answer)
 
 
 @any_seed
-def test_confidence_is_what_the_others_leave(seed):
-    demos = draw_shapes([4] * 6, seed=seed)
-    answer = Recognizer().fit(demos).recognize(demos[9])
-    assert answer.label == "kind 02"
-    assert answer.confidence == 1 - max(p for label, p in answer.p_values.items() if label != "kind 02")
-    assert [demos.labels[near.index] for near in answer.nearest] == ["kind 02"] * 3
-    assert np.all(np.diff([near.similarity for near in answer.nearest]) <= 0)
-    assert set(answer.ranked) == set(answer.p_values) == set(np.unique(demos.labels))
+def test_confidence_is_the_share_of_the_class_by_distances_to_the_power_of_fifteen(seed):
+    demos, asked = draw_shapes([4] * 6, seed=seed), draw_shapes([1] * 6, seed=seed, spread=0.4)[2]
+    recognizer = Recognizer(classifier="nearest").fit(demos)
+    answer = recognizer.recognize(asked, error_rate=0.04)
+    nearest = recognizer.log_similarity([asked])[0].reshape(6, 4).max(axis=1)
+    shares = np.sqrt(-2 * nearest) ** -15.0
+    if answer.label is not None:
+        expected = shares[list(answer.p_values).index(answer.label)] / shares.sum()
+        assert answer.confidence == pytest.approx(expected, abs=1.1e-4)
+    own = recognizer.recognize(demos[9])
+    assert (own.label, own.confidence) == ("kind 02", 1.0)
+    assert [demos.labels[near.index] for near in own.nearest] == ["kind 02"] * 3
+    assert np.all(np.diff([near.similarity for near in own.nearest]) <= 0)
+    assert set(own.ranked) == set(own.p_values) == set(np.unique(demos.labels))
+
+
+def test_an_answer_says_its_rule_and_what_it_promises():
+    demos = draw_shapes([25, 25, 4])
+    recognizer = Recognizer().fit(demos)
+    answers = recognizer.recognize([demos[0], demos[30], demos[51]])
+    assert [one.rule for one in answers] == ["class", "class", "pooled"]
+    once = Recognizer().fit(draw_shapes([1] * 25)).recognize(demos[0])
+    assert once.rule == "guess"
+    assert {RULES[one.rule] for one in [*answers, once]} == set(RULES.values())
+    for one in [*answers, once]:
+        assert one.promise == RULES[one.rule]
+        assert f"rule={one.rule!r}" in repr(one)
+        assert one.promise.count(".") == 1  # one sentence
 
 
 @pytest.mark.parametrize("mean", LOG_MEANS)

@@ -10,12 +10,15 @@ import pytest
 import kineme
 from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, earliness
 from kineme.recognition.early.early import partial_shares as shares_of
-from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.recognition.early.prefixes import N_PREFIX, beginnings, smooth_paths, smoother
+from kineme.recognition.early.hypotheses import Early, beginning_procrustes, hypotheses
+from kineme.recognition.early.prefixes import N_PREFIX, beginnings, describe_prefixes, smooth_paths, smoother
 
 
 def partial_shares(recognizer, movements):
@@ -71,10 +74,12 @@ def test_beginnings_do_not_see_place_or_size(seed):
     progress = np.array([0.3, 1.0])
     plain, moved = beginnings(paths, progress), beginnings(5.0 * paths + 3.0, progress)
     np.testing.assert_allclose(moved.positions, plain.positions, atol=1e-9)
-    np.testing.assert_allclose(moved.directions, plain.directions, atol=1e-9)
     np.testing.assert_allclose(moved.sizes, 5.0 * plain.sizes)
     np.testing.assert_allclose(np.linalg.norm(plain.positions, axis=1), 1.0)
-    np.testing.assert_allclose(np.linalg.norm(plain.directions, axis=1), 1.0)
+    shapes = [describe_prefixes(one, Procrustes(2)).pairs.shapes.arrays() for one in (plain, moved)]
+    for name, array in shapes[0].items():
+        np.testing.assert_allclose(shapes[1][name], array, atol=1e-4, err_msg=name)
+    np.testing.assert_allclose(np.linalg.norm(shapes[0]["tangents"], axis=2), 1.0, atol=1e-6)
 
 
 def test_a_straight_line_at_even_speed():
@@ -141,4 +146,59 @@ def test_hypotheses_are_kept_until_others_are_asked_for_or_fitted():
     assert recognizer.stream()._hypotheses is first
     assert recognizer.stream(early=Early(n_progress=10))._hypotheses is not first
     assert recognizer.stream()._hypotheses is not first
-    assert recognizer.fit(_spirals(2, n_classes=3)).stream()._hypotheses.stored is not first.stored
+    assert recognizer.fit(_spirals(2, n_classes=3)).stream()._hypotheses.prefixes is not first.prefixes
+
+
+def _fitted_in_space(order=None):
+    train, test = _split(_spirals(3, per_class=6, n_classes=5), per_class=6)
+    order = np.arange(len(train)) if order is None else order(len(train))
+    return kineme.Recognizer().fit(train[order]), test
+
+
+def test_the_order_of_training_does_not_matter():
+    recognizer, test = _fitted_in_space()
+    other, _ = _fitted_in_space(lambda n: np.random.default_rng(0).permutation(n))
+    for fraction in (0.4, 1.0):
+        parts = cut(test, fraction)
+        np.testing.assert_allclose(partial_shares(other, parts), partial_shares(recognizer, parts), atol=1e-6)
+
+
+def test_a_beginning_is_answered_alone_as_among_others():
+    recognizer, test = _fitted_in_space()
+    parts = cut(test, 0.6)
+    together = partial_shares(recognizer, parts)
+    alone = np.concatenate([partial_shares(recognizer, parts[[i]]) for i in range(len(parts))])
+    np.testing.assert_allclose(alone, together, atol=1e-6)
+
+
+def test_a_movement_that_is_over_is_also_compared_as_a_whole(monkeypatch):
+    recognizer, test = _fitted_in_space()
+
+    def log_odds(fraction):
+        """Of the own class against the unknown."""
+        parts = cut(test, fraction)
+        shares = partial_shares(recognizer, parts)
+        return np.log(shares[np.arange(len(parts)), np.searchsorted(recognizer.classes_, parts.labels)] / shares[:, -1])
+
+    over, half = log_odds(1.0), log_odds(0.5)
+    monkeypatch.setattr(evidence, "_NARROWED", 1e-3)  # nothing is similar as a whole
+    assert np.median(over - log_odds(1.0)) > 0.1
+    assert np.abs(half - log_odds(0.5)).max() < 0.05
+
+
+def test_few_hypotheses_compared_in_full_say_what_all_of_them_say(monkeypatch):
+    recognizer, test = _fitted_in_space()
+    parts = cut(test, 0.6)
+    few = partial_shares(recognizer, parts)
+    monkeypatch.setattr(evidence, "_COMPARED", 10**9)
+    every = partial_shares(recognizer, parts)
+    np.testing.assert_array_equal(few.argmax(axis=1), every.argmax(axis=1))
+    np.testing.assert_allclose(few, every, atol=0.05)
+
+
+@pytest.mark.parametrize(("concentration", "used"), [(None, 0.1), (0.0, 0.0), (0.5, 0.5)])
+def test_beginnings_have_a_rotation_prior_of_their_own_unless_one_is_given(concentration, used):
+    whole = Procrustes(3, math.pi, RotationPrior(concentration))
+    assert beginning_procrustes(whole, None).prior.concentration == used
+    assert beginning_procrustes(whole, 0.5) == Procrustes(3, 0.5)
+    assert beginning_procrustes(Procrustes(2, 0.3), None) == Procrustes(2, 0.3)

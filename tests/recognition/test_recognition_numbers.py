@@ -14,10 +14,11 @@ from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRES
 from kineme.comparison.weights import aligned_weights
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
-from kineme.recognition.conformal import Calibration, calibrate, typical_scale
+from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import beginnings, smooth_paths
+from kineme.recognition.left_out import typical_scale
 from kineme.recognition.spotting import _recognized
 from movement_samples import draw_shapes
 
@@ -36,10 +37,10 @@ def test_of_four_demonstrations_the_own_scale_counts_half():
     )
 
 
-def test_what_is_not_calibrated_is_unknown_beyond_six_tenths_of_the_way_to_another_class():
+def test_what_is_not_calibrated_is_unknown_beyond_three_quarters_of_the_way_to_another_class():
     none = (np.empty(0),)
     guess = Calibration(np.array([typical_scale(np.array([1.0, 2.0, 3.0]))]), none, none)
-    logs = -0.5 * (2.0 * np.array([[0.59], [0.6], [0.61]])) ** 2
+    logs = -0.5 * (2.0 * np.array([[0.74], [0.75], [0.76]])) ** 2
     p = guess.p_values(logs, 0.05)[:, 0]
     assert p[1] == pytest.approx(0.05)
     assert p[0] > 0.05 > p[2]

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme import Recognizer, SpecificationError, Trajectory, TrajectoryError
-from kineme.recognition.spotting import Spotted, _best_chain, _left_over, _unions
+from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
+from kineme.experiments.evaluation.spotting import Counts, concatenate, count_spotted
+from kineme.recognition.spotting import Spotted, _left_over, best_chain
 from movement_samples import draw_shapes
 
 KNOWN = ["CShape", "NShape", "Sshape", "WShape"]
@@ -108,32 +109,79 @@ def test_arrays_without_time_stamps_have_no_duration_to_compare():
     assert [one.label for one in found if one.label is not None] == ["WShape", "CShape"]
 
 
+def _stretched(movements, factor):
+    """The movements, slower by a factor, without labels."""
+    return Demonstrations([Trajectory(factor * one.times, one.positions) for one in movements])
+
+
+def _counts(rests, known=True, stretched=1.0):
+    """Spots in concatenated recordings of demonstrations not trained on, of eight classes."""
+    shapes = [*KNOWN, "GShape", "Zshape", "PShape", "Trapezoid"]
+    rng, found = np.random.default_rng(0), Counts()
+    demos = kineme.load_lasa([*shapes, *UNKNOWN])
+    held_out = np.flatnonzero(np.arange(len(demos)) % 7 >= 3)
+    shown = np.isin(demos.labels, shapes) & (np.arange(len(demos)) % 7 < 3)
+    recognizer = Recognizer().fit(demos[np.flatnonzero(shown)])
+    for _ in range(3):
+        chosen = [i for i in rng.permutation(held_out).tolist() if not known or demos.labels[i] in shapes][:9]
+        labels = [demos.labels[i] if demos.labels[i] in shapes else None for i in chosen]
+        movements = _stretched(demos[chosen], stretched)
+        recording, truth, _ = concatenate(movements, labels, rng, rests=rests)
+        found = found + count_spotted(recognizer.spot(recording), truth)
+    return found
+
+
+@pytest.mark.parametrize(("rests", "known"), [(True, True), (True, False), (False, True), (False, False)])
+def test_what_is_in_a_recording_is_found_with_and_without_rests(rests, known):
+    found = _counts(rests, known)
+    assert found.recall >= 0.95
+    assert found.precision >= 0.9
+
+
+@pytest.mark.parametrize("stretched", [0.6, 1.7])
+def test_a_recording_may_be_faster_or_slower_than_what_was_demonstrated(stretched):
+    found = _counts(True, stretched=stretched)
+    assert found.recall >= 0.95
+    assert found.precision >= 0.9
+
+
+def test_the_tempo_of_a_recording_is_estimated_from_what_is_found(monkeypatch):
+    """Of two classes that differ in duration alone, the order stays where all is slower."""
+    short = kineme.load_lasa(["CShape"])
+    long = _stretched(short, 2.0)
+    others = kineme.load_lasa(["NShape", "Sshape"])
+    train = _stretched([*short[:3], *long[:3], *others[[0, 1, 2, 7, 8, 9]]], 1.0)
+    recognizer = Recognizer().fit(train, ["short"] * 3 + ["long"] * 3 + ["N"] * 3 + ["S"] * 3)
+    slower = [(short[4], "short"), (others[4], "N"), (long[5], "long"), (others[11], "S"), (others[5], "N")]
+    movements = _stretched([one for one, _ in slower], 1.6)
+    recording, truth, _ = concatenate(movements, [label for _, label in slower], np.random.default_rng(0))
+    assert count_spotted(recognizer.spot(recording), truth) == Counts(5, 5, 5)
+    monkeypatch.setattr("kineme.recognition.spotting._PASSES", 1)
+    assert count_spotted(recognizer.spot(recording), truth).n_right < 5
+
+
 def test_the_best_chain_is_that_of_all_chains():
     """Against enumeration."""
     rng = np.random.default_rng(0)
     for _ in range(30):
-        n = int(rng.integers(1, 6))
-        first, last = _unions(n, 4)
+        n = int(rng.integers(2, 7))
+        first, last = (side[:12] for side in rng.permutation(np.array(np.triu_indices(n, 1)).T).T)
         score = rng.normal(size=len(first))
-        chain = _best_chain(first, last, score, n)
+        chain = best_chain(first, last, score, n)
+        assert all(last[a] <= first[b] for a, b in pairwise(chain))
         best = 0.0
         for chosen in range(2 ** len(first)):
-            members = [c for c in range(len(first)) if chosen >> c & 1]
-            if len(members) <= n and all(last[a] < first[b] for a, b in pairwise(members)):
+            members = sorted((c for c in range(len(first)) if chosen >> c & 1), key=lambda c: first[c])
+            if all(last[a] <= first[b] for a, b in pairwise(members)):
                 best = max(best, score[members].sum())
         assert score[chain].sum() == pytest.approx(best)
 
 
-def test_runs_of_neighbors_are_counted_once():
-    first, last = _unions(5, 3)
-    assert len(set(zip(first.tolist(), last.tolist(), strict=True))) == len(first) == 5 + 4 + 3
-    assert (last - first).max() == 2
-
-
-def test_what_is_left_over_is_joined_within_one_stretch_of_motion_only():
-    first, last = np.array([1]), np.array([1])
-    bout = np.array([0, 0, 0, 0, 1, 1])
-    assert _left_over(first, last, [0], bout) == [(0, 0), (2, 3), (4, 5)]
+def test_what_is_left_over_is_from_one_stretch_of_motion_and_long_enough():
+    bouts, known = np.array([[10, 100], [100, 140], [150, 160]]), np.array([[30, 50], [85, 98]])
+    times = np.arange(200) / RATE
+    assert _left_over(known, bouts, times, 0.0).tolist() == [[10, 30], [50, 85], [100, 140], [150, 160]]
+    assert _left_over(known, bouts, times, 0.1).tolist() == [[10, 30], [50, 85], [100, 140]]
 
 
 BAD = {

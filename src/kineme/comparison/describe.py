@@ -85,8 +85,13 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean)
     r = next(r for r, one in enumerate(how.by_rows) if one.quantity == "positions" and one.arc_share == 1)
+<<<<<<< HEAD
     # From single precision here too, so that rows that were stored in it say the same as the movements.
     shapes = shapes_of(np.asarray(rows[r], dtype=np.float32).reshape(len(rows[r]), procrustes.n_dims, -1))
+=======
+    single = np.asarray(rows[r], dtype=np.float32).astype(np.float64)  # so that stored rows say the same
+    shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
+>>>>>>> main
     measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
     return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures))
 
@@ -139,9 +144,19 @@ def for_described(
 def describe_tile(demos: Demonstrations, start: int, stop: int, like: Compares, procrustes: Procrustes) -> Tile:
     """Describe movements start:stop, all at once."""
     how = like.specification
-    # Single precision is far below the widths, except for paths that are far from the origin for their size.
-    paths, rows = _tile_rows(demos, start, stop, how, np.float32 if how.normalization.translation else np.float64)
+    paths, rows = _tile_rows(demos, start, stop, how, _precision(how))
     return Tile(start, stop, paths, prepare(rows, like, procrustes))
+
+
+def describe_paths(paths: Array, like: Compares, procrustes: Procrustes) -> Described:
+    """Describe smooth, evenly timed paths (n, d, T): relative ones, or recorded ones where position matters."""
+    how = like.specification
+    return prepare(_path_rows(paths, how, _precision(how)), how, procrustes)
+
+
+def _precision(how: ComparisonSpecification) -> DTypeLike:
+    """Single is far finer than the widths, except for paths that are far from the origin for their size."""
+    return np.float32 if how.normalization.translation else np.float64
 
 
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
@@ -162,6 +177,11 @@ def _tile_rows(
     """Paths of movements start:stop, as `even_paths` gives them, and their feature rows as `dtype`."""
     relative = even_paths(demos, start, stop, how.cutoff)
     paths = relative if how.normalization.translation else recorded_paths(demos, relative, start)
+    return relative, _path_rows(paths, how, dtype)
+
+
+def _path_rows(paths: Array, how: ComparisonSpecification, dtype: DTypeLike) -> tuple[NDArray[Any], ...]:
+    """Feature rows of paths (n, d, T) as `dtype`."""
     normalized: dict[tuple[float, int], NDArray[Any]] = {}  # representations of equal phase share it
     rows = []
     for one in how.by_rows:
@@ -169,7 +189,7 @@ def _tile_rows(
         if phase not in normalized:
             normalized[phase] = how.normalization.apply(one.along(paths), dtype)
         rows.append(one.describe(normalized[phase], how.normalization.translation))
-    return relative, tuple(rows)
+    return tuple(rows)
 
 
 def _tile_movements(n_dims: int) -> int:

@@ -13,11 +13,9 @@ from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
 SHARE = 0.4
-BEGUN_SHARE = 0.35  # the same for beginnings
-_GAP_SHARE = 0.35  # of the typical distance to the first movement beyond a gap
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
 _SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
-_COPIES = 1e-5  # share of the size; unlabeled movements at smaller distances are copies
+_COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
 _ROWS = 500  # movements that widths are estimated from, at most
 _BEGUN_MOVEMENTS = 60  # the same, where each has many beginnings
 _NO_IMPOSTOR = 0.1  # width where no two beginnings differ
@@ -63,14 +61,12 @@ def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Arra
     chosen = evenly_spaced(len(labels), _BEGUN_MOVEMENTS)
     rows = (chosen[:, None] * n_progress + np.arange(n_progress)).ravel()
     owners, movements = np.repeat(labels[chosen], n_progress), np.repeat(chosen, n_progress)
-    found = [
-        _share_of_median(one, 0.0, BEGUN_SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)
-    ]
+    found = [_share_of_median(one, 0.0, SHARE) for one in _nearest_of_others(beginnings.take(rows), owners, movements)]
     return np.array([_NO_IMPOSTOR if width is None else width for width in found])
 
 
 def gap_widths(described: Described) -> Array:
-    """Width sigma_r of each representation: 0.35 of the typical distance to the first movement beyond a gap.
+    """Width sigma_r of each representation: 0.4 of the typical distance to the first movement beyond a gap.
 
     `impostor_widths` takes that share of the distance to the nearest movement of another class. Without labels the
     class is told by its edge: sorted by distance, ``d_1 <= d_2 <= ...``, the neighbors of a movement are first those of
@@ -103,7 +99,7 @@ def gap_widths(described: Described) -> Array:
     ):
         squares[np.arange(len(chosen)), chosen] = -1.0  # itself first
         ordered = np.sqrt(np.maximum(np.sort(squares, axis=1)[:, 1:], 0.0))
-        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, _GAP_SHARE))
+        widths.append(_share_of_median(_beyond_the_gap(ordered, same), same, SHARE))
     if all(width is None for width in widths):
         raise SpecificationError("expected movements that differ, got copies of one movement; add other movements")
     return np.array([np.inf if width is None else width for width in widths])

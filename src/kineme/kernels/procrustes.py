@@ -178,7 +178,7 @@ class Procrustes:
     def _soft_filler(self, n_pairs: int, rotations: bool = False) -> Filler:
         """The same under a prior, or under none, and rotations."""
         F = np.zeros((3, 3)) if self.prior is None else self.prior.matrix(3)
-        if use_compiled(n_pairs * _PAIR_OPERATIONS):
+        if use_compiled(_CALL_OPERATIONS + n_pairs * _PAIR_OPERATIONS):
             soft = compiled_module("kineme.kernels._soft_rotation")
             if rotations:
                 return lambda products, a, b, best, R: soft.fill_soft_rotations(products, a, b, F, best, R)
@@ -265,6 +265,7 @@ def _within(parts: tuple[NDArray[Any], NDArray[Any]], max_angle: float) -> Array
 
 _PAIRS = 20_000  # covariances at a time: their intermediate results fit the cache of one core
 _PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
+_CALL_OPERATIONS = 10_000  # the time of a call of it for a few pairs, in such operations
 
 
 def _double(part: NDArray[Any]) -> Array:

@@ -1,4 +1,4 @@
-"""The open set: conformal p-values of a movement for each class, calibrated on the demonstrations.
+"""The open set: conformal p-values of a movement, for each class and for all together, from the demonstrations.
 
 Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random World", Springer 2005, chapters 2 and 4
 (conformal and class-conditional, or Mondrian, predictors).
@@ -6,7 +6,7 @@ Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random Worl
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,29 @@ from numpy.typing import NDArray
 from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
+from kineme.recognition.left_out import (
+    LEAST,
+    REACH,
+    REACH_OF_OTHERS,
+    ClassDistances,
+    Scored,
+    broad_law,
+    finite,
+    law,
+    score_classes,
+    typical_scale,
+)
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced
-_PRIOR = 4.0  # demonstrations that the common scale counts for beside those of the class
-_LEAST = 5e-3  # smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart
-#: Share of the typical distance to another class within which 95 % of members are expected without calibration.
-REACH = 0.6
+
+#: Rule by which a movement is called known or unknown -> what it promises.
+RULES = {
+    "class": "Of known movements most like this class, about the error rate or less are called unknown.",
+    "pooled": "Of known movements of all classes together, about the error rate or less are called unknown.",
+    "guess": "Too few demonstrations tell the error rate: any share of known movements may be called unknown.",
+}
 
 
 def check_error_rate(error_rate: float) -> None:
@@ -44,26 +59,36 @@ class Calibration:
     With one demonstration of each class they cannot be estimated: p-values are then a guess, see 3. below.
 
     The nonconformity of a movement to class c is ``a_c = d_c / s_c``: its distance d_c to the nearest demonstration of
-    the class, ``d = sqrt(-2 log K)``, over the scale s_c of the class. Each demonstration gets the same score with
-    itself left out, and ``p_c = (1 + #{scores >= a_c}) / (number of scores + 1)``. Whatever the distribution,
-    p_c <= e then happens to a share of at most about e of the members.
+    the class, ``d = sqrt(-2 log K)``, over the scale s_c of the class. Its novelty is the smallest, ``a = min_c a_c``.
+    Each demonstration gets the same scores with itself left out, and with everything of its group, where groups are
+    given. There are two kinds of p-value:
 
-    Which scores count depends on how many there are, for p_c cannot fall below 1 / (number + 1):
+    - of a class, ``p_c = (1 + #{scores of members >= a_c}) / (number of scores + 1)``. Whatever the distribution,
+      p_c <= e happens to a share of at most about e of the members of class c.
+    - of all known classes together, ``p = (1 + #{novelties >= a}) / (number of novelties + 1)``. p <= e happens to a
+      share of about e of the movements of known classes, whichever they are, and as many as possible of the others: a
+      movement with p <= e is called unknown. As a demonstration that is left out has one fewer of its class to be near
+      to, its distance to the class counts ``((n - 1) / n)^(1/8)`` times, see `score_classes`.
 
-    1. Those of the class, where they suffice for the error rate; 19 do for 0.05. The rate holds for each class.
-    2. Those of all classes. The rate holds for members of all classes together. Each is scored against as many
-       demonstrations of its class as class c has, so that unequal classes compare; and scaled by a mean from which
-       it is left out.
-    3. None: ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c. A guess: it
-       takes how much members differ from how far the classes are apart. With one demonstration of each class, 0 to
-       79 % of true members were rejected at 0.05, the more the more they differed (``python -m bench --only
-       one_shot``). `calibrated` tells which classes this is about.
+    Which scores count depends on how many there are, for p cannot fall below 1 / (number + 1):
+
+    1. "class": those of the class (for novelties, of demonstrations most like it), where they suffice for the error
+       rate; 19 do for 0.05. The rate holds for each class.
+    2. "pooled": those of all classes. The rate holds for movements of all classes together. Each is scored against as
+       many demonstrations of its class as class c has, so that unequal classes compare; and scaled by a mean from
+       which it is left out.
+    3. "guess": none. ``p_c = exp(-pi/4 a_c^2)``, the law (Rayleigh) of a distance in the plane whose mean is s_c;
+       broad, since little is known. Where some novelties are known, p follows the law of a distance in eight dimensions
+       with the same mean as they, else p is the largest p_c. With one demonstration of each class this takes how much
+       members differ from how far the classes are apart. `calibrated` tells which classes this is about.
 
     The scale s_c is the mean left-out distance of the class, shrunk towards that of all classes as if by four more,
     since the mean of two or three is little known. With one demonstration of every class no distance within a class is
-    known; s_c is then set so that the law reaches 0.05 at six tenths of the median distance from a demonstration to
-    the nearest other class: where a movement is half way to an impostor in two of three representations and
-    nowhere near in the third.
+    known; s_c is then set so that the law reaches 0.05 at three quarters of the median distance from a demonstration to
+    the nearest other class, or at the whole of it if the demonstrations are of several groups.
+
+    With groups, such as people, the rates hold for movements of other groups; without, for more movements like the
+    demonstrations. ``python -m bench --only open_set`` measures both.
 
     Attributes
     ----------
@@ -73,116 +98,141 @@ class Calibration:
         Of each class, the scores of its demonstrations.
     pooled : tuple of C ndarrays
         For each class, the scores of all demonstrations, each scored against as many as the class has.
+    own_novelties, pooled_novelties : tuple of C ndarrays, or None
+        The same of novelties; where they are None, the scores of members, which are not smaller.
     """
 
     scales: Array
     own: tuple[Array, ...]
     pooled: tuple[Array, ...]
+    own_novelties: tuple[Array, ...] | None = None
+    pooled_novelties: tuple[Array, ...] | None = None
 
     def scores(self, nearest: Array) -> Array:
         """Nonconformity (n, C) of movements whose log similarity to each class's nearest demonstration is given."""
         return distances(nearest) / self.scales
 
     def p_values(self, nearest: Array, error_rate: float) -> Array:
-        """P-values (n, C), from as few classes as suffice to reach `error_rate`."""
+        """P-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
         scores = self.scores(nearest)
-        result = np.exp(-0.25 * math.pi * scores**2)
+        result = broad_law(scores)
         ordered: dict[int, Array] = {}  # classes share what is pooled
-        for c, counted in enumerate(self._counted(error_rate)):
+        for c, counted in enumerate(_counted(self.own, self.pooled, error_rate)):
             if counted is not None:
-                if id(counted) not in ordered:
-                    ordered[id(counted)] = np.sort(counted)
-                calibrating = ordered[id(counted)]
-                above = len(calibrating) - np.searchsorted(calibrating, scores[:, c])
-                result[:, c] = (1.0 + above) / (len(calibrating) + 1.0)
+                if id(counted[1]) not in ordered:
+                    ordered[id(counted[1])] = np.sort(counted[1])
+                result[:, c] = _shares(ordered[id(counted[1])], scores[:, c])
         return result
+
+    def known_p_values(self, nearest: Array, error_rate: float) -> Array:
+        """P-values (n,) of all known classes together: unknown is what has one of at most `error_rate`."""
+        scores = self.scores(nearest)
+        like = scores.argmin(axis=1)
+        novelty = scores[np.arange(len(scores)), like]
+        result = np.empty(len(scores))
+        counted = self._counted_novelties(error_rate)
+        for c in np.unique(like):
+            own, chosen = novelty[like == c], counted[c]
+            few = (self.pooled if self.pooled_novelties is None else self.pooled_novelties)[c]
+            if chosen is not None:
+                result[like == c] = _shares(np.sort(chosen[1]), own)
+            else:
+                result[like == c] = law(own / max(few.mean(), LEAST)) if len(few) else broad_law(own)
+        return result
+
+    def rules(self, nearest: Array, error_rate: float) -> list[str]:
+        """The rule of each movement's `known_p_values`: "class", "pooled" or "guess", see `RULES`."""
+        counted = self._counted_novelties(error_rate)
+        chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
+        return ["guess" if one is None else one[0] for one in chosen]
 
     def calibrated(self, error_rate: float) -> NDArray[np.bool_]:
         """Whether p-values of each class keep `error_rate`, shape (C,); elsewhere they are a guess.
 
         They keep it where at least ``1 / error_rate - 1`` left-out scores count. One demonstration has none.
         """
-        return np.array([counted is not None for counted in self._counted(error_rate)])
+        return np.array([counted is not None for counted in _counted(self.own, self.pooled, error_rate)])
 
     def select(self, classes: NDArray[np.intp]) -> Calibration:
         """The calibration of some of the classes."""
-        own, pooled = (tuple(part[c] for c in classes) for part in (self.own, self.pooled))
-        return Calibration(self.scales[classes], own, pooled)
 
-    def _counted(self, error_rate: float) -> list[Array | None]:
-        """Of each class the scores that count: its own, else those of all, else none."""
-        choices = zip(self.own, self.pooled, strict=True)
-        return [next((one for one in pair if (len(one) + 1) * error_rate > 1 - 1e-12), None) for pair in choices]
+        def chosen(part: tuple[Array, ...]) -> tuple[Array, ...]:
+            return tuple(part[c] for c in classes)
+
+        novelties = (self.own_novelties, self.pooled_novelties)
+        return Calibration(
+            self.scales[classes],
+            chosen(self.own),
+            chosen(self.pooled),
+            *(None if part is None else chosen(part) for part in novelties),
+        )
+
+    def _counted_novelties(self, error_rate: float) -> list[tuple[str, Array] | None]:
+        own = self.own if self.own_novelties is None else self.own_novelties
+        return _counted(own, self.pooled if self.pooled_novelties is None else self.pooled_novelties, error_rate)
 
 
-def calibrate(similarity: AveragedSimilarity, references: References) -> Calibration:
-    """Score references against the others, at most a hundred of each class."""
-    counts, described = references.counts, references.described
-    blocks, impostors = [], []
+def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[tuple[str, Array] | None]:
+    """Of each class the rule and the scores that count: its own, else those of all, else None."""
+
+    def enough(scores: Array) -> bool:
+        return (len(scores) + 1) * error_rate > 1 - 1e-12
+
+    return [
+        ("class", one) if enough(one) else ("pooled", every) if enough(every) else None
+        for one, every in zip(own, pooled, strict=True)
+    ]
+
+
+def _shares(calibrating: Array, scores: Array) -> Array:
+    """``(1 + #{calibrating >= score}) / (number of calibrating + 1)``, of sorted ones."""
+    above = len(calibrating) - np.searchsorted(calibrating, scores)
+    return np.asarray((1.0 + above) / (len(calibrating) + 1.0))
+
+
+def calibrate(
+    similarity: AveragedSimilarity, references: References, groups: NDArray[np.intp] | None = None
+) -> Calibration:
+    """Score references against the others, at most a hundred of each class.
+
+    With `groups`, the number of each reference's group, none is compared with another of its group. Where all are of
+    one group nothing could be compared; they then count as movements without groups.
+    """
+    counts = references.counts
+    if groups is not None and len(np.unique(groups)) == 1:
+        groups = None
+    blocks, others, impostors = [], [], []
     for own_class, count in zip(references.slices(), counts, strict=True):
         chosen = own_class.start + evenly_spaced(count, _CALIBRATED)
-        away = distances(similarity.log_average(described.take(chosen), described))
+        away = distances(similarity.log_average(references.described.take(chosen), references.described))
         away[np.arange(len(chosen)), chosen] = np.inf
-        blocks.append(ClassDistances(away[:, own_class].copy(), chosen - own_class.start))
+        apart = away.copy()
+        apart[:, own_class] = np.inf
+        impostors.append(apart.min(axis=1))
+        if groups is not None:
+            away[groups[chosen][:, None] == groups] = np.inf
+        shown_by = None if groups is None else groups[own_class]
+        blocks.append(ClassDistances(away[:, own_class].copy(), chosen - own_class.start, shown_by))
         away[:, own_class] = np.inf
-        impostors.append(away.min(axis=1))
-    typical = typical_scale(np.concatenate(impostors))
+        others.append(np.minimum.reduceat(away, references.first, axis=1))
+    typical = typical_scale(np.concatenate(impostors), REACH if groups is None else REACH_OF_OTHERS)
     known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
-    scales = np.array([known[int(size)][0][c] for c, size in enumerate(counts)])
-    own = tuple(block.nearest(int(size))[0] / s for block, size, s in zip(blocks, counts, scales, strict=True))
-    empty = np.empty(0)
+    scales = np.array([known[int(size)].scales[c] for c, size in enumerate(counts)])
+    novelties = {size: _novelties(scored, others, scales) for size, scored in known.items()}
     return Calibration(
         scales,
-        tuple(one if size > 1 else empty for one, size in zip(own, counts, strict=True)),
-        tuple(known[int(size)][1] for size in counts),
+        tuple(finite(block.nearest(int(n))[0] / s) for block, n, s in zip(blocks, counts, scales, strict=True)),
+        tuple(known[int(size)].pooled() for size in counts),
+        tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
+        tuple(novelties[int(size)][0] for size in counts),
     )
 
 
-def typical_scale(impostors: Array) -> float:
-    """The scale of classes shown once, from distances of demonstrations to the nearest other class."""
-    return REACH * float(np.median(impostors)) * math.sqrt(math.pi / 4 / math.log(20))
-
-
-@dataclass(frozen=True, eq=False)
-class ClassDistances:
-    """Distances (k, n) of k calibrating demonstrations, at `indices`, to the n demonstrations of their class."""
-
-    distances: Array
-    indices: NDArray[np.intp]
-
-    def nearest(self, size: int) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Distance to the nearest and second nearest of the next `size` others, in a circle, and which is nearest."""
-        k, n = self.distances.shape
-        later = (np.arange(n) - self.indices[:, None]) % n
-        within = np.where(later <= size, self.distances, np.inf)
-        order = np.sort(within, axis=1)
-        return order[:, 0], order[:, 1] if n > 1 else np.full(k, np.inf), within.argmin(axis=1)
-
-    def left_out(self, size: int) -> Array:
-        """Distances (k, k) to the nearest, row i as if demonstration i did not exist; NaN where there is none."""
-        first, second, which = self.nearest(size)
-        without = np.where(which[None, :] == self.indices[:, None], second, first)
-        np.fill_diagonal(without, np.inf)
-        return np.where(np.isfinite(without), without, np.nan)
-
-
-def score_classes(blocks: list[ClassDistances], size: int, typical: float) -> tuple[Array, Array]:
-    """Scales of all classes and scores of all demonstrations, each against at most `size` others of its class."""
-    several = [block for block in blocks if len(block.distances) > 1]
-    if not several:
-        return np.full(len(blocks), typical), np.empty(0)
-    common = float(np.mean(np.concatenate([block.nearest(size)[0] for block in several])))
-    scales, scores = [], []
-    for block in blocks:
-        if len(block.distances) == 1:
-            scales.append(max(common, _LEAST))
-            continue
-        own, without = block.nearest(size)[0], block.left_out(size)
-        scales.append(max(_shrunk(own[None], common)[0], _LEAST))
-        scores.append(own / np.maximum(_shrunk(without, common), _LEAST))
-    return np.array(scales), np.concatenate(scores)
-
-
-def _shrunk(values: Array, common: float) -> Array:
-    """Means of rows, NaN left out, shrunk towards the common one."""
-    return np.asarray((np.nansum(values, axis=1) + _PRIOR * common) / (np.isfinite(values).sum(axis=1) + _PRIOR))
+def _novelties(scored: Scored, others: list[Array], scales: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Novelties of all demonstrations that have others of their class, and which class each is most like."""
+    scores = [away / scales for away in others]  # (k, C), infinite for the own class
+    for c, (one, own, share) in enumerate(zip(scores, scored.scores, scored.shares, strict=True)):
+        one[:, c] = own * share
+    every = np.concatenate(scores)[np.isfinite(np.concatenate(scored.scores))]
+    like = every.argmin(axis=1)
+    return every[np.arange(len(every)), like], like

@@ -86,15 +86,21 @@ def fit_known_classes(
     references: References,
     weights: str | Sequence[float] = "auto",
     classifier: str = "auto",
+    groups: NDArray[np.intp] | None = None,
 ) -> KnownClasses:
-    """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`."""
-    return _known(*fit_to_references(specification, references, weights), classifier)
+    """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
+
+    With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
+    """
+    return _known(*fit_to_references(specification, references, weights), classifier, groups)
 
 
-def _known(comparison: Comparison, references: References, classifier: str) -> KnownClasses:
+def _known(
+    comparison: Comparison, references: References, classifier: str, groups: NDArray[np.intp] | None = None
+) -> KnownClasses:
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
         fitted = fit_classifier(classifier, comparison, references)
-        calibration = calibrate(comparison.similarity, references)
+        calibration = calibrate(comparison.similarity, references, groups)
     return KnownClasses(comparison, references, fitted, calibration)
 
 
@@ -106,10 +112,11 @@ def open_set_labels(
     Returns
     -------
     labels : ndarray of n labels or None
-        The best class with a p-value above `error_rate`; None, unknown, if there is none.
+        The best class with a p-value above `error_rate`; None, unknown, as in `Calibration.known_p_values`.
     p_values : ndarray of shape (n, C)
     """
     check_error_rate(error_rate)
     similarities, scores = score(known.comparison, known.references, described, nearest, known.classifier.scores)
     p_values = known.calibration.p_values(similarities, error_rate)
-    return known_labels(known.references.classes, scores, p_values, error_rate), p_values
+    labels = known_labels(known.references.classes, scores, similarities, known.calibration, error_rate)
+    return labels, p_values

@@ -28,6 +28,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
 from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
+from kineme.recognition.left_out import check_groups
 from kineme.validation import Array, check_choice
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         the nearest.
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
-        right angle costs 0.06 of the inner product of two equal paths, and none is forbidden. Pass
+        right angle costs 0.06 of the inner product of two equal paths in the plane and 0.2 in space, and none is
+        forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
         is the default of earlier versions, ``max_angle=pi/3``.
 
@@ -132,7 +134,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             self.rotation_prior,
         )
 
-    def fit(self, X: MovementsLike, y: ArrayLike | None = None) -> Self:
+    def fit(self, X: MovementsLike, y: ArrayLike | None = None, groups: ArrayLike | None = None) -> Self:
         """Describe and store the demonstrations.
 
         Parameters
@@ -141,22 +143,29 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             Whatever `Demonstrations.of` accepts.
         y : array_like of shape (n,), optional
             Labels; by default those of the demonstrations.
+        groups : array_like of shape (n,), optional
+            Who did each movement, or what else makes some more alike than new ones will be. The calibration of the
+            unknown then compares no demonstration with another of its group, so that it holds for people who showed
+            nothing. Without, it holds for more movements by the same people.
 
         Raises
         ------
         SpecificationError
             A parameter out of its range, demonstrations that are all the same, or an SVM of one class.
         TrajectoryError
-            Not one label for each movement.
+            Not one label, or not one group, for each movement.
         """
         specification = self.specification
         check_choice("classifier", self.classifier, ["auto", *CLASSIFIERS])
         demos = Demonstrations.of(X)
         labels = check_labels(demos, y)
+        order = np.argsort(labels, kind="stable")
+        numbers = None if groups is None else check_groups(groups, len(demos))[order]
         comparison, references = fit_comparison(specification, demos, labels, self.weights)
         classifier = fit_classifier(self.classifier, comparison, references)
         # All at once: where a fit is refused, what was fitted before goes on as it was.
         self.comparison_, self.references_, self.classifier_ = comparison, references, classifier
+        self._groups: NDArray[np.intp] | None = numbers
         self._calibration: Calibration | None = None  # these two are made when first asked for
         self._hypotheses: tuple[Early, Hypotheses] | None = None
         return self
@@ -242,7 +251,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         error_rate : float, default 0.05
             Share of known movements that may be called unknown. It holds if the answer is `calibrated`, which takes at
             least ``1 / error_rate - 1`` demonstrations of classes with two or more. With one demonstration of each
-            class p-values are a guess, and the share may be anything; see `Calibration`.
+            class p-values are a guess, and the share may be anything; see `Calibration`. An answer's `rule` and
+            `promise` say what it rests on.
 
         Returns
         -------
@@ -266,12 +276,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def predict_known(self, X: MovementsLike, error_rate: float = 0.05) -> NDArray[Any]:
         """Labels as from `predict`, among the classes whose p-value is above `error_rate`.
 
-        None, for unknown, if no class has a p-value above it.
+        None, for unknown, if the movement is more novel than all but `error_rate` of the known ones, see `Calibration`.
         """
         check_error_rate(error_rate)
         similarities, scores = self._score(X, nearest, self._classifier_scores)
-        p_values = self.calibration().p_values(similarities, error_rate)
-        return known_labels(self.classes_, scores, p_values, error_rate)
+        return known_labels(self.classes_, scores, similarities, self.calibration(), error_rate)
 
     def novelty(self, X: MovementsLike) -> Array:
         """Smallest nonconformity to any class, shape (n,): the larger, the less it is any known movement."""
@@ -280,32 +289,36 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def calibration(self) -> Calibration:
         """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
-        if self._calibration is None:
-            self._calibration = calibrate(comparison.similarity, references)
-        return self._calibration
+        made = self._calibration
+        if made is None or "own_novelties" not in vars(made):  # by an earlier version
+            self._calibration = made = calibrate(comparison.similarity, references, vars(self).get("_groups"))
+        return made
 
     def spot(self, recording: MovementLike, error_rate: float = 0.05, max_pieces: int = 8) -> list[Spotted]:
         """Find known movements in one long recording, with unknown between them.
 
-        The recording is cut finely, at rests and at minima of speed; every run of neighbors is a candidate, all
-        are recognized in one batch, and the chain of candidates that do not overlap with the largest summed score is
-        chosen. A candidate of similarity K scores its duration times ``1 - log K / log K_impostor``, less a fixed cost.
+        Windows of the recording, from half the shortest demonstrated duration to three times the longest, are compared
+        with all demonstrations. They start and end at rests, at minima of speed and, where these are far apart, at even
+        times. Chosen is the chain of windows that do not overlap with the largest summed score; a window scores its
+        duration, less the more it differs from the class: in the averaged kernel, and in duration and size, given the
+        tempo and the size of the whole recording, which are estimated from what is found.
 
         Parameters
         ----------
         recording : Trajectory or array_like of shape (T, d)
             Unlabeled; pass a `Trajectory`, the time stamps matter.
         error_rate : float, default 0.05
-            Share of true movements that may be called unknown. Cutting adds errors of its own, and fewer than
-            ``1 / error_rate - 1`` demonstrations cannot tell so small a share.
+            The smaller, the more a movement may differ from the demonstrations. Not the share of movements that are
+            missed: a movement in a recording is cut by the search itself, see `kineme.recognition.window_scores`.
         max_pieces : int, default 8
-            Most pieces that one movement may consist of; cost grows with it.
+            Most stretches between rests that one movement may consist of.
 
         Returns
         -------
         list of Spotted
             ``(start, end, label, confidence)`` in order of time; label None is motion of no known class. Rests are left
-            out. A movement is looked for between a third and three times the durations demonstrated for it.
+            out. Without time stamps in fit, movements are looked for between a quarter of the typical stretch between
+            rests and four times it.
         """
         from kineme.recognition.spotting import spot
 

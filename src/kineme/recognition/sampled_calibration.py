@@ -11,7 +11,8 @@ from kineme.comparison.bounds import log_bounds
 from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
-from kineme.recognition.conformal import Calibration, ClassDistances, distances, score_classes, typical_scale
+from kineme.recognition.conformal import Calibration, distances
+from kineme.recognition.left_out import ClassDistances, score_classes, typical_scale
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
@@ -20,19 +21,32 @@ _CALIBRATED = 100  # movements of a class, at most
 _BUDGET = 4000  # movements in all, as far as four of each class allow
 _FEWEST = 4
 _SIZES = np.array([1, 2, 3, 4, 6, 8, 12, 16])  # classes of up to 16 are compared with others cut to as many, or less
+<<<<<<< HEAD
 _NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times in ten, else one 5 to 8 % farther
 _TOGETHER = 4  # movements in one product
 _IMPOSTORS = 64  # by their bounds, compared exactly: bounds leave out what is compared pair by pair
+=======
+_NEAREST = 4  # by their bounds, compared exactly
+_MORE = 16  # the same among all, where shapes differ
+>>>>>>> main
 _AT_ONCE = 64  # classes whose movements are read together
 
 
 def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """The `Calibration` of movements that are stored elsewhere.
 
+<<<<<<< HEAD
     As `conformal.calibrate`, with three differences: up to a hundred movements of a class calibrate it, but only about
     4000 in all and of a thousand classes, so that above 200 classes the scores of all classes count; classes of
     more than 16 are compared as if they were equally large; and the nearest movement is the nearest of the
     eight with the largest bounds. Distances are to the whole class, not to the sample.
+=======
+    As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
+    compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a class
+    calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores of all
+    classes count; classes of more than 16 are compared as if they were equally large; and the nearest movement is the
+    nearest of the four with the largest bounds. Distances are to the whole class, not to the sample.
+>>>>>>> main
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
@@ -45,12 +59,20 @@ def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -
     typical = 0.0 if several else typical_scale(_impostors(similarity, stored))
     levels = np.where(stored.counts > _SIZES[-1], 0, _SIZES[np.searchsorted(_SIZES, stored.counts, side="right") - 1])
     known = {int(s): score_classes(windows if s else wholes, int(s) or most + 1, typical) for s in np.unique(levels)}
-    scales = np.array([known[int(level)][0][c] for c, level in enumerate(levels)])
+    scales = np.array([known[int(level)].scales[c] for c, level in enumerate(levels)])
     own = [np.empty(0)] * n_classes
     for c in sampled:
         if stored.counts[c] > 1:
             own[c] = wholes[c].nearest(most + _SIZES[-1] + 1)[0] / scales[c]
-    return Calibration(scales, tuple(own), tuple(known[int(level)][1] for level in levels))
+    pooled = {level: scored.pooled() for level, scored in known.items()}
+    novelties = {level: scored.pooled_novelties() for level, scored in known.items()}
+    return Calibration(
+        scales,
+        tuple(own),
+        tuple(pooled[int(level)] for level in levels),
+        tuple(own),
+        tuple(novelties[int(level)] for level in levels),
+    )
 
 
 def _measured(
@@ -113,7 +135,11 @@ def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Arra
     asked = evenly_spaced(len(stored.members), _CALIBRATED)
     bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
     bounds[np.arange(len(asked)), asked] = -np.inf
+<<<<<<< HEAD
     n_near = min(_IMPOSTORS, bounds.shape[1] - 1)
+=======
+    n_near = max(1, min(_MORE, len(stored.members) - 1))
+>>>>>>> main
     near = np.argpartition(-bounds, n_near - 1, axis=1)[:, :n_near]
     found = np.empty(len(asked))
     for i, rows in enumerate(near):

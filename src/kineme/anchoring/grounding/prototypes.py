@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from kineme.comparison.alignment import Maps, maps_onto, moved, paths_of
 from kineme.comparison.describe import describe
 from kineme.comparison.described import Described
@@ -75,7 +77,9 @@ def medoid_of(movements: Described | MovementsLike, like: Compares | None = None
     if len(described) < 3:
         return 0
     # One width serves all of them: it only weighs the representations, by how much they differ within the symbol.
+    # Where they do not differ, as movements of one dimension do not in turning angles, all are equally typical.
     widths = median_distances(described)
-    if widths.min() <= 0:
+    differ = np.flatnonzero(widths > 0)
+    if not len(differ):
         return 0
-    return int(similarities(described, widths=widths).sum(axis=1).argmax())
+    return int(similarities(described.select(differ), widths=widths[differ]).sum(axis=1).argmax())

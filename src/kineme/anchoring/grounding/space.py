@@ -116,7 +116,8 @@ def conceptual_space(
     representations' kernels: each representation is a domain whose salience is ``1 / sigma_r``, likeness falls with
     distance as a Gaussian (Gärdenfors, chapter 1), and where no rotation is taken out d is a weighted Euclidean
     metric. The best rotation within a bounded angle may break the triangle inequality. The recognizer's arithmetic mean
-    says who is who, but beyond the nearest all are equally far; a space needs distances that go on growing.
+    says who is who, but beyond the nearest all are equally far; a space needs distances that go on growing. So only
+    representations that are compared sample by sample count: the others are not metrics.
 
     Parameters
     ----------
@@ -140,7 +141,11 @@ def conceptual_space(
             f"expected one prototype for each of different symbols, got {len(described)} prototypes for "
             f"{len(names)} symbols, {len(set(names))} of them different"
         )
-    similarity = averaged(described, _typical(described) if widths is None else widths)
+    n_rows = len(described.blocks)
+    sigma = _typical(described) if widths is None else np.asarray(widths, dtype=np.float64)
+    averaged(described, sigma)  # refuses widths of another number
+    described = described.select(range(n_rows))
+    similarity = averaged(described, sigma[:n_rows])
     d = np.sqrt(np.maximum(-2.0 * similarity.log_average(described, described), 0.0))
     d = 0.5 * (d + d.T)
     np.fill_diagonal(d, 0.0)

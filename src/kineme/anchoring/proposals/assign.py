@@ -18,13 +18,13 @@ from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.conformal import REACH
 from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count
 
 _REPEATS = 20
+_REACH = 0.6  # share of the typical distance to another symbol, where no two movements show one symbol
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ def agreement(comparison: Comparison, references: References) -> float:
     if several.any():
         return 0.5 * (float(np.median(np.diag(means)[several])) + apart)
     nearest = np.where(labels[:, None] == labels, 0.0, K).max(axis=1)
-    reach = REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
+    reach = _REACH * in_widths(np.log(np.maximum(nearest, np.finfo(float).tiny)))
     return float(np.exp(-0.5 * np.median(reach) ** 2))
 
 

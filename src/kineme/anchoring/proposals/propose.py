@@ -6,24 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.anchoring.clustering.clustering import METHODS, Clusters
+from kineme.anchoring.clustering.fusion import fuse, groups, set_apart
 from kineme.anchoring.clustering.number_of_clusters import count_clusters
+from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
 from kineme.anchoring.proposals.subsample import extend, largest_clustered, subsample
 from kineme.comparison.describe import describe
 from kineme.comparison.described import Described
+from kineme.comparison.distances import squared_distances
 from kineme.comparison.similarity import AveragedSimilarity, averaged, similarities
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_choice, check_count
 
+#: Of `propose` and of whatever clusters by it.
+DEFAULT_METHOD = "spectral"
+_LARGEST = 2000  # movements whose similarities are fused at once
 _REPEATS = 20  # subsets that clusters must come again in
 
 
 def propose(
     movements: MovementsLike | Described,
-    method: str = "agglomerative",
+    method: str = DEFAULT_METHOD,
     n_clusters: int | None = None,
     *,
     min_members: int = 3,
@@ -32,17 +38,23 @@ def propose(
 ) -> Proposals:
     """Cluster movements without labels.
 
-    Distances are ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
+    By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
+    together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fusion.fuse`. So movements of
+    several people connect, of whom each repeats the own way more closely than that of others. The other methods take
+    distances ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
 
     Parameters
     ----------
     movements : Described, or movements as `Demonstrations.of` accepts them
         At least three.
-    method : {"agglomerative", "hdbscan"}, default "agglomerative"
-        Average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN), which find their number themselves.
+    method : {"spectral", "agglomerative", "hdbscan"}, default "spectral"
+        Spectral clustering, in `n_clusters`; average linkage, cut into `n_clusters`; or clusters of density (HDBSCAN),
+        which find their number themselves.
     n_clusters : int, optional
-        Number of clusters of the tree, those too small to be proposed included; by default
-        `count_clusters`, at least two: whether all movements are one cluster cannot be told from their own distances.
+        Number of proposals, exactly, if there are `min_members` movements for each; with "agglomerative" the number of
+        clusters of the tree, those too small to be proposed included. By default it is found, by the largest gap
+        between eigenvalues or by `count_clusters`, and is at least two: whether all movements are one cluster cannot be
+        told from their own distances.
     min_members : int, default 3
         Movements of a proposal, at least; smaller clusters are left over.
     like : Recognizer, Comparison or ComparisonSpecification, optional
@@ -50,7 +62,7 @@ def propose(
     max_clustered : int, optional
         More movements than this are clustered by a subsample of so many; each of the others is added to the cluster of
         its nearest neighbor in the subsample if it is within the radius of that cluster, else it is left over. By
-        default 5000, in space 800.
+        default 2000; with the other methods 5000, in space 800.
 
     Returns
     -------
@@ -61,47 +73,86 @@ def propose(
     SpecificationError
         Parameters out of range, fewer than three movements, or copies of one movement.
     """
-    check_choice("method", method, list(METHODS))
+    check_choice("method", method, [DEFAULT_METHOD, *METHODS])
     check_count("min_members", min_members, 2)
     described = describe(movements, like)
     _check_count_of(n_clusters, method, len(described))
-    limit = largest_clustered(described.n_dims) if max_clustered is None else max_clustered
+    limit = _largest(method, described.n_dims) if max_clustered is None else max_clustered
     check_count("max_clustered", limit, 3)
     if len(described) <= limit:
-        similarity = averaged(described)
-        K = similarities(described, widths=similarity.widths)
-        return _propose(K, similarity, method, n_clusters, min_members)
+        return _propose(described, averaged(described), method, n_clusters, min_members)[1]
     sample, similarity = subsample(described, limit)
-    K = similarities(described.take(sample), widths=similarity.widths)
-    proposals = _propose(K, similarity, method, n_clusters, min_members)
-    return extend(described, sample, K, proposals, similarity)
+    K, found = _propose(described.take(sample), similarity, method, n_clusters, min_members)
+    return extend(described, sample, K, found, similarity)
+
+
+def _largest(method: str, n_dims: int) -> int:
+    """Movements that are all compared with each other by default."""
+    return _LARGEST if method == DEFAULT_METHOD else largest_clustered(n_dims)
 
 
 def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
     if n_clusters is None:
         return
     check_count("n_clusters", n_clusters, 1)
-    if method != "agglomerative":
+    if method == "hdbscan":
         raise SpecificationError(f"expected no n_clusters with method={method!r}, got {n_clusters!r}; it finds its own")
     if n_clusters > n:
         raise SpecificationError(f"expected n_clusters of at most {n}, the number of movements, got {n_clusters!r}")
 
 
 def _propose(
-    K: Array, similarity: AveragedSimilarity, method: str, n_clusters: int | None, min_members: int
-) -> Proposals:
+    described: Described, similarity: AveragedSimilarity, method: str, n_clusters: int | None, min_members: int
+) -> tuple[Array, Proposals]:
+    """Similarities K (n, n) at the widths given, and proposals."""
+    K = similarities(described, widths=similarity.widths)
     order = own_order(K)
-    distances = 1.0 - K[np.ix_(order, order)]
-    clusters, share = np.empty(len(K), dtype=np.intp), n_clusters or 0
+    clusters = np.empty(len(K), dtype=np.intp)
+    if method == DEFAULT_METHOD:
+        found, stable = _by_neighbors(described.take(order), n_clusters, min_members)
+    else:
+        found, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
+    clusters[order] = found
+    return K, describe_clusters(K, clusters, stable, similarity.widths)
+
+
+def _by_neighbors(described: Described, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
+    """Clusters of movements that are not alone, and how stable each is."""
+    described = by_shape(described)
+    squares = squared_distances(described, described)
+    squares = 0.5 * (squares + squares.transpose(0, 2, 1))
+    group = groups(squares)
+    kept = np.flatnonzero(np.bincount(group)[group] >= min_members)
+    clusters = np.full(len(described), -1, dtype=np.intp)
+    if len(kept) < 3:
+        return clusters, np.empty(0)
+    similar = set_apart(fuse(squares[:, kept[:, None], kept]), group[kept])
+    wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
+    clusters[kept] = spectral(similar, wanted, min_members)
+    stable = stabilities(similar, clusters[kept], lambda some: spectral(some, wanted), _REPEATS)
+    return clusters, stable
+
+
+def by_shape(described: Described) -> Described:
+    """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
+    if described.pairs is None:
+        return described
+    n, rows = len(described.blocks), described.pairs.positions.rows
+    positions = [r for r, one in enumerate(described.blocks) if np.array_equal(one.rows, rows)]
+    return described.select([*positions, *range(n, described.n_representations)])
+
+
+def _by_distances(distances: Array, method: str, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
+    """Clusters of all movements, and how stable each is."""
+    share = n_clusters or 0
     if method == "agglomerative" and n_clusters is None:
         share = count_clusters(distances, _REPEATS)
 
     def again(some: Array) -> Clusters:
         return METHODS[method](some, share, 1 if method == "agglomerative" else min_members)
 
-    ordered = METHODS[method](distances, share, min_members)
-    clusters[order] = ordered
-    return describe_clusters(K, clusters, stabilities(distances, ordered, again, _REPEATS), similarity.widths)
+    found = METHODS[method](distances, share, min_members)
+    return found, stabilities(distances, found, again, _REPEATS)
 
 
 def own_order(K: Array) -> NDArray[np.intp]:

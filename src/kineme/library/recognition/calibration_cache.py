@@ -26,7 +26,7 @@ from kineme.validation import Array
 
 FILE = "calibration.cache"
 
-_FORMAT = "1"
+_FORMAT = "2"
 _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
 
@@ -60,9 +60,12 @@ def _key(store: Store, members: Members) -> str:
 
 
 def _serialized(calibration: Calibration, key: str) -> bytes:
-    pooled = {id(one): one for one in calibration.pooled}  # classes of one size share an array
+    novelties = calibration.pooled if calibration.pooled_novelties is None else calibration.pooled_novelties
+    both = zip(calibration.pooled, novelties, strict=True)
+    pooled = {id(one): (one, novelty) for one, novelty in both}  # classes of one size share arrays
     numbers = {name: k for k, name in enumerate(pooled)}
-    arrays: dict[str, Any] = {f"pooled {k}": one for k, one in enumerate(pooled.values())}
+    arrays: dict[str, Any] = {f"pooled {k}": one for k, (one, _) in enumerate(pooled.values())}
+    arrays |= {f"novelties {k}": one for k, (_, one) in enumerate(pooled.values())}
     arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
     arrays |= {"own": np.concatenate(calibration.own), "ends": np.cumsum([len(one) for one in calibration.own])}
     file = io.BytesIO()
@@ -82,12 +85,15 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
         raise ValueError("damaged, or of other members")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         which, ends = _whole(arrays["which"], n, n), _whole(arrays["ends"], n, len(data))
-        pooled = [_real(arrays[f"pooled {k}"]) for k in range(int(which.max()) + 1)]
+        pooled, novelties = (
+            [_real(arrays[f"{name} {k}"]) for k in range(int(which.max()) + 1)] for name in ("pooled", "novelties")
+        )
         scales, own = _real(arrays["scales"]), _real(arrays["own"])
     sound = scales.shape == (n,) and ((scales > 0) & np.isfinite(scales)).all()
     if not sound or (np.diff(ends) < 0).any() or ends[-1] != len(own):
         raise ValueError("no calibration")
-    return Calibration(scales, tuple(np.split(own, ends[:-1])), tuple(pooled[k] for k in which))
+    scores = tuple(np.split(own, ends[:-1]))
+    return Calibration(scales, scores, tuple(pooled[k] for k in which), scores, tuple(novelties[k] for k in which))
 
 
 def _whole(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.anchoring.proposals.assign import assign_described
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
+from kineme.anchoring.proposals.propose import DEFAULT_METHOD
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import SpecificationError
 from kineme.library.recognition.members import described
@@ -106,7 +107,7 @@ def propose(
         proposals = assign_described(members, known, min_members=min_members).proposals
     else:
         members, like = described(store, chosen), store.specification.comparison
-        how = method or "agglomerative"
+        how = method or DEFAULT_METHOD
         proposals = propose_clusters(members, how, n_clusters, min_members=min_members, like=like)
     if ids is None:
         proposals = _without(proposals, _rejected_before(store, chosen))

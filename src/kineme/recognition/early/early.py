@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import even_paths
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.hypotheses import Hypotheses
-from kineme.recognition.early.prefixes import beginnings, smooth_paths
 from kineme.validation import MIN_SAMPLES, Array
 
 _TILE = 2_000_000  # hypotheses compared at a time
@@ -25,15 +26,16 @@ _N_SAMPLES = 200  # of a whole movement, of which `cut` takes the first
 def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike) -> Array:
     """Share of each class, and, last, of an unknown movement, in the evidence of each beginning: (n, C + 1)."""
     demos = comparison.checked(X)
-    step = max(1, _TILE // len(stored.stored.lengths))
+    step = max(1, _TILE // len(stored.prefixes.lengths))
     return np.concatenate(
-        [_shares(stored, demos[start : start + step], comparison.cutoff) for start in range(0, len(demos), step)]
+        [_shares(comparison, stored, demos[start : start + step]) for start in range(0, len(demos), step)]
     )
 
 
-def _shares(stored: Hypotheses, demos: Demonstrations, cutoff: float | None) -> Array:
-    begun = beginnings(smooth_paths(demos, cutoff), np.ones(1))
-    logs = stored.log_classes(stored.log_evidence(begun, demos.durations))
+def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
+    paths = even_paths(demos, 0, len(demos), comparison.cutoff)
+    starts = demos.positions[demos.offsets[:-1]]
+    logs = stored.log_classes(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
     shares = np.exp(logs - logs.max(axis=1, keepdims=True))
     return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 

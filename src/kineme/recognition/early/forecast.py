@@ -27,7 +27,7 @@ def forecast(stored: Hypotheses, evidence: Array, label: int, begun: Prefixes, d
     Parameters
     ----------
     evidence : ndarray of shape (m * G,)
-        Logarithms, see `Hypotheses.log_evidence`.
+        Logarithms, see `log_evidence`.
     label : int
         Index of the class.
     duration : float
@@ -44,16 +44,16 @@ def forecast(stored: Hypotheses, evidence: Array, label: int, begun: Prefixes, d
     logs = evidence[own]
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
-    elapsed = np.maximum(stored.stored.elapsed[own], 1e-3)
+    elapsed = np.maximum(stored.prefixes.elapsed[own], 1e-3)
     best = int(own[logs.argmax()])
     movement = best // G
     path = stored.paths[movement]
     times = np.linspace(0.0, 1.0, path.shape[1])
-    remaining_times = np.linspace(stored.stored.elapsed[best], 1.0, N_REMAINING)
+    remaining_times = np.linspace(stored.prefixes.elapsed[best], 1.0, N_REMAINING)
     remaining = np.stack([np.interp(remaining_times, times, row) for row in path])
     remaining = remaining - remaining[:, :1]
-    R = stored.procrustes.rotations(begun.positions, stored.stored.positions[best : best + 1])[0]
-    size = begun.sizes[0] / stored.stored.sizes[best] if stored.stored.sizes[best] > 0 else 1.0
+    R = stored.procrustes.rotations(begun.positions, stored.prefixes.positions[best : best + 1])[0]
+    size = begun.sizes[0] / stored.prefixes.sizes[best] if stored.prefixes.sizes[best] > 0 else 1.0
     return Forecast(
         float(weights @ np.tile(stored.progress, len(own) // G)),
         float(weights @ ((1.0 - elapsed) / elapsed)) * duration,

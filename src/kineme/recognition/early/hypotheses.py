@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.described import Described
-from kineme.comparison.log_averages import LOG_MEANS
 from kineme.comparison.references import References
-from kineme.comparison.widths import BEGUN_SHARE, beginning_widths
+from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
-from kineme.recognition.early.prefixes import Prefixes, beginnings, smooth_paths
+from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes, smooth_paths
 from kineme.validation import Array, check_count, check_number
 
 #: An unknown movement is as far as a typical impostor, and as unlikely in size, duration and timing as a true one.
-_LOG_UNKNOWN = -0.5 / BEGUN_SHARE**2 - 1.5
+_LOG_UNKNOWN = -0.5 / SHARE**2 - 1.5
 _EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
 _MOST_PROGRESS = 1000  # beginnings of one movement
+_CONCENTRATION = 0.1  # of the rotation prior, where none is given
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
 
 
@@ -32,7 +32,7 @@ class Early:
 
     Parameters
     ----------
-    n_progress : int, default 40
+    n_progress : int, default 20
         Beginnings stored of each movement. On a coarse grid a corner that has just been passed falls between two.
     size_spread : float, default 0.7
         Standard deviation of the logarithm of the ratio of sizes of two movements of one class: 0.7 makes a factor of 4
@@ -47,7 +47,7 @@ class Early:
         Largest rotation [rad]; by default the recognizer's.
     """
 
-    n_progress: int = 40
+    n_progress: int = 20
     size_spread: float = 0.7
     duration_spread: float = 0.35
     timing_spread: float = 0.05
@@ -79,52 +79,38 @@ class Hypotheses(NamedTuple):
     ----------
     early : Early
     procrustes : Procrustes
-    first : ndarray of shape (C,)
-        Index of the first movement of each class.
+    comparison : Comparison
+        Of whole movements.
+    references : References
+        The whole movements.
     progress : ndarray of shape (G,)
     paths : ndarray of shape (m, d, T)
         The smoothed movements, minus their start.
     durations : ndarray of shape (m,)
-    stored : Prefixes
+    prefixes : Prefixes
     described : Described
-        Positions and directions.
-    widths : ndarray of shape (2,)
+        Positions, elastic paths and point clouds.
+    widths : ndarray of shape (3,)
     log_lengths, log_durations : ndarray of shape (m * G,)
         Of the stored beginnings.
     timing_squares : ndarray of shape (m * G,)
-        Squared norms of the rows of `stored.timing`.
+        Squared norms of the rows of `prefixes.timing`.
     """
 
     early: Early
     procrustes: Procrustes
-    first: NDArray[np.intp]
+    comparison: Comparison
+    references: References
     progress: Array
     paths: Array
     durations: Array
-    stored: Prefixes
+    prefixes: Prefixes
     described: Described
     widths: Array
     log_lengths: Array
     log_durations: Array
     timing_squares: Array
-
-    def log_evidence(self, begun: Prefixes, durations: Array) -> Array:
-        """Logarithm of the evidence for each hypothesis, shape (n, m * G).
-
-        ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over positions and directions, each after the best rotation, plus
-        the logarithms of a normal density of log size and log duration ratio, and of a Cauchy density of timing, all
-        up to constants.
-        """
-        squares = zip(prepare(self.procrustes, begun).blocks, self.described.blocks, self.widths, strict=True)
-        near = LOG_MEANS["arithmetic"](
-            np.stack([-self.procrustes.squared_distances(a, b) / (2.0 * w * w) for a, b, w in squares])
-        )
-        sizes = np.log(_positive(begun.lengths))[:, None] - self.log_lengths
-        longer = np.log(_positive(durations))[:, None] - self.log_durations
-        near -= 0.5 * (sizes / self.early.size_spread) ** 2 + 0.5 * (longer / self.early.duration_spread) ** 2
-        norms = (begun.timing**2).sum(axis=1)[:, None] + self.timing_squares
-        late = norms - 2.0 * (begun.timing @ self.stored.timing.T)
-        return np.asarray(near - np.log1p(np.maximum(late, 0.0) / (2.0 * self.early.timing_spread**2)))
+    first: NDArray[np.intp]
 
     def log_classes(self, evidence: Array) -> Array:
         """Logarithm of the evidence for each class (n, C), and, last, for an unknown movement: shape (n, C + 1).
@@ -145,35 +131,42 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     """Prepare the beginnings of the references."""
     if comparison.normalization.scale == "none" and early.size_spread == Early.size_spread:
         early = replace(early, size_spread=_KNOWN_SIZE)
-    procrustes = comparison.procrustes
-    if early.max_angle is not None:
-        procrustes = Procrustes(comparison.n_dims, early.max_angle)
+    procrustes = beginning_procrustes(comparison.procrustes, early.max_angle)
     progress = np.arange(1, early.n_progress + 1) / early.n_progress
     demos = references.all_movements()
     paths = smooth_paths(demos, comparison.cutoff)
-    stored = beginnings(paths, progress)
-    described = prepare(procrustes, stored)
+    prefixes = beginnings(paths, progress)
+    described = describe_prefixes(prefixes, procrustes)
     return Hypotheses(
         early,
         procrustes,
-        references.first,
+        comparison,
+        references,
         progress,
         paths,
         demos.durations,
-        stored,
+        prefixes,
         described,
         beginning_widths(described, np.searchsorted(references.classes, references.labels)),
-        np.log(_positive(stored.lengths)),
-        np.log(_positive(np.repeat(demos.durations, len(progress)) * stored.elapsed)),
-        (stored.timing**2).sum(axis=1),
+        np.log(positive(prefixes.lengths)),
+        np.log(positive(np.repeat(demos.durations, len(progress)) * prefixes.elapsed)),
+        (prefixes.timing**2).sum(axis=1),
+        references.first,
     )
 
 
-def prepare(procrustes: Procrustes, prefixes: Prefixes) -> Described:
-    """Positions and directions ready for comparison; single precision, which is far finer than any width."""
-    rows = (prefixes.positions, prefixes.directions)
-    return Described(tuple(procrustes.prepare(block.astype(np.float32)) for block in rows), procrustes)
+def beginning_procrustes(whole: Procrustes, max_angle: float | None) -> Procrustes:
+    """How beginnings are rotated: by at most an angle, or as whole movements, by default less readily in the plane.
+
+    A beginning is often nearly straight, and the same as any other one if it may be rotated freely.
+    """
+    if max_angle is not None:
+        return Procrustes(whole.n_dims, max_angle)
+    if whole.prior is None or whole.prior.concentration is not None:
+        return whole
+    return replace(whole, prior=replace(whole.prior, concentration=_CONCENTRATION))
 
 
-def _positive(values: Array) -> Array:
+def positive(values: Array) -> Array:
+    """The values, at least the smallest positive number."""
     return np.maximum(values, np.finfo(float).tiny)

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from kineme.comparison.describe import N_POINTS, even_paths
+from kineme.comparison.described import Described, Pairs
+from kineme.comparison.representation import PAIR_QUANTITIES
+from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.shapes import ElasticSpec, shapes_of
 from kineme.movements.preparation.arc_length import arc_length_phase
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
-N_PREFIX = 32  # samples along the arc length of a beginning
+N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments
+#: What beginnings are compared by pair by pair.
+_PAIRS = tuple(PAIR_QUANTITIES.index(quantity) for quantity in ("elastic", "cloud"))
 
 
 class Prefixes(NamedTuple):
@@ -23,8 +30,6 @@ class Prefixes(NamedTuple):
     ----------
     positions : ndarray of shape (n * G, d * S)
         Minus their mean, at root mean square distance 1 from it; rows have norm 1.
-    directions : ndarray of shape (n * G, d * (S - 1))
-        Unit tangents; rows have norm 1. They weigh a corner just passed as much as everything before it.
     timing : ndarray of shape (n * G, S)
         Time at each sample as a share of the beginning's, divided by sqrt(S): squared distances are mean squares.
     sizes, lengths : ndarray of shape (n * G,)
@@ -34,7 +39,6 @@ class Prefixes(NamedTuple):
     """
 
     positions: Array
-    directions: Array
     timing: Array
     sizes: Array
     lengths: Array
@@ -70,18 +74,27 @@ def beginnings(paths: Array, progress: Array) -> Prefixes:
     shape = (n * len(progress), N_PREFIX)
     along = np.stack([np.interp(targets, knots, paths[:, k].ravel()).reshape(shape) for k in range(d)], axis=1)
     elapsed = np.interp(targets, knots, np.tile(np.linspace(0.0, 1.0, n_samples), n)).reshape(shape)
-    steps = np.diff(along, axis=2)
-    chords = np.sqrt((steps**2).sum(axis=1))
+    chords = np.sqrt((np.diff(along, axis=2) ** 2).sum(axis=1))
     centered = along - along.mean(axis=2, keepdims=True)
     sizes = np.sqrt((centered**2).sum(axis=1).mean(axis=1))
     return Prefixes(
         (centered / (_nonzero(sizes) * np.sqrt(N_PREFIX))[:, None, None]).reshape(len(along), -1),
-        (steps / (_nonzero(chords) * np.sqrt(N_PREFIX - 1))[:, None, :]).reshape(len(along), -1),
         elapsed / (_nonzero(elapsed[:, -1:]) * np.sqrt(N_PREFIX)),
         sizes,
         chords.sum(axis=1),
         elapsed[:, -1],
     )
+
+
+def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:
+    """Beginnings ready for comparison: positions sample by sample, elastic paths and point clouds pair by pair.
+
+    In single precision, which is far finer than any width.
+    """
+    rows = prefixes.positions
+    positions = procrustes.prepare(rows.astype(np.float32))
+    shapes = shapes_of(math.sqrt(N_PREFIX) * rows.reshape(len(rows), -1, N_PREFIX))
+    return Described((positions,), procrustes, pairs=Pairs(positions, shapes, _PAIRS))
 
 
 def _nonzero(values: Array) -> Array:

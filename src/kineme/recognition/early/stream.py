@@ -15,15 +15,16 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.bounded_path import BoundedPath
 from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.evidence import describe_begun, log_evidence
 from kineme.recognition.early.forecast import forecast
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
-from kineme.recognition.early.prefixes import beginnings, smoother
+from kineme.recognition.early.prefixes import smoother
 from kineme.runtime.compiled import load_compiled
+from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
 
 CAPACITY = 4096  # samples that are kept one by one
-_WHOLE = np.ones(1)
 
 
 class Live:
@@ -82,7 +83,8 @@ class Live:
         kept = self._path.kept()
         if len(kept) < MIN_SAMPLES or not np.ptp(kept[:, 1:], axis=0).any():
             return self._nothing(status | LiveStatus.TOO_SHORT)
-        return self._estimate(kept, status)
+        with single_threaded_blas():  # held once, not for each of many small products
+            return self._estimate(kept, status)
 
     def finish(self) -> Answer:
         """The answer of `Recognizer.recognize` to the whole movement.
@@ -119,8 +121,8 @@ class Live:
 
     def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
         elapsed = float(kept[-1, 0] - kept[0, 0])
-        begun = beginnings(self._smooth(kept), _WHOLE)
-        evidence = self._hypotheses.log_evidence(begun, np.array([elapsed]))
+        so_far = describe_begun(self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed]))
+        evidence = log_evidence(self._hypotheses, so_far)
         logs = self._hypotheses.log_classes(evidence)[0]
         shares = np.exp(logs - logs.max())
         shares /= shares.sum()
@@ -128,7 +130,7 @@ class Live:
         leader = int(order[0])
         decided = self._decision.update(elapsed, leader, float(shares[leader]))
         shown = leader if decided is None else decided
-        ahead = forecast(self._hypotheses, evidence[0], shown, begun, elapsed)
+        ahead = forecast(self._hypotheses, evidence[0], shown, so_far.prefixes, elapsed)
         self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
         self._leader = shown
         path = kept[-1, 1:] + ahead.path

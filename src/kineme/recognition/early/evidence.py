@@ -1,0 +1,126 @@
+"""The evidence for hypotheses about a movement that has begun: roughly for all of them, then in full for a few."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.describe import describe_paths
+from kineme.comparison.described import Described
+from kineme.comparison.log_averages import LOG_MEANS
+from kineme.kernels.pair_distances import pair_distances
+from kineme.kernels.procrustes import Procrustes
+from kineme.recognition.early.hypotheses import Hypotheses, positive
+from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes
+from kineme.validation import Array
+
+_COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
+_WIDENED = 2.0  # widths of positions where they choose those
+_ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
+_NARROWED = 0.5  # widths of whole movements, for hypotheses compared with those of beginnings
+_NEGLIGIBLE = 5.0  # whole movements with less than exp(-5) of the largest evidence are not compared
+
+_WHOLE = np.ones(1)
+
+
+class Begun(NamedTuple):
+    """n movements so far: as beginnings, described, and their paths (n, d, T), to be described as whole movements."""
+
+    prefixes: Prefixes
+    described: Described
+    paths: Array
+    durations: Array
+
+
+def describe_begun(stored: Hypotheses, paths: Array, starts: Array, durations: Array) -> Begun:
+    """Describe the smooth, evenly timed paths (n, d, T), relative to their first recorded positions (n, d)."""
+    prefixes = beginnings(paths, _WHOLE)
+    where = paths if stored.comparison.normalization.translation else paths + starts[:, :, None]
+    return Begun(prefixes, describe_prefixes(prefixes, stored.procrustes), where, durations)
+
+
+def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
+    """Logarithm of the evidence for each hypothesis, shape (n, m * G); -inf where another is far more likely.
+
+    ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over elastic path and point cloud, after the rotation that brings the
+    positions closest, plus the logarithms of the density of that rotation, of a normal density of log size and log
+    duration ratio, and of a Cauchy density of timing, all up to constants. A hypothesis that the movement is over has
+    also the evidence for it as a whole movement.
+
+    The positions' own distances, which are much cheaper, choose the hypotheses for which it is computed: the 200 best
+    and the best one of each class.
+    """
+    priors = _log_priors(stored, begun)
+    squares = stored.procrustes.squared_distances(begun.described.blocks[0], stored.described.blocks[0])
+    rough = priors - squares / (2.0 * (_WIDENED * stored.widths[0]) ** 2)
+    evidence = np.full(rough.shape, -np.inf)
+    for i in range(len(rough)):
+        chosen = _choose(stored, rough[i])
+        one = begun.described.take(slice(i, i + 1))
+        near, turned = _near(stored, one, chosen)
+        evidence[i, chosen] = near + turned + priors[i, chosen]
+        _add_whole(stored, begun.paths[i : i + 1], evidence[i], chosen, near)
+    return evidence
+
+
+def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
+    """Logarithms of the densities of size, duration and timing."""
+    sizes = np.log(positive(begun.prefixes.lengths))[:, None] - stored.log_lengths
+    longer = np.log(positive(begun.durations))[:, None] - stored.log_durations
+    timing = begun.prefixes.timing
+    norms = (timing**2).sum(axis=1)[:, None] + stored.timing_squares
+    late = np.maximum(norms - 2.0 * (timing @ stored.prefixes.timing.T), 0.0)
+    early = stored.early
+    normal = 0.5 * (sizes / early.size_spread) ** 2 + 0.5 * (longer / early.duration_spread) ** 2
+    return np.asarray(-normal - np.log1p(late / (2.0 * early.timing_spread**2)))
+
+
+def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
+    """Hypotheses to be compared pair by pair; all that are equally good are, so that their order does not matter."""
+    if len(rough) <= _COMPARED:
+        return np.arange(len(rough))
+    starts = stored.first * len(stored.progress)
+    best = np.repeat(np.maximum.reduceat(rough, starts), np.diff(starts, append=len(rough)))
+    least = np.partition(rough, len(rough) - _COMPARED)[len(rough) - _COMPARED]
+    return np.flatnonzero((rough >= least) | (rough >= best))
+
+
+def _near(stored: Hypotheses, one: Described, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Logarithms of the averaged kernel of elastic path and point cloud, and of the density of the rotation."""
+    others = stored.described.take(chosen)
+    assert one.pairs is not None
+    assert others.pairs is not None
+    _, rotations = stored.procrustes.align(one.pairs.positions, others.pairs.positions)
+    squares = pair_distances(one.pairs.shapes, others.pairs.shapes, rotations)[list(one.pairs.measures), 0]
+    logs = squares.astype(float) / (-2.0 * stored.widths[1:, None] ** 2)
+    return LOG_MEANS["arithmetic"](logs), _log_rotations(stored.procrustes, rotations)
+
+
+def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None) -> Array:
+    """Logarithms (k,) of the prior density of rotations (1, k, ...), 0 for none."""
+    if procrustes.prior is None or rotations is None:
+        return np.zeros(1)
+    F = procrustes.prior.matrix(procrustes.n_dims)
+    R = rotations[0].astype(float)
+    product = R[:, 0] * np.trace(F) if procrustes.n_dims == 2 else np.einsum("kij,ij->k", R, F)
+    return np.asarray(_ROTATION * (product - np.trace(F)))
+
+
+def _add_whole(stored: Hypotheses, path: Array, evidence: Array, chosen: NDArray[np.intp], near: Array) -> None:
+    """Add the evidence for the hypotheses among the chosen that the movement is over, in place.
+
+    It is the geometric mean of that for a beginning and the recognizer's similarity, which is at most 1, of the whole.
+    """
+    G = len(stored.progress)
+    last = np.flatnonzero(chosen % G == G - 1)
+    most = evidence[chosen[last]] - 0.5 * near[last]
+    matters = most > evidence.max() - _NEGLIGIBLE
+    last, most = last[matters], most[matters]
+    if len(last):
+        others = stored.references.described.take(chosen[last] // G)
+        whole = describe_paths(path, stored.comparison, stored.comparison.procrustes)
+        similar = stored.comparison.similarity.widened(_NARROWED).log_average(whole, others)[0]
+        at = chosen[last]
+        evidence[at] = np.logaddexp(evidence[at], most + 0.5 * similar)

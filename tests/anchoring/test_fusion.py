@@ -1,0 +1,201 @@
+"""Similarities that are fused over representations and neighbors, and the clusters that random walks seldom leave."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.metrics import adjusted_rand_score
+
+from kineme import Demonstrations
+from kineme.anchoring.clustering import fusion
+from kineme.anchoring.clustering.fusion import fuse, groups, set_apart
+from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
+from kineme.anchoring.proposals.propose import by_shape, propose
+from kineme.comparison.describe import describe
+from kineme.comparison.distances import squared_distances
+from kineme.comparison.representation import ROW_REPRESENTATIONS
+from kineme.comparison.specification import ComparisonSpecification
+from kineme.experiments.evaluation.data import load_data
+from unlabeled_samples import draw_kinds, recovered
+
+quick = settings(max_examples=5, deadline=None, derandomize=True)
+seeds = st.integers(0, 10_000)
+FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
+
+
+def squares_of(*coordinates):
+    """Squared distances (R, n, n) of points at coordinates (n, d) in each representation."""
+    return np.stack([((x[:, None] - x) ** 2).sum(axis=2) for x in coordinates])
+
+
+def points(seed, sizes=(20, 30, 25), apart=8.0):
+    """Points (n, 3) in clusters of these sizes, and the cluster of each."""
+    rng = np.random.default_rng(seed)
+    which = np.repeat(np.arange(len(sizes)), sizes)
+    centers = apart * np.eye(3)[np.arange(len(sizes)) % 3] * (1 + np.arange(len(sizes)) // 3)[:, None]
+    return centers[which] + rng.normal(size=(len(which), 3)), which
+
+
+@given(seed=seeds)
+@quick
+def test_fused_similarities_are_symmetric_and_follow_the_order(seed):
+    squares = squares_of(points(seed)[0], points(seed + 1)[0])
+    order = np.random.default_rng(seed).permutation(squares.shape[1])
+    similar = fuse(squares)
+    np.testing.assert_array_equal(similar, similar.T)
+    assert similar.min() >= 0
+    assert not similar.diagonal().any()
+    np.testing.assert_allclose(fuse(squares[:, order[:, None], order]), similar[order[:, None], order], rtol=1e-9)
+
+
+@given(seed=seeds, factor=st.sampled_from([1e-3, 0.3, 50.0]))
+@quick
+def test_the_unit_of_a_representation_does_not_matter(seed, factor):
+    squares = squares_of(points(seed)[0], points(seed + 1)[0])
+    scaled = squares * np.array([1.0, factor**2])[:, None, None]
+    np.testing.assert_allclose(fuse(scaled), fuse(squares), rtol=1e-9)
+
+
+def test_a_dense_and_a_loose_cluster_are_both_found():
+    """Widths are those of each neighborhood: the loose one is 30 times as wide."""
+    rng = np.random.default_rng(0)
+    x = np.concatenate((rng.normal(size=(40, 2)), 30 * rng.normal(size=(40, 2)) + [250.0, 0.0]))
+    similar = fuse(squares_of(x, x))
+    assert count_by_eigengap(similar) == 2
+    assert adjusted_rand_score(np.repeat([0, 1], 40), spectral(similar, 2)) == 1.0
+
+
+def test_what_is_near_in_one_representation_or_the_other_is_connected():
+    """Four pieces in a ring: each representation connects other neighbors, and both together all of them."""
+    rng = np.random.default_rng(0)
+    piece = np.repeat(np.arange(8), 12)  # two rings of four
+    ring, k = np.divmod(piece, 4)
+    there = rng.normal(size=(96, 2))
+    first = there + 20.0 * np.stack((k // 2, 6 * ring), axis=1)
+    second = there[::-1] + 20.0 * np.stack(((k + 1) % 4 // 2, 6 * ring), axis=1)
+    similar = fuse(squares_of(first, second))
+    assert adjusted_rand_score(ring, spectral(similar, 2)) == 1.0
+
+
+@pytest.mark.parametrize("c", [2, 3, 7])
+def test_as_many_clusters_as_nothing_connects(c):
+    which = np.repeat(np.arange(c), 6)
+    similar = (which[:, None] == which) * 1.0 - np.eye(6 * c)
+    assert count_by_eigengap(similar + 1e-6) == c
+    assert adjusted_rand_score(which, spectral(similar + 1e-6, c)) == 1.0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6, 9])
+def test_exactly_as_many_proposals_as_are_asked_for(count):
+    """Although some clusters of the first cut are too small to be proposed."""
+    demos = draw_kinds([9, 4, 7, 5, 8, 6], spread=0.3)
+    assert len(propose(demos, n_clusters=count)) == count
+
+
+@given(seed=seeds, n_clusters=st.integers(1, 12), min_members=st.integers(1, 5))
+@quick
+def test_exactly_as_many_clusters_as_are_asked_for(seed, n_clusters, min_members):
+    """Of anything: here there are none to be found."""
+    x = np.random.default_rng(seed).normal(size=(12 * 5 * 2, 3))
+    found = spectral(fuse(squares_of(x)), n_clusters, min_members)
+    sizes = np.bincount(found[found >= 0])
+    assert len(sizes) == n_clusters
+    assert sizes.min() >= min_members
+
+
+def test_more_proposals_than_there_are_movements_for_are_not_made():
+    demos = draw_kinds([5, 6])
+    assert 2 <= len(propose(demos, n_clusters=11)) <= 3
+
+
+@pytest.mark.parametrize(("ratio", "n"), [(4.5, 1), (5.5, 2)])
+def test_groups_are_five_times_the_usual_distance_to_a_neighbor_apart(ratio, n):
+    """Between neighbors it is 2 on this line: the second nearest of one inside is at 1, at its ends at 2."""
+    line = np.concatenate((np.arange(10.0), 9 + ratio + np.arange(10.0)))[:, None]
+    assert groups(squares_of(line)).max() + 1 == n
+
+
+def test_only_small_groups_are_set_apart():
+    similar, group = np.ones((20, 20)), np.repeat([0, 1], [13, 7])
+    apart = group[:, None] != group
+    found = set_apart(similar, group)
+    assert (found[~apart] == 1).all()
+    assert (found[apart] < 0.01).all()
+    np.testing.assert_array_equal(set_apart(similar, np.repeat([0, 1], [12, 8])), similar)
+
+
+def test_rare_clusters_and_single_movements_are_told_from_a_large_one():
+    demos = draw_kinds([80, 3, 60, 1], spread=0.04)
+    proposals = propose(demos)
+    assert [len(one) for one in proposals.proposals] == [80, 60, 3]
+    assert proposals.left_over.tolist() == [143]
+
+
+def test_the_forcing_term_is_left_out_where_pairs_are_compared():
+    demos = draw_kinds([4, 4])
+    assert by_shape(describe(demos).take([0, 3, 5])).n_representations == 4
+    by_rows = describe(demos, ComparisonSpecification(representations=ROW_REPRESENTATIONS))
+    assert by_shape(by_rows) is by_rows
+
+
+def test_representations_in_which_nothing_differs_are_left_out():
+    x = points(0)[0]
+    one, both = squares_of(x, x), squares_of(x, x, np.zeros_like(x))
+    np.testing.assert_array_equal(fuse(both), fuse(one))
+    np.testing.assert_array_equal(groups(both), groups(one))
+
+
+def draw_people(n_classes, n_people, each, seed, own=0.15, spread=0.04):
+    """Movements of people, each of whom has an own way of every class, four times as different as repetitions are."""
+    rng, shape = np.random.default_rng(seed), (n_classes, n_people, each, 2, 5)
+    sines = np.sin(np.pi * np.linspace(0, 1, 60) * np.arange(1, 6)[:, None])
+    classes, ways, repeats = (rng.normal(size=(*shape[:k], *(1,) * (3 - k), 2, 5)) for k in (1, 2, 3))
+    paths = ((classes + own * ways + spread * repeats) / np.arange(1, 6) ** 0.5) @ sines
+    return Demonstrations.from_arrays(
+        paths.reshape(-1, 2, 60).transpose(0, 2, 1), np.repeat(np.arange(n_classes).astype(str), n_people * each)
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_as_many_classes_as_are_asked_for_are_found_across_people(seed):
+    demos = draw_people(6, 4, 5, seed)
+    assert recovered(demos.labels, propose(demos, n_clusters=6)) == 1.0
+
+
+@pytest.fixture(scope="module")
+def digits():
+    """Digits that five people drew in the air, and who."""
+    path = FOLDER / "gestures3d.npz"
+    if not path.is_file():
+        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
+    data = load_data(str(path))
+    chosen = np.flatnonzero(np.char.isdigit(np.asarray(data.demonstrations.labels, dtype=str)))
+    return data.demonstrations[chosen], np.asarray(data.people)[chosen]
+
+
+def test_digits_of_five_people_are_ten_clusters(digits):
+    """By themselves one more or less, 20 to 40 when people are not connected; all right if ten are asked for."""
+    demos, _ = digits
+    proposals = propose(demos)
+    assert 9 <= len(proposals) <= 11
+    assert recovered(demos.labels, proposals) >= 0.95
+    assert recovered(demos.labels, propose(demos, n_clusters=10)) >= 0.99
+
+
+def test_digits_of_one_person_are_ten_clusters(digits):
+    demos, people = digits
+    for person in np.unique(people):
+        own = demos[np.flatnonzero(people == person)]
+        assert recovered(own.labels, propose(own)) >= 0.95
+
+
+def test_neighborhoods_are_few_and_many():
+    """Few alone split people, and many alone merge small classes; the page of `fuse` names the numbers."""
+    assert fusion.NEIGHBORS == (7, 15)
+    squares = squared_distances(*(2 * (by_shape(describe(draw_kinds([4, 5, 3]))),)))
+    assert fuse(squares).shape == (12, 12)

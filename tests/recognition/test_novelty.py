@@ -1,0 +1,230 @@
+"""Novelty over all classes decides what is unknown: valid where movements are exchangeable, by group where given."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi
+
+from kineme import Recognizer, TrajectoryError
+from kineme.comparison.described import Described
+from kineme.comparison.references import References
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.kernels.procrustes import Prepared, Procrustes
+from kineme.recognition.confidence import class_probabilities
+from kineme.recognition.conformal import Calibration, calibrate
+from kineme.recognition.left_out import ClassDistances, law
+from movement_samples import draw_shapes
+
+ROOT = Path(__file__).parents[2]
+SHOWN = ("known called unknown", "unknown rejected")
+SAME_PLACE = Procrustes(1, 0.0)  # rows are compared as they are
+SIMILARITY = AveragedSimilarity(SAME_PLACE, np.ones(1))
+
+
+def _described(points):
+    return Described((Prepared(points, (points**2).sum(axis=1)),), SAME_PLACE)
+
+
+def _calibration(points, labels, groups=None):
+    not_asked_for = draw_shapes([1])
+    return calibrate(SIMILARITY, References.of(not_asked_for, _described(points), labels), groups)
+
+
+def _asked(points, labels, asked):
+    logs = SIMILARITY.log_average(_described(asked), _described(points))
+    return np.maximum.reduceat(logs, np.unique(labels, return_index=True)[1], axis=1)
+
+
+def _drawn(rng, n_classes, n_shown, n_dims, apart=3.0, n_people=0):
+    """Points of classes around centers, by people whose own centers differ; templates, and as many new ones."""
+    centers = apart * rng.normal(size=(n_classes, 1, n_dims))
+    labels = np.repeat(np.arange(n_classes), n_shown)
+    if not n_people:
+        return labels, *((centers + rng.normal(size=(n_classes, n_shown, n_dims))).reshape(-1, n_dims) for _ in "ab")
+    habits = centers + rng.normal(size=(n_classes, n_people + n_shown, n_dims))  # the last are of people not shown
+    of = np.arange(n_shown) % n_people
+    points, asked = habits[:, of], habits[:, n_people:]
+    points, asked = (each + 0.2 * rng.normal(size=each.shape) for each in (points, asked))
+    return labels, points.reshape(-1, n_dims), asked.reshape(-1, n_dims)
+
+
+def _called_unknown(n_classes, n_shown, n_dims, seeds, rate=0.05, n_people=0, grouped=False):
+    """Share of new movements of known classes that are called unknown."""
+    shares = []
+    for seed in seeds:
+        labels, points, asked = _drawn(np.random.default_rng(seed), n_classes, n_shown, n_dims, n_people=n_people)
+        groups = np.arange(len(labels)) % n_shown % n_people if grouped else None
+        calibration = _calibration(points, labels, groups)
+        shares.append(np.mean(calibration.known_p_values(_asked(points, labels, asked), rate) <= rate))
+    return np.mean(shares)
+
+
+@pytest.mark.parametrize("n_dims", [4, 8, 16])
+@pytest.mark.parametrize(("n_classes", "n_shown"), [(20, 2), (10, 4), (10, 8), (5, 20)])
+def test_of_exchangeable_movements_the_error_rate_is_kept_and_used(n_classes, n_shown, n_dims):
+    """Whether two or twenty calibrate a class; rates of 0.05 that calibrating scores can tell, averaged over draws."""
+    assert 0.02 <= _called_unknown(n_classes, n_shown, n_dims, range(60)) <= 0.07
+
+
+@pytest.mark.parametrize("n_dims", [4, 16])
+def test_class_p_values_are_valid(n_dims):
+    shares = []
+    for seed in range(60):
+        labels, points, asked = _drawn(np.random.default_rng(seed), 10, 4, n_dims)
+        p = _calibration(points, labels).p_values(_asked(points, labels, asked), 0.1)[np.arange(40), labels]
+        shares.append(np.mean(p <= 0.1))
+    assert np.mean(shares) <= 0.11
+
+
+def test_fewer_scores_than_the_error_rate_needs_follow_the_law_of_their_mean():
+    assert 0.03 <= _called_unknown(4, 3, 8, range(200)) <= 0.1  # 12 scores, and 19 are needed
+    np.testing.assert_allclose(law(np.array([0.5, 1.0, 1.44])), chi.sf(np.array([0.5, 1.0, 1.44]) * chi.mean(8), 8))
+
+
+@pytest.mark.parametrize("n_shown", [4, 8])
+def test_of_other_people_the_error_rate_is_kept_by_groups_alone(n_shown):
+    """Each shows a movement twice; new people do not do it as any of those who showed it."""
+    shown = {"n_classes": 10, "n_shown": n_shown, "n_dims": 8, "seeds": range(40), "n_people": n_shown // 2}
+    assert _called_unknown(**shown) >= 0.4
+    assert 0.02 <= _called_unknown(**shown, grouped=True) <= 0.08
+
+
+def test_copies_within_a_group_are_never_compared():
+    labels, points, _ = _drawn(np.random.default_rng(0), 6, 3, 4)
+    twice, groups = np.repeat(points, 2, axis=0), np.repeat(np.arange(18), 2)
+    grouped, plain = (_calibration(twice, np.repeat(labels, 2), each) for each in (groups, None))
+    for scores in ("pooled", "pooled_novelties"):
+        assert getattr(plain, scores)[0].max() < 1e-3
+        assert getattr(grouped, scores)[0].min() > 0.1
+
+
+def test_one_group_of_all_is_no_group():
+    labels, points, asked = _drawn(np.random.default_rng(0), 6, 4, 4)
+    plain, one = _calibration(points, labels), _calibration(points, labels, np.zeros(24, dtype=np.intp))
+    logs = _asked(points, labels, asked)
+    np.testing.assert_array_equal(plain.known_p_values(logs, 0.05), one.known_p_values(logs, 0.05))
+
+
+def test_a_class_shown_by_one_person_is_calibrated_by_the_others():
+    labels, points, asked = _drawn(np.random.default_rng(0), 8, 4, 4)
+    groups = np.arange(32) % 4
+    groups[:4] = 0
+    calibration = _calibration(points, labels, groups)
+    assert len(calibration.pooled_novelties[0]) == 28
+    assert calibration.calibrated(0.05).all()
+    assert np.isfinite(calibration.known_p_values(_asked(points, labels, asked), 0.05)).all()
+
+
+@given(seed=st.integers(0, 10**6), grouped=st.booleans())
+def test_the_order_of_demonstrations_does_not_matter(seed, grouped):
+    rng = np.random.default_rng(seed)
+    labels, points, asked = _drawn(rng, 6, 4, 4)
+    groups = np.arange(24) % 4 if grouped else None
+    order = np.concatenate([rng.permutation(4) + 4 * c for c in range(6)])
+    one = _calibration(points, labels, groups)
+    other = _calibration(points[order], labels, None if groups is None else groups[order])
+    for rate in (0.05, 0.01):  # pooled; too few
+        p, q = (each.known_p_values(_asked(points, labels, asked), rate) for each in (one, other))
+        np.testing.assert_allclose(p, q, rtol=1e-6)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_the_larger_the_error_rate_the_more_is_unknown(seed):
+    """As long as the same rule speaks; and what is farther from all classes is not less unknown."""
+    labels, points, asked = _drawn(np.random.default_rng(seed), 6, 4, 4)
+    calibration, logs = _calibration(points, labels), _asked(points, labels, asked)
+    for rates in ((0.04, 0.1, 0.15), (0.001, 0.01, 0.03)):
+        found = np.array([calibration.known_p_values(logs, rate) <= rate for rate in rates])
+        assert len({tuple(calibration.rules(logs, rate)) for rate in rates}) == 1
+        assert (np.diff(found.astype(int), axis=0) >= 0).all()
+        order = np.argsort(calibration.scores(logs).min(axis=1))
+        assert (np.diff(calibration.known_p_values(logs, rates[0])[order]) <= 0).all()
+
+
+def test_people_make_the_guess_from_one_demonstration_look_farther():
+    """The whole way to another class, instead of three quarters."""
+    labels, points, _ = _drawn(np.random.default_rng(0), 6, 1, 4)
+    one, several = (_calibration(points, labels, groups) for groups in (None, np.arange(6) % 3))
+    np.testing.assert_allclose(one.scales / several.scales, 0.75)
+
+
+def test_nearest_of_the_next_others_in_a_circle():
+    away = np.array([[np.inf, 3.0, 1.0, 2.0], [3.0, np.inf, np.inf, 5.0], [np.inf] * 4])
+    block = ClassDistances(away, np.array([0, 1, 2]))
+    first, second, which = block.nearest(2)
+    np.testing.assert_array_equal(first, [1.0, 3.0, np.inf])
+    np.testing.assert_array_equal(second, [3.0, 5.0, np.inf])
+    np.testing.assert_array_equal(which[:2], [2, 0])
+    np.testing.assert_array_equal(block.counted(9), [3, 2, 0])
+
+
+def test_groups_of_a_recognizer_reach_its_calibration_whatever_the_order():
+    demos = draw_shapes([6] * 5, seed=1, spread=0.2)
+    people = np.tile(["ann", "bob", "cid"], 10)
+    shuffled = np.random.default_rng(0).permutation(30)
+    plain, one = Recognizer().fit(demos), Recognizer().fit(demos, groups=people)
+    other = Recognizer().fit(demos[shuffled], groups=people[shuffled].tolist())
+    np.testing.assert_allclose(np.sort(one.calibration().pooled[0]), np.sort(other.calibration().pooled[0]), rtol=1e-4)
+    assert one.calibration().scales.mean() > plain.calibration().scales.mean()  # fewer to be near to
+
+
+@pytest.mark.parametrize("groups", [["ann"], [["ann"] * 4], "ann"])
+def test_groups_are_one_for_each_movement(groups):
+    with pytest.raises(TrajectoryError, match=r"expected groups to be one name or number for each of the 4 movements"):
+        Recognizer().fit(draw_shapes([2, 2]), groups=groups)
+
+
+def test_groups_have_an_order():
+    with pytest.raises(TrajectoryError, match="expected groups that are texts or numbers"):
+        Recognizer().fit(draw_shapes([2, 2]), groups=np.array(["ann", 1, None, "bob"], dtype=object))
+
+
+def test_a_recognizer_of_an_earlier_version_is_calibrated_again():
+    demos = draw_shapes([5] * 5, seed=1)
+    recognizer, asked = Recognizer().fit(demos), draw_shapes([1] * 5, seed=1, spread=0.3)
+    expected = recognizer.predict_known(asked)
+    old = recognizer.calibration()
+    bare = object.__new__(Calibration)
+    vars(bare).update(scales=old.scales, own=old.own, pooled=old.pooled)
+    del recognizer._groups
+    recognizer._calibration = bare
+    np.testing.assert_array_equal(recognizer.predict_known(asked), expected)
+    assert recognizer.calibration().own_novelties is not None
+
+
+def test_probabilities_are_right_where_neighbors_are_drawn_evenly():
+    """Two classes that are equally dense where the movement is, in fifteen dimensions: as often one as the other."""
+    logs = -0.5 * np.array([[1.0, 1.0, 1e6], [1.0, 4.0, 1e6], [0.0, 1.0, 1e6], [0.0, 0.0, 1e6]])
+    p = class_probabilities(logs)
+    np.testing.assert_allclose(p.sum(axis=1), 1.0)
+    np.testing.assert_allclose(p[:2, 0], [0.5, 1 / (1 + 2.0**-15)])
+    np.testing.assert_allclose(p[2:, 0], [1.0, 0.5])
+
+
+TABLE = {
+    "LASA, strongly": "LASA, all strongly",
+    "letters2d": "letters by one person",
+    "gestures3d, same person": "gestures, same person",
+    "gestures3d, other people": "gestures, other people",
+}
+
+
+def test_the_page_shows_what_was_measured():
+    """docs/recognition.md against bench/results/open_set.json."""
+    rows = json.loads((ROOT / "bench" / "results" / "open_set.json").read_text())["rows"]
+    measured = {row["what"]: row["ours"] for row in rows}
+    page = " ".join((ROOT / "docs" / "recognition.md").read_text(encoding="utf-8").split())
+    for name, title in TABLE.items():
+        found = [[measured.get(f"{name}, {n} shown: {what}") for what in SHOWN] for n in (1, 2, 4, 8)]
+        cells = ["-" if known is None else f"{known:.0f} % / {unknown:.0f} %" for known, unknown in found]
+        assert f"| {title} | {' | '.join(cells)} |" in page
+        for k, cell in enumerate(found):
+            assert cell[0] is None or cell[0] <= (8.0 if k else 15.0)
+    errors = [measured[f"{name}: expected calibration error"] for name in (*list(TABLE)[2:], "LASA, severely")]
+    assert "expected calibration error is {:.3f}, {:.3f} and {:.3f}".format(*errors) in page
