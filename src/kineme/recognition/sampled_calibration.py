@@ -21,32 +21,20 @@ _CALIBRATED = 100  # movements of a class, at most
 _BUDGET = 4000  # movements in all, as far as four of each class allow
 _FEWEST = 4
 _SIZES = np.array([1, 2, 3, 4, 6, 8, 12, 16])  # classes of up to 16 are compared with others cut to as many, or less
-<<<<<<< HEAD
 _NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times in ten, else one 5 to 8 % farther
 _TOGETHER = 4  # movements in one product
-_IMPOSTORS = 64  # by their bounds, compared exactly: bounds leave out what is compared pair by pair
-=======
-_NEAREST = 4  # by their bounds, compared exactly
 _MORE = 16  # the same among all, where shapes differ
->>>>>>> main
 _AT_ONCE = 64  # classes whose movements are read together
 
 
 def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """The `Calibration` of movements that are stored elsewhere.
 
-<<<<<<< HEAD
-    As `conformal.calibrate`, with three differences: up to a hundred movements of a class calibrate it, but only about
-    4000 in all and of a thousand classes, so that above 200 classes the scores of all classes count; classes of
-    more than 16 are compared as if they were equally large; and the nearest movement is the nearest of the
-    eight with the largest bounds. Distances are to the whole class, not to the sample.
-=======
     As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
     compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a class
     calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores of all
     classes count; classes of more than 16 are compared as if they were equally large; and the nearest movement is the
-    nearest of the four with the largest bounds. Distances are to the whole class, not to the sample.
->>>>>>> main
+    nearest of the eight with the largest bounds. Distances are to the whole class, not to the sample.
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
@@ -135,11 +123,7 @@ def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Arra
     asked = evenly_spaced(len(stored.members), _CALIBRATED)
     bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
     bounds[np.arange(len(asked)), asked] = -np.inf
-<<<<<<< HEAD
-    n_near = min(_IMPOSTORS, bounds.shape[1] - 1)
-=======
     n_near = max(1, min(_MORE, len(stored.members) - 1))
->>>>>>> main
     near = np.argpartition(-bounds, n_near - 1, axis=1)[:, :n_near]
     found = np.empty(len(asked))
     for i, rows in enumerate(near):
