@@ -203,7 +203,7 @@ def _envelope(values: Array, band: int) -> tuple[Array, Array]:
     return low, high
 
 
-_NO_LENGTH = 1e-9  # of a movement of size 1: a shorter vector is the rounding error of positions
+_NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding error of positions in single precision
 
 
 def _unit(vectors: Array) -> Array:
