@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.comparison.describe import describe_tile, feature_rows
+from kineme.comparison.describe import describe, describe_rows, describe_tile, feature_rows
 from kineme.kernels.procrustes import as_complex
 from kineme.runtime.compiled import CHOICES
 
@@ -31,3 +31,13 @@ def test_movements_far_from_the_origin_keep_the_digits_of_their_forcing_term():
     described = describe_tile(far, 0, len(far), how, how.procrustes(2)).described
     for block, rows in zip(described.blocks, feature_rows(far, how), strict=True):
         assert np.array_equal(block.rows, as_complex(rows.astype(np.float32)))
+
+
+def test_rows_stored_in_single_precision_say_exactly_the_same():
+    """The nearest point of a cloud, and so its distance, may jump with the last digit."""
+    demos = kineme.load_lasa()[::9]
+    how = kineme.Recognizer().specification
+    stored = np.concatenate(feature_rows(demos, how), axis=1).astype(np.float32)
+    back, given = describe_rows(stored, 2, how), describe(demos, how)
+    for name, array in given.pairs.shapes.arrays().items():
+        np.testing.assert_array_equal(back.pairs.shapes.arrays()[name], array)

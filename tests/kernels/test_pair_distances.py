@@ -216,6 +216,14 @@ def test_movements_without_direction_have_no_tangents_and_no_turning_angles():
     assert set(np.linalg.norm(rest.tangents[0], axis=1).round(6)) == {0.0, 1.0}
 
 
+def test_a_reversal_has_no_tangent_whatever_the_rounding_of_its_positions():
+    there_and_back = np.abs(np.arange(20) - 10.0)
+    noisy = there_and_back + 1e-6 * np.random.default_rng(0).normal(size=(50, 1, 20))
+    shapes = shapes_of(sized(noisy).astype(np.float32))
+    assert not shapes.point_tangents[:, 10].any()
+    assert (np.abs(shapes.point_tangents[:, 9]) == 1).all()
+
+
 def test_values_of_a_hundred_samples_are_every_third():
     a = paths(2, 3)
     ends = a[:, :, ::3].transpose(0, 2, 1)

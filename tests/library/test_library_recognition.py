@@ -13,6 +13,8 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.recognition import sampled_calibration
+from kineme.recognition.conformal import distances
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):
@@ -100,6 +102,23 @@ def test_large_classes_keep_the_error_rate(make):
     labels = kinds.labels[known[640:]]
     assert np.mean([a.label in {None, name} for a, name in zip(answers, labels, strict=True)]) == 1
     assert 0.03 < np.mean([a.label is None for a in answers]) < 0.2
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_calibration_finds_the_nearest_of_a_large_class(make, d):
+    """Or one hardly farther: bounds leave out what is compared pair by pair, so the few with the best are compared."""
+    library = make(_kinds([400, 5], d, seed=7, spread=0.1))
+    model = LibraryRecognizer(library.store, exhaustive=0).model()
+    stored, similarity = model.stored, model.comparison.similarity
+    asked = sampled_calibration._rows(stored, 0)[::4]
+    others = sampled_calibration._proposed(similarity, stored, 0, asked)
+    own = stored.described(similarity, asked)
+    found = sampled_calibration._to_own(similarity, own, stored.described(similarity, others.ravel()))
+    every = np.setdiff1d(sampled_calibration._rows(stored, 0), asked)
+    nearest = distances(similarity.log_average(own, stored.described(similarity, every))).min(axis=1)
+    assert (found >= nearest - 1e-4).all()
+    assert found.mean() < 1.012 * nearest.mean()
+    assert np.mean(found < nearest + 1e-4) > 0.85
 
 
 def _flip(path, where):

@@ -109,6 +109,11 @@ def test_arrays_without_time_stamps_have_no_duration_to_compare():
     assert [one.label for one in found if one.label is not None] == ["WShape", "CShape"]
 
 
+def _stretched(movements, factor):
+    """The movements, slower by a factor, without labels."""
+    return Demonstrations([Trajectory(factor * one.times, one.positions) for one in movements])
+
+
 def _counts(rests, known=True, stretched=1.0):
     """Spots in concatenated recordings of demonstrations not trained on, of eight classes."""
     shapes = [*KNOWN, "GShape", "Zshape", "PShape", "Trapezoid"]
@@ -120,7 +125,7 @@ def _counts(rests, known=True, stretched=1.0):
     for _ in range(3):
         chosen = [i for i in rng.permutation(held_out).tolist() if not known or demos.labels[i] in shapes][:9]
         labels = [demos.labels[i] if demos.labels[i] in shapes else None for i in chosen]
-        movements = Demonstrations([Trajectory(stretched * one.times, one.positions) for one in demos[chosen]])
+        movements = _stretched(demos[chosen], stretched)
         recording, truth, _ = concatenate(movements, labels, rng, rests=rests)
         found = found + count_spotted(recognizer.spot(recording), truth)
     return found
@@ -138,6 +143,21 @@ def test_a_recording_may_be_faster_or_slower_than_what_was_demonstrated(stretche
     found = _counts(True, stretched=stretched)
     assert found.recall >= 0.95
     assert found.precision >= 0.9
+
+
+def test_the_tempo_of_a_recording_is_estimated_from_what_is_found(monkeypatch):
+    """Of two classes that differ in duration alone, the order stays where all is slower."""
+    short = kineme.load_lasa(["CShape"])
+    long = _stretched(short, 2.0)
+    others = kineme.load_lasa(["NShape", "Sshape"])
+    train = _stretched([*short[:3], *long[:3], *others[[0, 1, 2, 7, 8, 9]]], 1.0)
+    recognizer = Recognizer().fit(train, ["short"] * 3 + ["long"] * 3 + ["N"] * 3 + ["S"] * 3)
+    slower = [(short[4], "short"), (others[4], "N"), (long[5], "long"), (others[11], "S"), (others[5], "N")]
+    movements = _stretched([one for one, _ in slower], 1.6)
+    recording, truth, _ = concatenate(movements, [label for _, label in slower], np.random.default_rng(0))
+    assert count_spotted(recognizer.spot(recording), truth) == Counts(5, 5, 5)
+    monkeypatch.setattr("kineme.recognition.spotting._PASSES", 1)
+    assert count_spotted(recognizer.spot(recording), truth).n_right < 5
 
 
 def test_the_best_chain_is_that_of_all_chains():

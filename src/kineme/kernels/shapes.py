@@ -186,7 +186,7 @@ def _even(paths: Array, n: int) -> Array:
     return np.asarray(x[:, before] * (1 - share)[:, None] + x[:, before + 1] * share[:, None])
 
 
-_NO_LENGTH = 1e-9  # of a movement of size 1: a shorter vector is the rounding error of positions
+_NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding error of positions in single precision
 
 
 def _unit(vectors: Array) -> Array:

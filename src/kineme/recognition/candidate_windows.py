@@ -21,7 +21,7 @@ from kineme.validation import Array
 MIN_SAMPLES = 8  # of a window
 N_POINTS = 64  # even samples by which a window is described
 _RESOLUTION = 0.04  # share of the peak speed that must be distinguished from rest
-_SHARE = 0.16  # distance of boundaries, in durations of the shortest windows between them
+_SHARE = 0.12  # distance of boundaries, in durations of the shortest windows between them
 _DEPTH = 0.2  # prominence, in the logarithm of speed, of a minimum that is a boundary
 _FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
 _SLOW = 0.02  # share of the peak speed below which a sample counts as at rest
@@ -97,15 +97,18 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
     motion = observe(recording, _RESOLUTION)
     rest = Rest()
     bouts = moving(motion, rest.pieces(motion), rest.resolution)
+    if not len(bouts):
+        return Windows(motion, bouts, bouts)
     t = motion.times
     least, most = durations or _unknown_durations(motion, bouts)
     least = max(least, MIN_SAMPLES * float(np.median(np.diff(t))))
     most = min(max(most, least), float(t[-1] - t[0]))
     rows = [np.empty((0, 2), dtype=np.intp)]
-    for level in range(max(1, math.ceil(math.log2(max(most / least, 1.0)) - 1e-9))):
+    n_levels = max(1, math.ceil(math.log2(most / least) - 1e-9))
+    for level in range(n_levels):
         shortest = least * 2.0**level
-        at = _boundaries(motion, bouts, _SHARE * shortest)
-        rows.append(_between(at, t, shortest, min(2.0 * shortest, most * (1 + 1e-9))))
+        longest = 2.0 * shortest if level < n_levels - 1 else most * (1.0 + 1e-9)
+        rows.append(_between(_boundaries(motion, bouts, _SHARE * shortest), t, shortest, longest))
     found = np.unique(np.concatenate(rows), axis=0)
     around = surroundings(motion, bouts, found)
     return Windows(motion, bouts, found[(around.at_rest <= _MOST_REST) & (around.rests_inside < most_bouts)])
@@ -113,8 +116,6 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
 
 def _unknown_durations(motion: Motion, bouts: Rows) -> Durations:
     """From the stretches between rests."""
-    if not len(bouts):
-        return Durations(np.inf, np.inf)
     typical = float(np.median(motion.times[bouts[:, 1] - 1] - motion.times[bouts[:, 0]]))
     return Durations(0.25 * typical, 4.0 * typical)
 
@@ -193,15 +194,3 @@ def resampled(motion: Motion, start: Array, end: Array) -> Movements:
     positions = x[below] * (1.0 - weight) + x[below + 1] * weight
     offsets: NDArray[np.intp] = np.arange(len(start) + 1) * N_POINTS
     return Movements(np.ascontiguousarray(positions), offsets, np.asarray(end - start))
-
-
-def moved(motion: Motion, rows: Rows, share: float) -> Rows:
-    """Windows with one end earlier or later by a share of the duration, (4, n, 2); one that gets too short stays."""
-    t = motion.times
-    step = share * (t[rows[:, 1]] - t[rows[:, 0]])
-    found = np.repeat(rows[None], 4, axis=0)
-    for i, (end, sign) in enumerate(((0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0))):
-        found[i, :, end] = np.clip(np.searchsorted(t, t[rows[:, end]] + sign * step), 0, len(t) - 1)
-    short = found[:, :, 1] - found[:, :, 0] < MIN_SAMPLES - 1
-    found[short] = np.broadcast_to(rows, found.shape)[short]
-    return found

@@ -301,8 +301,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         with all demonstrations. They start and end at rests, at minima of speed and, where these are far apart, at even
         times. Chosen is the chain of windows that do not overlap with the largest summed score; a window scores its
         duration, less the more it differs from the class: in the averaged kernel, and in duration and size, given the
-        tempo and the size of the whole recording, which are estimated from what is found. Then its ends are moved to
-        where it fits best.
+        tempo and the size of the whole recording, which are estimated from what is found.
 
         Parameters
         ----------

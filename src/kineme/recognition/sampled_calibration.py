@@ -21,7 +21,8 @@ _CALIBRATED = 100  # movements of a class, at most
 _BUDGET = 4000  # movements in all, as far as four of each class allow
 _FEWEST = 4
 _SIZES = np.array([1, 2, 3, 4, 6, 8, 12, 16])  # classes of up to 16 are compared with others cut to as many, or less
-_NEAREST = 4  # by their bounds, compared exactly
+_NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times in ten, else one 5 to 8 % farther
+_TOGETHER = 4  # movements in one product
 _MORE = 16  # the same among all, where shapes differ
 _AT_ONCE = 64  # classes whose movements are read together
 
@@ -33,7 +34,7 @@ def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -
     compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a class
     calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores of all
     classes count; classes of more than 16 are compared as if they were equally large; and the nearest movement is the
-    nearest of the four with the largest bounds. Distances are to the whole class, not to the sample.
+    nearest of the eight with the largest bounds. Distances are to the whole class, not to the sample.
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
@@ -93,14 +94,14 @@ def _measured(
 
 
 def _to_own(similarity: AveragedSimilarity, asked: Described, others: Described) -> Array:
-    """Distance of each movement to the nearest of its own four others; a few movements in one product."""
+    """Distance of each movement to the nearest of its own eight others; a few movements in one product."""
     nearest = np.empty(len(asked))
-    for start in range(0, len(nearest), _NEAREST):
-        some = asked.take(slice(start, start + _NEAREST))
-        theirs = others.take(slice(_NEAREST * start, _NEAREST * (start + _NEAREST)))
+    for start in range(0, len(nearest), _TOGETHER):
+        some = asked.take(slice(start, start + _TOGETHER))
+        theirs = others.take(slice(_NEAREST * start, _NEAREST * (start + _TOGETHER)))
         k = np.arange(len(some))
         away = distances(similarity.log_average(some, theirs)).reshape(len(k), len(k), _NEAREST)
-        nearest[start : start + _NEAREST] = away[k, k].min(axis=1)
+        nearest[start : start + _TOGETHER] = away[k, k].min(axis=1)
     return nearest
 
 
@@ -109,7 +110,7 @@ def _rows(stored: StoredReferences, c: int) -> Rows:
 
 
 def _proposed(similarity: AveragedSimilarity, stored: StoredReferences, c: int, asked: Rows) -> Rows:
-    """For each row asked, (k, 4) others of a large class, nearest by their bounds, that are not asked themselves."""
+    """For each row asked, (k, 8) others of a large class, nearest by their bounds, that are not asked themselves."""
     if stored.counts[c] <= _CALIBRATED + _SIZES[-1]:
         return np.empty((len(asked), 0), dtype=np.intp)
     own = np.setdiff1d(_rows(stored, c), asked)

@@ -27,7 +27,6 @@ from kineme.recognition.window_scores import (
     expected,
     manner_of,
     score_windows,
-    with_moved_ends,
 )
 from kineme.validation import Array, check_count
 
@@ -109,11 +108,6 @@ def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, ND
         manner = manner_of(compared, typical, chosen, scored.best)
     scored = score_windows(compared, typical, around, manner, error_rate)
     chosen = _best_windows(compared.rows, scored)
-    if chosen:
-        compared = with_moved_ends(known, motion, compared, chosen, scored.best)
-        around = surroundings(motion, windows.bouts, compared.rows)
-        scored = score_windows(compared, typical, around, manner, error_rate)
-        chosen = _best_windows(compared.rows, scored)
     rows = compared.rows[chosen]
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), scored.best[chosen]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +16,11 @@ from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.motion import Motion
 from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.candidate_windows import N_POINTS, Surroundings, moved, resampled
+from kineme.recognition.candidate_windows import N_POINTS, Surroundings, resampled
 from kineme.recognition.conformal import Calibration
 from kineme.validation import Array
 
 _TILE = 4096  # windows described at a time
-_MOVES = (0.06, 0.03)  # by which shares of its duration the ends of a window are moved
 _REACH = 0.975  # nonconformity at which a window counts as far, in that which members exceed at the error rate
 _TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
@@ -131,24 +130,6 @@ def compare_windows(known: Known, motion: Motion, rows: Rows) -> Compared:
         sizes[tile], slowness[tile] = _size_and_slowness(paths)
         scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, nearest)[0])
     return Compared(rows, scores, np.log(end - start), sizes, slowness)
-
-
-def with_moved_ends(
-    known: Known, motion: Motion, compared: Compared, chosen: list[int], best: NDArray[np.intp]
-) -> Compared:
-    """The same windows, and those chosen with their ends moved to where the nonconformity to their class is least."""
-    rows, classes, here = compared.rows[chosen], best[chosen], np.arange(len(chosen))
-    least = compared.scores[chosen, classes]
-    several = [compared]
-    for share in _MOVES:
-        candidates = moved(motion, rows, share)
-        several.append(compare_windows(known, motion, candidates.reshape(-1, 2)))
-        scores = several[-1].scores.reshape(4, len(chosen), -1)[:, here, classes]
-        which = scores.argmin(axis=0)
-        better = scores[which, here] < least
-        rows = np.where(better[:, None], candidates[which, here], rows)
-        least = np.minimum(least, scores[which, here])
-    return Compared(*(np.concatenate([getattr(one, field.name) for one in several]) for field in fields(Compared)))
 
 
 def score_windows(

@@ -89,3 +89,17 @@ def test_an_onset_is_extrapolated_by_a_tenth_of_the_movement_at_most():
     motion = Motion(t, t[:, None], speed, 1.0, 0.0, 1e6)
     start = t[onset_rows(motion, np.array([[0, len(t)]]))[0, 0]]
     assert start == pytest.approx(5.0 - 0.1 * (t[-1] - 5.0), abs=0.02)
+
+
+@pytest.mark.parametrize(("pauses", "n"), [((0.014, 0.03, 0.014), 3), ((0.3, 0.3, 0.3), 12)])
+def test_pauses_at_corners_are_no_rests(pauses, n):
+    """Four strokes of half a second each: the longest pause counts by the movement that the shorter ones leave."""
+    times, positions, now, x = [0.0, 0.5], [0.0, 0.0], 0.5, 0.0
+    for pause in 3 * (*pauses, 0.5):
+        x += 1.0
+        times += [now + 0.5, now + 0.5 + pause]
+        positions += [x, x]
+        now += 0.5 + pause
+    t = np.arange(0.0, now, 0.002)
+    x = np.interp(t, times, positions)
+    assert len(segment(Trajectory(t, x[:, None] * [0.6, 0.8]))) == n

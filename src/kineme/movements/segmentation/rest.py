@@ -20,7 +20,8 @@ from kineme.movements.segmentation.motion import Motion
 from kineme.movements.segmentation.onset import onset_rows
 from kineme.validation import check_number
 
-_MIN_REST, _MIN_MOVEMENT = 0.02, 0.1  # of the typical duration of a movement
+_MIN_REST, _MIN_MOVEMENT = 0.035, 0.1  # of the typical duration of a movement
+_ROUNDS = 10  # at most: the typical movement gets longer with every pause that is no rest
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,9 @@ class Rest:
         Share of the recording's peak speed below which it rests. A movement that never exceeds twice this share is
         missed: lower it for recordings with both slow and fast movements.
     min_rest : float, optional
-        A shorter rest is a pause within a movement [s]; by default a fiftieth of the typical movement. Measured
-        between extrapolated ends, so that a smooth reversal is not a rest, however slow it is.
+        A shorter rest is a pause within a movement [s]; by default 0.035 of the typical movement, which
+        is as long as it is without these pauses. Measured between extrapolated ends, so that a smooth reversal is not a
+        rest, however slow it is.
     min_movement : float, optional
         A shorter movement is a twitch within a rest [s]; by default a tenth of the typical movement.
 
@@ -85,8 +87,19 @@ class Rest:
             return np.array([[0, len(motion.times)]]), np.array([True])
         # A rest is measured between extrapolated ends: a smooth reversal is no rest, however long it is slow.
         bouts = onset_rows(motion, consecutive((bouts[:-1, 1] + bouts[1:, 0]) // 2, len(motion.times)))
-        typical = typical_duration(durations_of(bouts, motion.times))
-        bouts = merge_across(bouts, motion.times, _MIN_REST * typical if self.min_rest is None else self.min_rest)
+        bouts = self._without_pauses(bouts, motion)
         lasting = durations_of(bouts, motion.times)
         least = _MIN_MOVEMENT * typical_duration(lasting) if self.min_movement is None else self.min_movement
         return bouts, lasting >= least
+
+    def _without_pauses(self, bouts: Rows, motion: Motion) -> Rows:
+        """Bouts merged across pauses."""
+        if self.min_rest is not None:
+            return merge_across(bouts, motion.times, self.min_rest)
+        for _ in range(_ROUNDS):
+            before = len(bouts)
+            typical = typical_duration(durations_of(bouts, motion.times))
+            bouts = merge_across(bouts, motion.times, _MIN_REST * typical)
+            if len(bouts) == before:
+                break
+        return bouts
