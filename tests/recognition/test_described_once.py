@@ -72,8 +72,7 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
     recognizer = Recognizer().fit(demos)
     recognizer.calibration()
     asked = []
-    score = "kineme.recognition.spotting.score"
-    from kineme.recognition import spotting
+    from kineme.recognition import spotting, window_scores
 
     inner = spotting.score
 
@@ -81,7 +80,8 @@ def test_a_candidate_in_a_recording_is_described_once(monkeypatch):
         asked.append(len(movements))
         return inner(comparison, references, movements, *scores)
 
-    monkeypatch.setattr(score, noted)
+    for module in (spotting, window_scores):
+        monkeypatch.setattr(module, "score", noted)
     counts = _Counts(monkeypatch)
     pieces = [demos[0].positions, np.repeat(demos[0].positions[-1:], 40, axis=0), demos[3].positions]
     positions = np.concatenate(pieces)

@@ -111,7 +111,9 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
         rows.append(_between(_boundaries(motion, bouts, _SHARE * shortest), t, shortest, longest))
     found = np.unique(np.concatenate(rows), axis=0)
     around = surroundings(motion, bouts, found)
-    return Windows(motion, bouts, found[(around.at_rest <= _MOST_REST) & (around.rests_inside < most_bouts)])
+    return Windows(
+        motion, bouts, found[(around.at_rest <= _MOST_REST) & (around.rests_inside < min(most_bouts, len(bouts)))]
+    )
 
 
 def _unknown_durations(motion: Motion, bouts: Rows) -> Durations:
