@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import special_ortho_group
 
 from kineme.errors import SpecificationError
-from kineme.kernels.pair_distances import listed_distances, pair_distances, turning_bounds
+from kineme.kernels.pair_distances import pair_distances
 from kineme.kernels.shapes import CloudSpec, ElasticSpec, shapes_of
 
 CHOICES = ("never", "always")
@@ -136,7 +136,7 @@ def test_compiled_equals_plain(d, n, m, monkeypatch):
     found = {}
     for choice in CHOICES:
         monkeypatch.setenv("KINEME_COMPILED", choice)
-        found[choice] = pair_distances(A, B, R), turning_bounds(A, B), pair_distances(A, B)
+        found[choice] = pair_distances(A, B, R), pair_distances(A, B)
     for one, other in zip(*found.values(), strict=True):
         assert one.dtype == other.dtype == np.float32
         np.testing.assert_allclose(one, other, atol=1e-5)
@@ -152,8 +152,8 @@ def test_a_batch_equals_its_members_in_any_order(d, choice):
     for i, j in ((0, 0), (4, 36), (2, 16)):
         alone = pair_distances(A.take([i]), B.take([j]), R[[i]][:, [j]])
         np.testing.assert_allclose(alone[:, 0, 0], whole[:, i, j], **exact)
-    i, j = np.divmod(np.random.default_rng(1).permutation(n * m)[:50], m)
-    np.testing.assert_allclose(listed_distances(A, B, i, j, R[i, j]), whole[:, i, j], **exact)
+    few = np.random.default_rng(1).permutation(m)[:7]  # so few are compared as a list
+    np.testing.assert_allclose(pair_distances(A, B.take(few), R[:, few]), whole[:, :, few], **exact)
 
 
 def test_rotations_are_matrices_or_cosines_and_sines_or_made_tile_by_tile(choice, monkeypatch):
@@ -162,8 +162,8 @@ def test_rotations_are_matrices_or_cosines_and_sines_or_made_tile_by_tile(choice
     expected = pair_distances(A, B, R)
     for others in (R[..., 0], lambda i, j: R[i, j], lambda i, j: R[i, j, :, 0]):
         np.testing.assert_allclose(pair_distances(A, B, others), expected, atol=1e-6)
-    i, j = np.arange(40), np.arange(40)
-    np.testing.assert_allclose(listed_distances(A, B, i, j, R[i, j, :, 0]), expected[:, i, j], atol=1e-6)
+    few = pair_distances(A, B.take(slice(0, 4)), R[:, :4, :, 0])
+    np.testing.assert_allclose(few, expected[:, :, :4], atol=1e-6)
     none = np.broadcast_to(np.eye(2), R.shape)
     np.testing.assert_allclose(pair_distances(A, B), pair_distances(A, B, none), atol=1e-6)
 
@@ -193,14 +193,19 @@ def test_equal_movements_have_a_distance_of_zero(d, choice):
     assert (squares >= 0).all()
 
 
+def own(squares):
+    """Of each movement with the one of the same number."""
+    return squares.diagonal(axis1=1, axis2=2)
+
+
 @pytest.mark.parametrize("d", [2, 3, 6])
 def test_a_rotated_movement_is_brought_back_by_its_rotation(d, choice):
     a, b, R = paths(6, d), paths(6, d, seed=1), rotations(1, 6, d)[0]
-    i = np.arange(6)
-    back = listed_distances(shapes_of(a), shapes_of(R.transpose(0, 2, 1) @ a), i, i, R)
-    np.testing.assert_allclose(back, 0, atol=2e-6)
-    together = listed_distances(shapes_of(R @ a), shapes_of(b), i, i, R)
-    np.testing.assert_allclose(together, listed_distances(shapes_of(a), shapes_of(b), i, i), atol=1e-5)
+    each = np.broadcast_to(R, (6, *R.shape))
+    back = pair_distances(shapes_of(a), shapes_of(R.transpose(0, 2, 1) @ a), each)
+    np.testing.assert_allclose(own(back), 0, atol=2e-6)
+    together = pair_distances(shapes_of(R @ a), shapes_of(b), each)
+    np.testing.assert_allclose(own(together), own(pair_distances(shapes_of(a), shapes_of(b))), atol=1e-5)
 
 
 def test_movements_without_direction_have_no_tangents_and_no_turning_angles():
@@ -238,29 +243,16 @@ def test_shapes_are_taken_and_filled_and_keep_what_they_are():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 3), st.integers(0, 10**6), st.integers(0, 12), st.sampled_from(CHOICES), st.floats(0, 0.3))
-def test_bounds_are_never_above_the_distances(d, seed, band, choice, noise):
+def test_turning_distances_are_never_above_elastic_ones(d, seed, band, choice, noise):
     rng = np.random.default_rng(seed)
     x = np.concatenate((paths(6, d, seed), degenerate(d)))
     x = sized(x + noise * rng.normal(size=x.shape))
     shapes = shapes_of(np.concatenate((x, x[:2])), ElasticSpec(band=band))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KINEME_COMPILED", choice)
-        bounds, squares = turning_bounds(shapes, shapes), pair_distances(shapes, shapes)
-    assert (bounds >= 0).all()
-    assert (bounds <= squares[1]).all()
+        squares = pair_distances(shapes, shapes)
+    assert (squares >= 0).all()
     assert (squares[1] <= squares[0] * (1 + 1e-5)).all()
-
-
-def test_bounds_say_something():
-    shapes = shapes_of(paths(40, 2))
-    bounds, turning = turning_bounds(shapes, shapes), pair_distances(shapes, shapes)[1]
-    np.testing.assert_allclose(bounds, bounds.T, atol=1e-7)
-    assert bounds.sum() > 0.1 * turning.sum()
-
-
-def test_a_bound_without_a_band_is_the_distance():
-    shapes = shapes_of(paths(10, 3), ElasticSpec(band=0))
-    np.testing.assert_allclose(turning_bounds(shapes, shapes), pair_distances(shapes, shapes)[1], rtol=1e-4, atol=1e-6)
 
 
 def test_no_movements_have_no_distances(choice):
@@ -268,9 +260,6 @@ def test_no_movements_have_no_distances(choice):
     none = shapes.take(slice(0, 0))
     assert pair_distances(shapes, none).shape == (3, 3, 0)
     assert pair_distances(none, shapes).shape == (3, 0, 3)
-    assert turning_bounds(none, shapes).shape == (0, 3)
-    assert turning_bounds(shapes, none).shape == (3, 0)
-    assert listed_distances(shapes, shapes, np.arange(0), np.arange(0)).shape == (3, 0)
 
 
 def test_what_does_not_fit_is_refused():
@@ -278,11 +267,11 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(SpecificationError, match="same number of dimensions, got 2 and 3"):
         pair_distances(flat, space)
     with pytest.raises(SpecificationError, match="same specifications"):
-        turning_bounds(flat, shapes_of(paths(3, 2), ElasticSpec(band=2)))
+        pair_distances(flat, shapes_of(paths(3, 2), ElasticSpec(band=2)))
     with pytest.raises(SpecificationError, match=r"expected rotations of shape \(3, 3, 3, 3\), got \(3, 3, 2\)"):
         pair_distances(space, space, np.zeros((3, 3, 2)))
-    with pytest.raises(SpecificationError, match=r"expected rotations of shape \(1, 2, 2\) or \(1, 2\)"):
-        listed_distances(flat, flat, np.array([0]), np.array([1]), np.zeros((3, 2)))
+    with pytest.raises(SpecificationError, match=r"expected rotations of shape \(3, 3, 2, 2\) or \(3, 3, 2\)"):
+        pair_distances(flat, flat, np.zeros((3, 2)))
     for wrong in ({"n_segments": 2}, {"band": -1}, {"turning_weight": math.nan}, {"position_weight": math.inf}):
         with pytest.raises(SpecificationError, match=next(iter(wrong))):
             ElasticSpec(**wrong)

@@ -47,7 +47,7 @@ from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, MEANS, averaged
-from kineme.kernels.pair_distances import listed_distances, pair_distances, turning_bounds
+from kineme.kernels.pair_distances import pair_distances
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.preparation.arc_length import resample_by_arc_length
@@ -341,12 +341,11 @@ def pairs_row(n_dims: int) -> Batched:
         for name, array in shapes.take(slice(None)).arrays().items():
             room.arrays()[name][:] = array
         R = np.broadcast_to(turns, (len(X), *turns.shape))
-        own = np.arange(len(X))
+        few = pair_distances(shapes, reference.take(slice(2, 5)), R[:, 2:5])
         return each(
             len(X),
             squares=pair_distances(room, reference, R).transpose(1, 0, 2),
-            listed=listed_distances(shapes, reference, own, own * 0 + 3, R[:, 3]).T,
-            bounds=turning_bounds(shapes, reference),
+            few=few.transpose(1, 0, 2),
         )
 
     return Batched(f"pair_distances {n_dims}", call, 2e-5, draw=rows)

@@ -163,25 +163,3 @@ def _sum_up(n_points, matched, work):  # type: ignore[no-untyped-def]
         back = plus(back, unless(matched_back, bit(p), distance))
     mean = times(least(forth, back), every(np.float32(1) / np.float32(n_points)))
     store(work.squares, 2, times(mean, mean))
-
-
-@jit
-def fill_turning_bounds(A, B, slack, bounds):  # type: ignore[no-untyped-def]
-    """The larger sum of squares of what is outside the other's envelope; A and B hold values, low and high ends."""
-    a, a_low, a_high = A
-    b, b_low, b_high = B
-    zero = np.float32(0)
-    for i in range(bounds.shape[0]):
-        for j in range(bounds.shape[1]):
-            forth, back = zero, zero
-            for p in range(a.shape[1]):
-                x, y = a[i, p], b[j, p]
-                above, below = x - b_high[j, p], b_low[j, p] - x
-                excess = (above if above > below else below) - slack
-                excess = excess if excess > zero else zero
-                forth += excess * excess
-                above, below = y - a_high[i, p], a_low[i, p] - y
-                excess = (above if above > below else below) - slack
-                excess = excess if excess > zero else zero
-                back += excess * excess
-            bounds[i, j] = forth if forth > back else back

@@ -10,12 +10,6 @@ costs over warping paths from (0, 0) to (K - 1, K - 1) with steps (1, 0), (0, 1)
 1978), divided by the number K of segments. The squared turning distance is the same with the last term alone, so it
 needs no rotation and is never larger. Both are symmetric, with the transposed rotation, non-negative, and zero for
 equal movements; neither satisfies the triangle inequality.
-
-Every warping path meets each segment at least once, within the band. Hence what is outside the other's envelope, the
-range of its turning angles within the band, is a lower bound (E. Keogh, "Exact indexing of dynamic time warping", VLDB
-2002):
-
-    w_theta / K sum_p max(0, theta_p - high_p, low_p - theta_p)^2,  and the same with the movements exchanged.
 """
 
 from __future__ import annotations
@@ -25,9 +19,6 @@ from numpy.typing import NDArray
 
 from kineme.kernels.shapes import Floats, Shapes
 from kineme.validation import Array
-
-#: Rounding errors of turning angles and of sums in single precision, by which a bound is lowered so that it stays one.
-BOUND_SLACK, BOUND_SHARE = 2.5e-7, 1 - 1e-5
 
 Indices = NDArray[np.intp]
 
@@ -68,15 +59,3 @@ def _warped(costs: Array, band: int) -> Array:
             before = np.minimum(np.minimum(table[p, q + 1], table[p + 1, q]), table[p, q])
             table[p + 1, q + 1] = costs[:, p, q] + before
     return table[n, n]
-
-
-def turning_excess(A: Shapes, B: Shapes) -> Array:
-    """Sums of squares (n, m) of what is outside the other's envelope, less the slack; the larger of both directions."""
-    sums = np.zeros((2, len(A), len(B)))
-    for p in range(A.elastic.n_segments):
-        a, b = ([x[:, p].astype(float) for x in (one.turning, one.turning_low, one.turning_high)] for one in (A, B))
-        forth = np.maximum(a[0][:, None] - b[2], b[1] - a[0][:, None])
-        back = np.maximum(b[0] - a[2][:, None], a[1][:, None] - b[0])
-        sums[0] += np.maximum(forth - BOUND_SLACK, 0) ** 2
-        sums[1] += np.maximum(back - BOUND_SLACK, 0) ** 2
-    return sums.max(axis=0)

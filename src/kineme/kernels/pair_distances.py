@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.kernels.elastic import BOUND_SHARE, BOUND_SLACK, Indices, elastic_squares, turning_excess
+from kineme.kernels.elastic import Indices, elastic_squares
 from kineme.kernels.point_cloud import cloud_squares
 from kineme.kernels.shapes import Floats, Shapes
 from kineme.runtime.compiled import compiled_module, use_compiled
@@ -26,7 +26,7 @@ RotationsOfTile = Callable[[slice, slice], NDArray[Any]]
 _TILE_ROWS, _TILE_PAIRS = 32, 4096  # the columns are packed once for so many rows; a tile takes about a millisecond
 _FEW_COLUMNS = 8  # with so few, most lanes of a row would be idle: its pairs are taken as a list
 _TWIN_PAIRS = 1000
-_PAIR_OPERATIONS, _BOUND_OPERATIONS = 10_000, 500  # elementary operations of the plain twins per pair
+_PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 
 
 def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTile | None = None) -> Floats:
@@ -78,55 +78,6 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTi
 
     for_tiles(work, len(tiles), 1)
     return squares
-
-
-def listed_distances(
-    A: Shapes, B: Shapes, first: Indices, second: Indices, rotations: NDArray[Any] | None = None
-) -> Floats:
-    """Squared distances (3, k) of k pairs, A's movement ``first[i]`` and B's ``second[i]``: as `pair_distances`.
-
-    Parameters
-    ----------
-    A, B : Shapes
-    first, second : arrays (k,) of indices
-    rotations : array (k, d, d) or, in the plane, (k, 2), optional
-    """
-    _check(A, B)
-    first, second = np.ascontiguousarray(first, np.intp), np.ascontiguousarray(second, np.intp)
-    k = len(first)
-    entries = np.empty((k, 0), np.float32) if rotations is None else _as_entries(rotations, (k,), A.n_dims)
-    squares = np.empty((3, k), np.float32)
-    compiled = use_compiled(k * _PAIR_OPERATIONS)
-
-    def work(start: int, stop: int) -> None:
-        chosen = (first[start:stop], second[start:stop], entries[start:stop])
-        (_listed_compiled if compiled else _listed_plain)(A, B, *chosen, squares[:, start:stop])
-
-    for_tiles(work, k, _TILE_PAIRS if compiled else _TWIN_PAIRS)
-    return squares
-
-
-def turning_bounds(A: Shapes, B: Shapes) -> Floats:
-    """Lower bounds (n, m) of the squared turning distances, and therefore also of the squared elastic ones.
-
-    They need no rotations. Rounding errors are taken off, so that they hold for what `pair_distances` returns.
-    """
-    _check(A, B)
-    bounds = np.empty((len(A), len(B)), np.float32)
-    ends = [(one.turning, one.turning_low, one.turning_high) for one in (A, B)]
-    compiled = use_compiled(bounds.size * _BOUND_OPERATIONS)
-
-    def work(start: int, stop: int) -> None:
-        if compiled:
-            fill = compiled_module("kineme.kernels._pairs").fill_turning_bounds
-            part = tuple(np.ascontiguousarray(one[start:stop]) for one in ends[0])
-            fill(part, ends[1], np.float32(BOUND_SLACK), bounds[start:stop])
-        else:
-            bounds[start:stop] = turning_excess(A.take(slice(start, stop)), B)
-
-    for_tiles(work, len(A), max(1, 16 * _TILE_PAIRS // max(1, len(B))))
-    bounds *= np.float32(BOUND_SHARE * A.elastic.turning_weight / A.elastic.n_segments)
-    return bounds
 
 
 def _check(A: Shapes, B: Shapes) -> None:

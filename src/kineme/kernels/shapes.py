@@ -87,8 +87,6 @@ class Shapes:
     turning : array (n, n_segments)
         Angle between the tangents before and after a segment, divided by pi; 0 at both ends, and wherever one of the
         three has no direction.
-    turning_low, turning_high : arrays (n, n_segments)
-        Smallest and largest turning angle of the segments within the band around each.
     points, point_tangents : arrays (n, n_points, d)
         Points, and unit vectors along the central differences there (one-sided at the ends), zero for a difference of
         zero.
@@ -101,8 +99,6 @@ class Shapes:
     tangents: Floats
     midpoints: Floats
     turning: Floats
-    turning_low: Floats
-    turning_high: Floats
     points: Floats
     point_tangents: Floats
     point_turning: Floats
@@ -160,7 +156,6 @@ def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec
     tangents = _unit(np.diff(ends, axis=1))
     turning = np.zeros(tangents.shape[:2])
     turning[:, 1:-1] = _angles(tangents[:, :-2], tangents[:, 2:]) * (tangents[:, 1:-1] != 0).any(axis=2)
-    low, high = _envelope(turning, elastic.band)
     points = _even(paths, cloud.n_points)
     steps = _unit(np.diff(points, axis=1))
     point_turning = np.zeros(points.shape[:2])
@@ -169,8 +164,6 @@ def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec
         tangents=_single(tangents),
         midpoints=_single(0.5 * (ends[:, 1:] + ends[:, :-1])),
         turning=_single(turning),
-        turning_low=_single(low),
-        turning_high=_single(high),
         points=_single(points),
         point_tangents=_single(_unit(np.gradient(points, axis=1))),
         point_turning=_single(point_turning),
@@ -191,16 +184,6 @@ def _even(paths: Array, n: int) -> Array:
     share = at - before
     x = paths.transpose(0, 2, 1)
     return np.asarray(x[:, before] * (1 - share)[:, None] + x[:, before + 1] * share[:, None])
-
-
-def _envelope(values: Array, band: int) -> tuple[Array, Array]:
-    """Smallest and largest of the values (n, k) at most `band` columns away."""
-    low, high = values.copy(), values.copy()
-    for shift in range(1, min(band, values.shape[1] - 1) + 1):
-        for smaller, larger in ((slice(None, -shift), slice(shift, None)), (slice(shift, None), slice(None, -shift))):
-            np.minimum(low[:, smaller], values[:, larger], out=low[:, smaller])
-            np.maximum(high[:, smaller], values[:, larger], out=high[:, smaller])
-    return low, high
 
 
 _NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding error of positions in single precision
