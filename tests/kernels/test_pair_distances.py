@@ -230,6 +230,34 @@ def test_values_of_a_hundred_samples_are_every_third():
     np.testing.assert_array_equal(shapes_of(a).midpoints, (0.5 * (ends[:, 1:] + ends[:, :-1])).astype(np.float32))
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+@pytest.mark.parametrize(
+    ("specs", "n_samples"), [((), 100), ((ElasticSpec(3), CloudSpec(3)), 2), ((ElasticSpec(40), CloudSpec(32)), 29)]
+)
+def test_compiled_shapes_equal_plain_ones(d, dtype, specs, n_samples, monkeypatch):
+    x = np.concatenate((paths(30, d, n_points=n_samples), degenerate(d)[:, :, :n_samples])).astype(dtype)
+    x = x.transpose(2, 0, 1).copy().transpose(1, 2, 0)  # any layout is accepted
+    found = {}
+    for choice in CHOICES:
+        monkeypatch.setenv("KINEME_COMPILED", choice)
+        found[choice] = shapes_of(x, *specs).arrays()
+        assert all(len(one) == 0 for one in shapes_of(x[:0], *specs).arrays().values())
+    for name, plain in found["never"].items():
+        assert found["always"][name].shape == plain.shape
+        assert found["always"][name].dtype == np.float32
+        np.testing.assert_allclose(found["always"][name], plain, rtol=0, atol=1e-6)
+
+
+def test_turning_angles_are_exact_over_their_whole_range(choice):
+    angles = np.concatenate((np.linspace(0, np.pi, 2001), np.geomspace(1e-6, 1e-3, 50)))
+    corners = np.zeros((len(angles), 2, 3))
+    corners[:, 0] = np.stack((-np.ones_like(angles), 0 * angles, np.cos(angles)), axis=1)
+    corners[:, 1, 2] = np.sin(angles)
+    turning = shapes_of(corners, cloud=CloudSpec(3)).point_turning[:, 1]
+    np.testing.assert_allclose(turning, angles / np.pi, rtol=0, atol=6e-8)
+
+
 def test_shapes_are_taken_and_filled_and_keep_what_they_are():
     shapes = shapes_of(paths(5, 2), ElasticSpec(10, 2), CloudSpec(8))
     two, room = shapes.take(np.array([3, 1])), shapes.empty(7)
