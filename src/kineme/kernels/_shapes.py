@@ -68,14 +68,13 @@ def _normalize(v, n, no_length, directed):  # type: ignore[no-untyped-def]
         for p in range(n):
             directed[p] += own[p] * own[p]
     for p in range(n):
-        length = math.sqrt(directed[p])
-        directed[p] = 1.0 / length if length > no_length else 0.0
+        directed[p] = math.sqrt(directed[p])
     for k in range(len(v)):
         own = v[k]
         for p in range(n):
-            own[p] = own[p] * directed[p] if directed[p] > 0.0 else 0.0
+            own[p] = own[p] / directed[p] if directed[p] > no_length else 0.0
     for p in range(n):
-        directed[p] = 1.0 if directed[p] > 0.0 else 0.0
+        directed[p] = 1.0 if directed[p] > no_length else 0.0
 
 
 @jit

@@ -154,13 +154,14 @@ def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: Cl
     elastic : ElasticSpec, optional
     cloud : CloudSpec, optional
     """
-    shapes = _room(*paths.shape[:2], elastic or ElasticSpec(), cloud or CloudSpec())
-    if use_compiled(_CALL_OPERATIONS + len(paths) * _PATH_OPERATIONS):
-        at = [_between(paths.shape[2], n) for n in (shapes.elastic.n_segments + 1, shapes.cloud.n_points)]
+    n, d, n_positions = paths.shape
+    shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
+    if use_compiled(_CALL_OPERATIONS + n * _PATH_OPERATIONS):
+        ends, even = _between(n_positions, shapes.elastic.n_segments + 1), _between(n_positions, shapes.cloud.n_points)
         segments = (shapes.tangents, shapes.midpoints, shapes.turning)
         points = (shapes.points, shapes.point_tangents, shapes.point_turning)
         fill = compiled_module("kineme.kernels._shapes").fill_shapes
-        fill(np.ascontiguousarray(paths), _NO_LENGTH, tuple(at), segments, points)
+        fill(np.ascontiguousarray(paths), _NO_LENGTH, (ends, even), segments, points)
     else:
         _fill_shapes(paths, shapes)
     return shapes
@@ -168,8 +169,16 @@ def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: Cl
 
 def _room(n: int, d: int, elastic: ElasticSpec, cloud: CloudSpec) -> Shapes:
     segments, points = (n, elastic.n_segments), (n, cloud.n_points)
-    sizes = ((*segments, d), (*segments, d), segments, (*points, d), (*points, d), points)
-    return Shapes(*(np.empty(one, np.float32) for one in sizes), elastic, cloud)
+    return Shapes(
+        tangents=np.empty((*segments, d), np.float32),
+        midpoints=np.empty((*segments, d), np.float32),
+        turning=np.empty(segments, np.float32),
+        points=np.empty((*points, d), np.float32),
+        point_tangents=np.empty((*points, d), np.float32),
+        point_turning=np.empty(points, np.float32),
+        elastic=elastic,
+        cloud=cloud,
+    )
 
 
 def _fill_shapes(paths: Array, shapes: Shapes) -> None:
