@@ -23,10 +23,13 @@ def test_the_transform_is_found_again(d, seed):
     R, scale, shift = turn(rng.uniform(-0.6, 0.6), d, seed), rng.uniform(0.3, 3), rng.normal(size=d) * 5
     i = int(rng.integers(10))
     moved = Trajectory(3.0 * demos[i].times + 7, scale * demos[i].positions @ R.T + shift)
-    answer = Recognizer().fit(demos).recognize(moved)
+    recognizer = Recognizer().fit(demos)
+    answer = recognizer.recognize(moved)
     assert answer.nearest[0].index == i
     assert answer.nearest[0].name == f"no {i}"
-    assert answer.nearest[0].similarity == pytest.approx(1, abs=6e-2)  # a rotation costs a little
+    assert 0.8 < answer.nearest[0].similarity <= 1  # a rotation costs, the more the more alike the kinds are
+    unturned = recognizer.recognize(scale * demos[i].positions + shift)
+    assert unturned.nearest[0].similarity == pytest.approx(1, abs=1e-3)
     np.testing.assert_allclose(answer.transform.rotation, R, atol=1e-6)
     np.testing.assert_allclose(answer.transform.scale, scale, rtol=1e-6)
     np.testing.assert_allclose(answer.transform.shift, shift, atol=1e-5)
