@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,14 +28,6 @@ class Pairs:
     positions: Prepared
     shapes: Shapes
     measures: tuple[int, ...]
-
-    def take(self, chosen: Any) -> Pairs:
-        """The chosen movements."""
-        return replace(self, positions=self.positions.take(chosen), shapes=self.shapes.take(chosen))
-
-    def empty(self, n: int) -> Pairs:
-        """Room for n movements."""
-        return replace(self, positions=self.positions.empty(n), shapes=self.shapes.empty(n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +66,20 @@ class Described:
 
     def take(self, chosen: Any) -> Described:
         """The chosen movements: a slice, a mask or indices."""
-        blocks = tuple(block.take(chosen) for block in self.blocks)
-        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.take(chosen))
+        return self._each(lambda part: part.take(chosen))
 
     def empty(self, n: int) -> Described:
         """Room for n movements that are described in the same way."""
-        blocks = tuple(block.empty(n) for block in self.blocks)
-        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.empty(n))
+        return self._each(lambda part: part.empty(n))
+
+    def _each(self, made: Callable[[Any], Any]) -> Described:
+        """With parts made of these: positions that are one of the blocks stay it, to be kept and compared once."""
+        blocks = tuple(made(block) for block in self.blocks)
+        if self.pairs is None:
+            return replace(self, blocks=blocks)
+        same = [new for old, new in zip(self.blocks, blocks, strict=True) if old is self.pairs.positions]
+        positions = same[0] if same else made(self.pairs.positions)
+        return replace(self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=made(self.pairs.shapes)))
 
     def put(self, start: int, others: Described) -> None:
         """Write other movements over those from `start` on."""
@@ -103,6 +102,10 @@ class Described:
         )
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents."""
-        by_rows = [float(np.sqrt(np.median(block.squares))) for block in self.blocks]
+        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents.
+
+        Movements that do not move have no size, and do not count; of such alone the norm is 0.
+        """
+        moving = [block.squares[block.squares > 0] for block in self.blocks]
+        by_rows = [float(np.sqrt(np.median(squares))) if len(squares) else 0.0 for squares in moving]
         return np.array(by_rows + [2.0] * (self.n_representations - len(by_rows)))

@@ -121,6 +121,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.weights = weights
         self.rotation_prior = rotation_prior
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__({"rotation_prior": None, **state})  # earlier versions had a limit alone
+
     @property
     def specification(self) -> ComparisonSpecification:
         """How movements are compared, by the parameters alone."""
