@@ -106,7 +106,8 @@ def _text(data: dict[str, Any], error_rate: float) -> str:
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
             "Which movements are unknown, their confidence, and p-values are a guess: too few demonstrations tell how "
-            f"much movements of one symbol differ; learn two or more of each symbol, {needed} in all, to keep --error-rate {error_rate:g}"
+            "much movements of one symbol differ; learn two or more of each symbol, "
+            f"{needed} in all, to keep --error-rate {error_rate:g}"
         )
     return "\n".join(lines + [f"not read: {printable(problem)}" for problem in data["problems"]])
 
