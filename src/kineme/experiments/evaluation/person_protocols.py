@@ -129,7 +129,7 @@ PERSON_PROTOCOLS: dict[str, Protocol] = {
     "spotting": Protocol(
         "Spotting", "The test movements of one person in random order, in recordings of up to twenty, with rests and "
         "straight transits between them, or linked without a stop; templates by the same person (own) or by the "
-        "others. A movement is found if its class is right and the stretch overlaps it by at least half of their union.",
+        "others. A movement is found if its class is right and the stretch overlaps it by half of their union or more.",
         _spotting, _n_splits, "spot", person=_person, by_person=True,
     ),
     "anchoring": Protocol(
