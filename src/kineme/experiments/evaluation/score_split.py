@@ -71,7 +71,7 @@ def _partial(contender: Any, trial: Trial) -> Iterator[Scores]:
 
 def _spot(contender: Any, trial: Trial, seed: list[int]) -> Iterator[Scores]:
     test = trial.demonstrations[trial.split.test]
-    labels = np.where(trial.split.known, require_labels(test).astype(object), None).tolist()
+    labels = [a if known else None for a, known in zip(require_labels(test), trial.split.known, strict=True)]
     recordings = concatenate_all(test, labels, [2, *seed], rests=trial.rests)
     began = time.perf_counter()
     contender.fit(trial.demonstrations[trial.split.train])
