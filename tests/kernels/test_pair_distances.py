@@ -144,7 +144,7 @@ def test_compiled_equals_plain(d, n, m, monkeypatch):
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_a_batch_equals_its_members_in_any_order(d, choice):
-    n, m = 5, 37
+    n, m = 14, 37
     A, B, R = shapes_of(paths(n, d)), shapes_of(paths(m, d, seed=1)), rotations(n, m, d)
     whole, order = pair_distances(A, B, R), np.random.default_rng(0).permutation(m)
     exact = {"rtol": 0, "atol": 0 if choice == "always" else 1e-6}
@@ -152,16 +152,18 @@ def test_a_batch_equals_its_members_in_any_order(d, choice):
     for i, j in ((0, 0), (4, 36), (2, 16)):
         alone = pair_distances(A.take([i]), B.take([j]), R[[i]][:, [j]])
         np.testing.assert_allclose(alone[:, 0, 0], whole[:, i, j], **exact)
-    few = np.random.default_rng(1).permutation(m)[:7]  # so few are compared as a list
-    np.testing.assert_allclose(pair_distances(A, B.take(few), R[:, few]), whole[:, :, few], **exact)
+    # Of the whole and of the first, 16 of A's movements are compared at once, of others a list of pairs, 16 of B's.
+    for i, some in ((14, 7), (5, 7), (5, 16)):
+        few = np.random.default_rng(some).permutation(m)[:some]
+        found = pair_distances(A.take(slice(0, i)), B.take(few), R[:i, few])
+        np.testing.assert_allclose(found, whole[:, :i, few], **exact)
 
 
-def test_rotations_are_matrices_or_cosines_and_sines_or_made_tile_by_tile(choice, monkeypatch):
+def test_rotations_are_matrices_or_cosines_and_sines(choice, monkeypatch):
     monkeypatch.setattr("kineme.kernels.pair_distances._TILE_PAIRS", 64)
     A, B, R = shapes_of(paths(40, 2)), shapes_of(paths(50, 2, seed=1)), rotations(40, 50, 2)
     expected = pair_distances(A, B, R)
-    for others in (R[..., 0], lambda i, j: R[i, j], lambda i, j: R[i, j, :, 0]):
-        np.testing.assert_allclose(pair_distances(A, B, others), expected, atol=1e-6)
+    np.testing.assert_allclose(pair_distances(A, B, R[..., 0]), expected, atol=1e-6)
     few = pair_distances(A, B.take(slice(0, 4)), R[:, :4, :, 0])
     np.testing.assert_allclose(few, expected[:, :, :4], atol=1e-6)
     none = np.broadcast_to(np.eye(2), R.shape)
@@ -228,6 +230,34 @@ def test_values_of_a_hundred_samples_are_every_third():
     a = paths(2, 3)
     ends = a[:, :, ::3].transpose(0, 2, 1)
     np.testing.assert_array_equal(shapes_of(a).midpoints, (0.5 * (ends[:, 1:] + ends[:, :-1])).astype(np.float32))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+@pytest.mark.parametrize(
+    ("specs", "n_samples"), [((), 100), ((ElasticSpec(3), CloudSpec(3)), 2), ((ElasticSpec(40), CloudSpec(32)), 29)]
+)
+def test_compiled_shapes_equal_plain_ones(d, dtype, specs, n_samples, monkeypatch):
+    x = np.concatenate((paths(30, d, n_points=n_samples), degenerate(d)[:, :, :n_samples])).astype(dtype)
+    x = x.transpose(2, 0, 1).copy().transpose(1, 2, 0)  # any layout is accepted
+    found = {}
+    for choice in CHOICES:
+        monkeypatch.setenv("KINEME_COMPILED", choice)
+        found[choice] = shapes_of(x, *specs).arrays()
+        assert all(len(one) == 0 for one in shapes_of(x[:0], *specs).arrays().values())
+    for name, plain in found["never"].items():
+        assert found["always"][name].shape == plain.shape
+        assert found["always"][name].dtype == np.float32
+        np.testing.assert_allclose(found["always"][name], plain, rtol=0, atol=1e-6)
+
+
+def test_turning_angles_are_exact_over_their_whole_range(choice):
+    angles = np.concatenate((np.linspace(0, np.pi, 2001), np.geomspace(1e-6, 1e-3, 50)))
+    corners = np.zeros((len(angles), 2, 3))
+    corners[:, 0] = np.stack((-np.ones_like(angles), 0 * angles, np.cos(angles)), axis=1)
+    corners[:, 1, 2] = np.sin(angles)
+    turning = shapes_of(corners, cloud=CloudSpec(3)).point_turning[:, 1]
+    np.testing.assert_allclose(turning, angles / np.pi, rtol=0, atol=6e-8)
 
 
 def test_shapes_are_taken_and_filled_and_keep_what_they_are():

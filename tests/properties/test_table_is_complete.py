@@ -67,6 +67,8 @@ EXEMPT = {
     "comparison.stored_references.StoredReferences.described": "reads stored rows",
     "comparison.similarity.similarities": "of pairs of the batch",
     "recognition.early.early.PredictsPartial.predict_partial": "a protocol; the recognizer is in the table",
+    "recognition.candidate_windows.surroundings": "windows of one recording by contract",
+    "recognition.window_scores.compare_windows": "windows of one recording by contract",
     "recognition.recognizer.Recognizer.look_at": "the old name of describe",
     "recognition.transform.Transform.apply": "one movement by contract",
     "primitives.styles.average.average": "a mean of the batch; see test_order_of_training.py",

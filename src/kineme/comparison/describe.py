@@ -85,7 +85,7 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean)
     r = next(r for r, one in enumerate(how.by_rows) if one.quantity == "positions" and one.arc_share == 1)
-    single = np.asarray(rows[r], dtype=np.float32).astype(np.float64)  # so that stored rows say the same
+    single = np.ascontiguousarray(rows[r], dtype=np.float32)  # so that stored rows say the same
     shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
     measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
     return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures))

@@ -6,30 +6,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.kernels.elastic import Indices, elastic_squares
+from kineme.kernels.elastic import elastic_squares
 from kineme.kernels.point_cloud import cloud_squares
-from kineme.kernels.shapes import Floats, Shapes
+from kineme.kernels.shapes import CloudSpec, ElasticSpec, Floats, Shapes
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
-#: The rotations of a tile of pairs, called with the slices of its rows and columns; in several threads at once.
-RotationsOfTile = Callable[[slice, slice], NDArray[Any]]
-
 _TILE_ROWS, _TILE_PAIRS = 32, 4096  # the columns are packed once for so many rows; a tile takes about a millisecond
-_FEW_COLUMNS = 8  # with so few, most lanes of a row would be idle: its pairs are taken as a list
+_LANES = 16  # pairs that the compiled loops compare at once
+_LISTED = 1.2  # time of 16 pairs taken from a list, by that of 16 of one movement with others
 _TWIN_PAIRS = 1000
 _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 
 
-def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTile | None = None) -> Floats:
+def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
     """Squared distances (3, n, m) of every movement of A with every one of B: elastic, turning, point cloud.
 
     Parameters
@@ -37,9 +35,8 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTi
     A, B : Shapes
         n and m movements with the same dimensions d and specifications.
     rotations : array (n, m, d, d) or, in the plane, (n, m, 2), optional
-        Matrices R, or cosines and sines, that rotate B's movement onto A's, float32 fastest; or a function that returns
-        them for the slices of rows and columns of a tile of pairs, so that they never are in memory all at once. By
-        default nothing is rotated.
+        Matrices R, or cosines and sines, that rotate B's movement onto A's, float32 fastest. By default nothing is
+        rotated.
 
     Returns
     -------
@@ -56,27 +53,28 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | RotationsOfTi
     squares = np.empty((3, n, m), np.float32)
     if n == 0 or m == 0:
         return squares
-    fill = _filler(A, B, n * m)
-    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m))
-    columns = max(16, _TILE_PAIRS // rows // 16 * 16)
+    compiled = use_compiled(n * m * _PAIR_OPERATIONS)
+    fill = _fill_compiled if compiled else _fill_plain
+    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m // _LANES * _LANES))
+    columns = m if rows * m <= _TILE_PAIRS else max(_LANES, _TILE_PAIRS // rows // _LANES * _LANES)
     tiles = [
         (slice(i, min(i + rows, n)), slice(j, min(j + columns, m)))
         for i in range(0, n, rows)
         for j in range(0, m, columns)
     ]
-    if rotations is not None and not callable(rotations):
-        _as_entries(rotations, (n, m), d)
+    if rotations is not None:
+        _check_rotations(rotations, (n, m), d)
 
     def work(first: int, last: int) -> None:
         for i, j in tiles[first:last]:
             shape = (i.stop - i.start, j.stop - j.start)
-            if rotations is None:
-                part = np.empty((*shape, 0), np.float32)
-            else:
-                part = _as_entries(rotations(i, j) if callable(rotations) else rotations[i, j], shape, d)
-            fill(i, j, part, squares[:, i, j])
+            part = np.empty((*shape, 0)) if rotations is None else rotations[i, j].reshape(*shape, -1)
+            fill(A, B, i, j, np.ascontiguousarray(part, np.float32), squares[:, i, j])
 
-    for_tiles(work, len(tiles), 1)
+    if compiled and len(tiles) == 1:
+        work(0, 1)  # one thread, and no BLAS whose threads would have to be held back
+    else:
+        for_tiles(work, len(tiles), 1)
     return squares
 
 
@@ -93,72 +91,73 @@ def _check(A: Shapes, B: Shapes) -> None:
         )
 
 
-def _as_entries(rotations: NDArray[Any], shape: tuple[int, ...], d: int) -> Floats:
-    """Rotations as C-contiguous arrays (..., d * d), or (..., 2) for cosine and sine."""
-    accepted = [(*shape, d, d)] + [(*shape, 2)] * (d == 2)
-    if rotations.shape not in accepted:
-        wanted = " or ".join(str(one) for one in accepted)
+def _check_rotations(rotations: NDArray[Any], shape: tuple[int, int], d: int) -> None:
+    if rotations.shape != (*shape, d, d) and (d != 2 or rotations.shape != (*shape, 2)):
+        wanted = f"{(*shape, d, d)}" + f" or {(*shape, 2)}" * (d == 2)
         raise SpecificationError(f"expected rotations of shape {wanted}, got {rotations.shape}; pass one for each pair")
-    return np.ascontiguousarray(rotations, np.float32).reshape(*shape, -1)
 
 
-def _filler(A: Shapes, B: Shapes, n_pairs: int) -> Callable[[slice, slice, Floats, Floats], None]:
-    """The function that writes the distances of a tile, from its slices and the entries of its rotations."""
-    compiled = use_compiled(n_pairs * _PAIR_OPERATIONS)
+def _fill_compiled(A: Shapes, B: Shapes, rows: slice, columns: slice, entries: Floats, squares: Floats) -> None:
+    """Write the squared distances (3, n, m) of a tile of pairs, with entries (n, m, r) of their rotations.
 
-    def fill(rows: slice, columns: slice, entries: Floats, squares: Floats) -> None:
-        n, m = squares.shape[1:]
-        if compiled and (m > _FEW_COLUMNS or n == 1):
-            sides = (_arrays(A, rows), _arrays(B, columns))
-            loop = compiled_module("kineme.kernels._pairs").fill_grid
-            found = np.empty(squares.shape, np.float32)  # always contiguous, so that one version is compiled
-            loop((0,) * A.n_dims, sides, _numbers(A), entries, found)
-            squares[:] = found
-            return
-        first, second = np.divmod(np.arange(n * m), m)
-        step = n * m if compiled else _TWIN_PAIRS
-        flat, found = entries.reshape(n * m, -1), np.empty((3, n * m), np.float32)
-        for start in range(0, n * m, step):
-            part = slice(start, start + step)
-            chosen = (first[part] + rows.start, second[part] + columns.start, flat[part])
-            (_listed_compiled if compiled else _listed_plain)(A, B, *chosen, found[:, part])
-        squares[:] = found.reshape(3, n, m)
-
-    return fill
+    r is d^2, or 2 for cosine and sine, or 0 for no rotation.
+    """
+    n, m = squares.shape[1:]
+    module, numbers = compiled_module("kineme.kernels._pairs"), _numbers(A.elastic, A.cloud)
+    sides = (_arrays(A, rows), _arrays(B, columns))
+    # Always contiguous, so that one version is compiled.
+    found = squares if squares.flags.c_contiguous else np.empty(squares.shape, np.float32)
+    by_columns, by_rows, listed = n * -(-m // _LANES), m * -(-n // _LANES), _LISTED * -(-n * m // _LANES)
+    if by_columns <= min(by_rows, listed):
+        module.fill_grid((0,) * A.n_dims, sides, numbers, entries, found)
+    elif by_rows <= listed:
+        module.fill_by_rows((0,) * A.n_dims, sides, numbers, entries, found)
+    else:
+        pairs = np.divmod(np.arange(n * m), m)
+        entries = entries.reshape(n * m, 1, -1) if entries.size else np.empty((n * m, 1, 0), np.float32)
+        module.fill_listed((0,) * A.n_dims, sides, pairs, numbers, entries, found.reshape(3, -1))
+    if found is not squares:
+        squares[:] = found
 
 
-def _listed_compiled(A: Shapes, B: Shapes, first: Indices, second: Indices, entries: Floats, squares: Floats) -> None:
-    loop = compiled_module("kineme.kernels._pairs").fill_listed
-    sides = (_arrays(A, slice(None)), _arrays(B, slice(None)))
-    found = np.empty(squares.shape, np.float32)
-    loop((0,) * A.n_dims, sides, (first, second), _numbers(A), entries[:, None], found)
-    squares[:] = found
-
-
-def _listed_plain(A: Shapes, B: Shapes, first: Indices, second: Indices, entries: Floats, squares: Floats) -> None:
-    matrices = _matrices(entries, A.n_dims)
-    squares[:2] = elastic_squares(A, B, first, second, matrices)
-    squares[2] = cloud_squares(A, B, first, second, matrices)
+def _fill_plain(A: Shapes, B: Shapes, rows: slice, columns: slice, entries: Floats, squares: Floats) -> None:
+    """The same by the plain definitions."""
+    n, m = squares.shape[1:]
+    first, second = np.divmod(np.arange(n * m), m)
+    matrices, found = _matrices(entries, A.n_dims), np.empty((3, n * m), np.float32)
+    for start in range(0, n * m, _TWIN_PAIRS):
+        part = slice(start, start + _TWIN_PAIRS)
+        chosen = (first[part] + rows.start, second[part] + columns.start)
+        R = None if matrices is None else matrices[part]
+        found[:2, part] = elastic_squares(A, B, *chosen, R)
+        found[2, part] = cloud_squares(A, B, *chosen, R)
+    squares[:] = found.reshape(squares.shape)
 
 
 def _matrices(entries: Floats, d: int) -> Array | None:
-    if entries.shape[1] == 0:
+    if entries.shape[2] == 0:
         return None
-    if entries.shape[1] == d * d:
+    if entries.shape[2] == d * d:
         return entries.reshape(-1, d, d).astype(float)
-    c, s = entries.T.astype(float)
+    c, s = entries.reshape(-1, 2).T.astype(float)
     return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
 
 
 def _arrays(shapes: Shapes, chosen: slice) -> tuple[Floats, ...]:
     """What the compiled loops read, of some movements: the numbers of each in one row."""
-    s = shapes
-    arrays = (s.tangents, s.midpoints, s.turning, s.points, s.point_tangents, s.point_turning)
-    return tuple(one[chosen].reshape(-1, one[0].size if len(one) else 1) for one in arrays)
+    s, segments, points = shapes, shapes.elastic.n_segments * shapes.n_dims, shapes.cloud.n_points * shapes.n_dims
+    return (
+        s.tangents[chosen].reshape(-1, segments),
+        s.midpoints[chosen].reshape(-1, segments),
+        s.turning[chosen],
+        s.points[chosen].reshape(-1, points),
+        s.point_tangents[chosen].reshape(-1, points),
+        s.point_turning[chosen],
+    )
 
 
-def _numbers(shapes: Shapes) -> tuple[tuple[np.float32, ...], tuple[int, int, int]]:
+@lru_cache(maxsize=64)
+def _numbers(elastic: ElasticSpec, cloud: CloudSpec) -> tuple[tuple[np.float32, ...], tuple[int, int, int]]:
     """Roots of the weights of those arrays, and the numbers of segments, band and points."""
-    elastic, cloud = shapes.elastic, shapes.cloud
     weights = (1.0, elastic.position_weight, elastic.turning_weight, 1.0, cloud.line_weight**0.5, cloud.turning_weight)
     return tuple(np.float32(one**0.5) for one in weights), (elastic.n_segments, elastic.band, cloud.n_points)

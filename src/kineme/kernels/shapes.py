@@ -8,15 +8,18 @@ of 1 from it. Its *segments* are the pieces between ``n_segments + 1`` even valu
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
 Floats = NDArray[np.float32]
 
+_PATH_OPERATIONS, _CALL_OPERATIONS = 800, 12_000  # elementary operations of the plain definition per path and call
 MOST_POINTS = 32  # of a cloud: the matched ones are bits of an integer
 
 
@@ -140,8 +143,8 @@ class Shapes:
         return {one.name: getattr(self, one.name) for one in fields(self) if one.name not in ("elastic", "cloud")}
 
 
-def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
-    """Segments and points of paths (n, d, S).
+def shapes_of(paths: NDArray[Any], elastic: ElasticSpec | None = None, cloud: CloudSpec | None = None) -> Shapes:
+    """Segments and points of paths (n, d, S), computed in double precision.
 
     Parameters
     ----------
@@ -151,39 +154,60 @@ def shapes_of(paths: Array, elastic: ElasticSpec | None = None, cloud: CloudSpec
     elastic : ElasticSpec, optional
     cloud : CloudSpec, optional
     """
-    elastic, cloud = elastic or ElasticSpec(), cloud or CloudSpec()
-    ends = _even(paths, elastic.n_segments + 1)
-    tangents = _unit(np.diff(ends, axis=1))
-    turning = np.zeros(tangents.shape[:2])
-    turning[:, 1:-1] = _angles(tangents[:, :-2], tangents[:, 2:]) * (tangents[:, 1:-1] != 0).any(axis=2)
-    points = _even(paths, cloud.n_points)
-    steps = _unit(np.diff(points, axis=1))
-    point_turning = np.zeros(points.shape[:2])
-    point_turning[:, 1:-1] = _angles(steps[:, :-1], steps[:, 1:])
+    n, d, n_positions = paths.shape
+    shapes = _room(n, d, elastic or ElasticSpec(), cloud or CloudSpec())
+    if use_compiled(_CALL_OPERATIONS + n * _PATH_OPERATIONS):
+        ends, even = _between(n_positions, shapes.elastic.n_segments + 1), _between(n_positions, shapes.cloud.n_points)
+        segments = (shapes.tangents, shapes.midpoints, shapes.turning)
+        points = (shapes.points, shapes.point_tangents, shapes.point_turning)
+        fill = compiled_module("kineme.kernels._shapes").fill_shapes
+        fill(np.ascontiguousarray(paths), _NO_LENGTH, (ends, even), segments, points)
+    else:
+        _fill_shapes(paths, shapes)
+    return shapes
+
+
+def _room(n: int, d: int, elastic: ElasticSpec, cloud: CloudSpec) -> Shapes:
+    segments, points = (n, elastic.n_segments), (n, cloud.n_points)
     return Shapes(
-        tangents=_single(tangents),
-        midpoints=_single(0.5 * (ends[:, 1:] + ends[:, :-1])),
-        turning=_single(turning),
-        points=_single(points),
-        point_tangents=_single(_unit(np.gradient(points, axis=1))),
-        point_turning=_single(point_turning),
+        tangents=np.empty((*segments, d), np.float32),
+        midpoints=np.empty((*segments, d), np.float32),
+        turning=np.empty(segments, np.float32),
+        points=np.empty((*points, d), np.float32),
+        point_tangents=np.empty((*points, d), np.float32),
+        point_turning=np.empty(points, np.float32),
         elastic=elastic,
         cloud=cloud,
     )
 
 
-def _single(array: Array) -> Floats:
-    return np.ascontiguousarray(array, np.float32)
+def _fill_shapes(paths: Array, shapes: Shapes) -> None:
+    """The plain definition."""
+    ends, points = _even(paths, shapes.elastic.n_segments + 1), _even(paths, shapes.cloud.n_points)
+    tangents, steps = _unit(np.diff(ends, axis=1)), _unit(np.diff(points, axis=1))
+    shapes.tangents[:] = tangents
+    shapes.midpoints[:] = 0.5 * (ends[:, 1:] + ends[:, :-1])
+    shapes.turning[:, [0, -1]] = 0
+    shapes.turning[:, 1:-1] = _angles(tangents[:, :-2], tangents[:, 2:]) * (tangents[:, 1:-1] != 0).any(axis=2)
+    shapes.points[:] = points
+    shapes.point_tangents[:] = _unit(np.gradient(points, axis=1))
+    shapes.point_turning[:, [0, -1]] = 0
+    shapes.point_turning[:, 1:-1] = _angles(steps[:, :-1], steps[:, 1:])
 
 
 def _even(paths: Array, n: int) -> Array:
     """Positions (N, n, d) at n even values along paths (N, d, S), interpolated linearly."""
-    last = paths.shape[2] - 1
-    at = np.arange(n) * last / (n - 1)
-    before = np.minimum(at.astype(int), last - 1)
-    share = at - before
+    before, share = _between(paths.shape[2], n)
     x = paths.transpose(0, 2, 1)
     return np.asarray(x[:, before] * (1 - share)[:, None] + x[:, before + 1] * share[:, None])
+
+
+def _between(n_positions: int, n: int) -> tuple[NDArray[np.intp], Array]:
+    """The positions before n even values along a path, and the shares of the next positions in them."""
+    last = n_positions - 1
+    at = np.arange(n) * last / (n - 1)
+    before = np.minimum(at.astype(np.intp), last - 1)
+    return before, at - before
 
 
 _NO_LENGTH = 1e-6  # of a movement of size 1: a shorter vector is the rounding error of positions in single precision
