@@ -45,7 +45,7 @@ class Early:
         so far. Its influence grows only as a logarithm, so that a hesitation cannot outweigh the path.
     max_angle : float, optional
         Largest rotation [rad], instead of the recognizer's limit or prior. By default those hold, with a concentration
-        of 0.1 in the plane as in space if none is given: short beginnings are nearly straight, and turned they are equal.
+        of 0.1 in the plane as in space if none is given: beginnings are nearly straight, and equal once turned.
     """
 
     n_progress: int = 20
