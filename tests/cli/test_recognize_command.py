@@ -99,6 +99,7 @@ def test_the_answer_is_that_of_python(folder, asked):
     with kineme.ActionLibrary(folder, read_only=True) as library:
         expected = library.recognize(read_recording(asked / "c.csv"))
     assert data["confidence"] == expected.confidence
+    assert (data["p_known"], data["rule"], data["promise"]) == (expected.p_known, expected.rule, expected.promise)
     assert {one["symbol"]: one["p_value"] for one in data["ranked"]} == dict(expected.p_values)
 
 
@@ -205,6 +206,7 @@ def test_an_answer_that_is_a_guess_says_so(tmp_path, asked, shown, guess):
         library.learn(demos[np.arange(len(demos)) % 7 < shown])
     said = answer("recognize", asked / "c.csv", "-l", tmp_path / "a")["movements"][0]
     assert said["calibrated"] is not guess
+    assert (said["rule"] == "guess", "any share" in said["promise"]) == (guess, guess)
     text = run("recognize", asked / "c.csv", "-l", tmp_path / "a").stdout
-    assert ("p-values are a guess" in text) is guess
+    assert ("Which movements are unknown, their confidence, and p-values are a guess" in text) is guess
     assert ("two or more of each symbol, 19 in all, to keep --error-rate 0.05" in text) is guess

@@ -144,7 +144,7 @@ def test_compiled_equals_plain(d, n, m, monkeypatch):
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_a_batch_equals_its_members_in_any_order(d, choice):
-    n, m = 5, 37
+    n, m = 14, 37
     A, B, R = shapes_of(paths(n, d)), shapes_of(paths(m, d, seed=1)), rotations(n, m, d)
     whole, order = pair_distances(A, B, R), np.random.default_rng(0).permutation(m)
     exact = {"rtol": 0, "atol": 0 if choice == "always" else 1e-6}
@@ -152,8 +152,11 @@ def test_a_batch_equals_its_members_in_any_order(d, choice):
     for i, j in ((0, 0), (4, 36), (2, 16)):
         alone = pair_distances(A.take([i]), B.take([j]), R[[i]][:, [j]])
         np.testing.assert_allclose(alone[:, 0, 0], whole[:, i, j], **exact)
-    few = np.random.default_rng(1).permutation(m)[:7]  # so few are compared as a list
-    np.testing.assert_allclose(pair_distances(A, B.take(few), R[:, few]), whole[:, :, few], **exact)
+    # Of the whole and of the first, 16 of A's movements are compared at once, of others a list of pairs, 16 of B's.
+    for i, some in ((14, 7), (5, 7), (5, 16)):
+        few = np.random.default_rng(some).permutation(m)[:some]
+        found = pair_distances(A.take(slice(0, i)), B.take(few), R[:i, few])
+        np.testing.assert_allclose(found, whole[:, :i, few], **exact)
 
 
 def test_rotations_are_matrices_or_cosines_and_sines(choice, monkeypatch):

@@ -29,8 +29,12 @@ _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fe
 def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:
     """Recognize the movements in RECORDINGS, a file or a folder, or - for CSV from the standard input.
 
-    A movement that is like no symbol is unknown. What cannot be read is listed. With one demonstration of each symbol
-    p-values are a guess, and the answer says so.
+    A movement that is like no symbol is unknown. What cannot be read is listed.
+
+    Confidence is the probability that the symbol is right if the movement is one of the library's; for an unknown
+    movement it is the share of known movements that are less novel. With --json, the rule says which demonstrations
+    decide what is unknown: those of the symbol (class), those of all symbols (pooled), or too few, as with one of each
+    (guess); the promise says what follows. P-values are then a guess too, and the answer says so.
 
     Example: kineme recognize new.csv --library actions/
     """
@@ -67,6 +71,9 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
         "symbol": answer.label,
         "id": None if answer.label is None else ids[answer.label],
         "confidence": answer.confidence,
+        "p_known": answer.p_known,
+        "rule": answer.rule,
+        "promise": answer.promise,
         "calibrated": answer.calibrated,
         "ranked": [{"symbol": str(name), "p_value": answer.p_values.get(name)} for name in answer.ranked[:top]],
         "like": [{"movement": one.index, "name": one.name, "similarity": one.similarity} for one in answer.nearest],
@@ -98,8 +105,9 @@ def _text(data: dict[str, Any], error_rate: float) -> str:
     if not all(one["calibrated"] for one in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
-            "Confidence and p-values are a guess: too few demonstrations tell how much movements of one symbol differ; "
-            f"learn two or more of each symbol, {needed} in all, to keep --error-rate {error_rate:g}"
+            "Which movements are unknown, their confidence, and p-values are a guess: too few demonstrations tell how "
+            "much movements of one symbol differ; learn two or more of each symbol, "
+            f"{needed} in all, to keep --error-rate {error_rate:g}"
         )
     return "\n".join(lines + [f"not read: {printable(problem)}" for problem in data["problems"]])
 

@@ -21,7 +21,8 @@ from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
 _TILE_ROWS, _TILE_PAIRS = 32, 4096  # the columns are packed once for so many rows; a tile takes about a millisecond
-_FEW_COLUMNS = 8  # with so few, most lanes of a row would be idle: its pairs are taken as a list
+_LANES = 16  # pairs that the compiled loops compare at once
+_LISTED = 1.2  # time of 16 pairs taken from a list, by that of 16 of one movement with others
 _TWIN_PAIRS = 1000
 _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 
@@ -54,8 +55,8 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) 
         return squares
     compiled = use_compiled(n * m * _PAIR_OPERATIONS)
     fill = _fill_compiled if compiled else _fill_plain
-    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m))
-    columns = max(16, _TILE_PAIRS // rows // 16 * 16)
+    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m // _LANES * _LANES))
+    columns = m if rows * m <= _TILE_PAIRS else max(_LANES, _TILE_PAIRS // rows // _LANES * _LANES)
     tiles = [
         (slice(i, min(i + rows, n)), slice(j, min(j + columns, m)))
         for i in range(0, n, rows)
@@ -106,8 +107,11 @@ def _fill_compiled(A: Shapes, B: Shapes, rows: slice, columns: slice, entries: F
     sides = (_arrays(A, rows), _arrays(B, columns))
     # Always contiguous, so that one version is compiled.
     found = squares if squares.flags.c_contiguous else np.empty(squares.shape, np.float32)
-    if m > _FEW_COLUMNS or n == 1:
+    by_columns, by_rows, listed = n * -(-m // _LANES), m * -(-n // _LANES), _LISTED * -(-n * m // _LANES)
+    if by_columns <= min(by_rows, listed):
         module.fill_grid((0,) * A.n_dims, sides, numbers, entries, found)
+    elif by_rows <= listed:
+        module.fill_by_rows((0,) * A.n_dims, sides, numbers, entries, found)
     else:
         pairs = np.divmod(np.arange(n * m), m)
         entries = entries.reshape(n * m, 1, -1) if entries.size else np.empty((n * m, 1, 0), np.float32)

@@ -22,6 +22,7 @@ from kineme.recognition.left_out import (
     ClassDistances,
     Scored,
     broad_law,
+    distances,
     finite,
     law,
     score_classes,
@@ -30,7 +31,6 @@ from kineme.recognition.left_out import (
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
-_ROUNDING = 1e-5  # of log similarities, in single precision
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced
 
 #: Rule by which a movement is called known or unknown -> what it promises.
@@ -46,14 +46,6 @@ def check_error_rate(error_rate: float) -> None:
     check_number("error_rate", error_rate, above=0.0)
     if error_rate >= 1:
         raise SpecificationError(f"expected error_rate below 1, got {error_rate!r}; 0.05 is one member in twenty")
-
-
-def distances(logs: Array) -> Array:
-    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K.
-
-    0 between copies: what rounding makes of them would make some more novel than others.
-    """
-    return np.sqrt(np.where(logs < -_ROUNDING, -2.0 * logs, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
