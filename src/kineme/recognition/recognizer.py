@@ -342,7 +342,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Parameters
         ----------
         confidence : float, default 0.9
-            Share of the evidence at which a label is decided.
+            Share of the evidence at which a label is decided. At 0.9, about nine in ten of the labels decided before
+            the end are right for people without demonstrations, more for people with some.
         patience : float, default 0.05
             How long it must be held, as a share of the time so far.
         early : Early, optional
