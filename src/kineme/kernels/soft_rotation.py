@@ -52,7 +52,7 @@ class RotationPrior:
     vertical : tuple of 3 floats, optional
         The direction of gravity, either way, for movements in space that are turned about it more often than tilted.
     tilt : float, default 0.5
-        t of ``F = k I + t u u^T``, u the unit vector along `vertical`: tilting by t costs ``tilt (1 - cos t)`` more.
+        s of ``F = k I + s u u^T``, u the unit vector along `vertical`: tilting by t costs ``s (1 - cos t)`` more.
 
     Raises
     ------

@@ -80,7 +80,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     demonstrations_ : Demonstrations
         The training movements, ordered by class.
     representations_ : tuple of R Representation
-        Those with a weight above 0.
+        Those with a weight above 0, and positions over arc length if pairs are rotated by them.
     weights_ : ndarray of shape (R,)
         Their weights in the average; they sum to 1.
     widths_ : ndarray of shape (R,)
@@ -182,7 +182,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def representations_(self) -> tuple[Representation, ...]:
-        """The representations with a weight above 0."""
+        """The representations that movements are compared in."""
         return self._fitted[0].representations
 
     @property

@@ -23,7 +23,7 @@ from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
     Known,
     Manner,
-    Scored,
+    ScoredWindows,
     compare_windows,
     durations_of,
     expected,
@@ -111,7 +111,6 @@ def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, ND
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
-    motion = windows.motion
     motion, typical = windows.motion, expected(known.references)
     compared = compare_windows(known, motion, windows.rows)
     around = surroundings(motion, windows.bouts, compared.rows)
@@ -126,7 +125,7 @@ def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, ND
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), scored.best[chosen]
 
 
-def _best_windows(rows: Rows, scored: Scored) -> list[int]:
+def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
     """The chain of windows of largest summed score."""
     boundaries = np.unique(np.append(0, rows))
     first, last = np.searchsorted(boundaries, rows).T
