@@ -30,9 +30,8 @@ from kineme.comparison.specification import ComparisonSpecification
 from kineme.experiments.evaluation.conditions import TOGETHER
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.confidence import EXPONENT, class_probabilities
-from kineme.recognition.conformal import distances
 from kineme.recognition.known_classes import fit_known_classes
-from kineme.recognition.left_out import LEAST
+from kineme.recognition.left_out import LEAST, distances
 
 ERROR_RATE = 0.05
 SHOWN = (1, 2, 4, 8)

@@ -14,7 +14,7 @@ from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.recognition import sampled_calibration
-from kineme.recognition.conformal import distances
+from kineme.recognition.left_out import distances
 
 
 def _kinds(counts, d=2, seed=0, spread=0.05):

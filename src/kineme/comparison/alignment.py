@@ -8,15 +8,13 @@ import numpy as np
 
 from kineme.comparison.describe import N_POINTS, even_paths, recorded_paths
 from kineme.comparison.normalization import Normalization
-from kineme.comparison.representation import Representation
+from kineme.comparison.representation import POSITIONS
 from kineme.comparison.specification import Compares, specification_of
 from kineme.kernels.procrustes import Procrustes
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.parameters import from_numbers, shared_label, to_numbers
 from kineme.validation import Array
-
-_POSITIONS = Representation("positions", arc_share=1.0)  # over arc length: independent of timing
 
 
 class Maps(NamedTuple):
@@ -64,7 +62,7 @@ def maps_onto(paths: Array, onto: Array, like: Compares | None = None) -> Maps:
     See `fit_maps`; it is fitted to positions at even arc lengths.
     """
     how = specification_of(like)
-    along, target = _POSITIONS.along(paths), _POSITIONS.along(onto[None])
+    along, target = POSITIONS.along(paths), POSITIONS.along(onto[None])
     return fit_maps(along, target, how.normalization, how.procrustes(paths.shape[1]))
 
 

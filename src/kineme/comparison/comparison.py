@@ -28,7 +28,7 @@ class Comparison:
     Attributes
     ----------
     representations : tuple of R Representation
-        Those with a weight above 0.
+        Those with a weight above 0, and positions over arc length if pairs are rotated by them.
     normalization : Normalization
     cutoff : float or None
         Movements are smoothed below this many cycles each; None for not at all.
@@ -43,7 +43,7 @@ class Comparison:
 
     @property
     def procrustes(self) -> Procrustes:
-        """The distance between rows."""
+        """The distance between rows, and the best rotation of a pair."""
         return self.similarity.procrustes
 
     @property

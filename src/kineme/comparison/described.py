@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -28,14 +28,6 @@ class Pairs:
     positions: Prepared
     shapes: Shapes
     measures: tuple[int, ...]
-
-    def take(self, chosen: Any) -> Pairs:
-        """The chosen movements."""
-        return replace(self, positions=self.positions.take(chosen), shapes=self.shapes.take(chosen))
-
-    def empty(self, n: int) -> Pairs:
-        """Room for n movements."""
-        return replace(self, positions=self.positions.empty(n), shapes=self.shapes.empty(n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,20 +66,19 @@ class Described:
 
     def take(self, chosen: Any) -> Described:
         """The chosen movements: a slice, a mask or indices."""
-        blocks = tuple(block.take(chosen) for block in self.blocks)
-        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.take(chosen))
+        return self._changed(lambda arrays: arrays.take(chosen))
 
     def empty(self, n: int) -> Described:
         """Room for n movements that are described in the same way."""
-        blocks = tuple(block.empty(n) for block in self.blocks)
-        return replace(self, blocks=blocks, pairs=None if self.pairs is None else self.pairs.empty(n))
+        return self._changed(lambda arrays: arrays.empty(n))
 
     def put(self, start: int, others: Described) -> None:
         """Write other movements over those from `start` on."""
         rows = slice(start, start + len(others))
         blocks = list(zip(self.blocks, others.blocks, strict=True))
         if self.pairs is not None and others.pairs is not None:
-            blocks.append((self.pairs.positions, others.pairs.positions))
+            if not any(block is self.pairs.positions for block in self.blocks):
+                blocks.append((self.pairs.positions, others.pairs.positions))
             self.pairs.shapes.put(start, others.pairs.shapes)
         for ours, theirs in blocks:
             ours.rows[rows], ours.squares[rows] = theirs
@@ -100,6 +91,18 @@ class Described:
             self,
             blocks=tuple(self.blocks[r] for r in chosen if r < n),
             pairs=replace(self.pairs, measures=measures) if self.pairs is not None and measures else None,
+        )
+
+    def _changed(self, change: Callable[[Any], Any]) -> Described:
+        """All arrays changed alike; positions that are a block as well stay one object, which is compared once."""
+        blocks = tuple(map(change, self.blocks))
+        if self.pairs is None:
+            return replace(self, blocks=blocks)
+        old = self.pairs.positions
+        same = [new for block, new in zip(self.blocks, blocks, strict=True) if block is old]
+        positions = same[0] if same else change(old)
+        return replace(
+            self, blocks=blocks, pairs=replace(self.pairs, positions=positions, shapes=change(self.pairs.shapes))
         )
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:

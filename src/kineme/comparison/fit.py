@@ -43,7 +43,8 @@ def fit_comparison(
     Returns
     -------
     comparison : Comparison
-        With the representations that have a weight above 0.
+        With the representations that have a weight above 0, and with positions over arc length if any of them is
+        compared pair by pair.
     references : References
         The movements, ordered by class.
 

@@ -1,4 +1,4 @@
-"""Representations of movements: a quantity along a phase, compared sample by sample or as a whole."""
+"""Representations of movements: a quantity along a phase, compared sample by sample or pair by pair."""
 
 from __future__ import annotations
 
@@ -25,31 +25,39 @@ ROW_QUANTITIES = ("positions", "forcing")
 PAIR_QUANTITIES = ("elastic", "turning", "cloud")
 QUANTITIES = ROW_QUANTITIES + PAIR_QUANTITIES
 
-
+#: Quantity -> name of the representation.
 PAIR_NAMES = {"elastic": "elastic path", "turning": "turning angles", "cloud": "point cloud"}
 
 
 @dataclass(frozen=True)
 class Representation:
-    """One way to describe an evenly sampled, smooth path by a row of numbers.
+    """One way to describe an evenly sampled, smooth path: by a row of numbers, or by what pairs are compared by.
 
     A recognizer compares movements in several representations and averages the similarities: what misleads one of them,
     such as uneven timing or a deformed path, leaves another one unimpaired.
 
     Parameters
     ----------
-    quantity : {"positions", "forcing"}
-        The path itself, or the forcing term f of a bio-inspired DMP learned from it, which turns with the movement. The
-        DMP is fitted to the path with a curvature penalty (``fit="trajectory"``), so that no noise is differentiated.
-    arc_share : float
+    quantity : {"positions", "forcing", "elastic", "turning", "cloud"}
+        Sample by sample: "positions", the path itself, or "forcing", the forcing term f of a bio-inspired DMP learned
+        from it, which turns with the movement. The DMP is fitted to the path with a curvature penalty
+        (``fit="trajectory"``), so that no noise is differentiated. Pair by pair: "elastic", dynamic time warping of
+        tangents, positions and turning angles, "turning", of turning angles alone, or "cloud", points in any order, see
+        `kineme.kernels.elastic` and `kineme.kernels.point_cloud`. They need positions over arc length beside them.
+    arc_share : float, default 1.0
         The phase: 0 is time, 1 arc length, between them a blend; see `arc_length_phase`. Arc length is independent of
         timing; time distinguishes movements that differ in timing only. What is compared pair by pair takes arc length.
     n_points : int, default 100
         Samples along the phase.
     n_basis, stiffness, ridge
-        Of the DMP.
+        Of the DMP; for "forcing" alone.
     weight : float, default 1.0
         Share in the average where no weights are given or fitted, relative to those of the others.
+
+    Raises
+    ------
+    SpecificationError
+        A parameter out of its range, or another phase than arc length for what is compared pair by pair.
     """
 
     quantity: str
@@ -80,7 +88,7 @@ class Representation:
 
     @property
     def name(self) -> str:
-        """As in "forcing over arc length"."""
+        """As in "forcing over arc length", or "elastic path"."""
         if self.in_pairs:
             return PAIR_NAMES[self.quantity]
         phase = {0.0: "time", 1.0: "arc length"}.get(self.arc_share, f"{self.arc_share:g} arc length")
@@ -96,9 +104,9 @@ class Representation:
     def describe(self, paths: NDArray[Any], translation: bool = True) -> NDArray[Any]:
         """Rows (n, d * n_points), dimension-major, of normalized paths (n, d, n_points) along the phase.
 
-        In the precision of the paths. Without `translation` the paths still have their position, and it is added to the
-        forcing term: f itself does not depend on it, so that movements at other positions would be similar in that
-        representation.
+        For what is compared sample by sample; in the precision of the paths. Without `translation` the paths still have
+        their position, and it is added to the forcing term: f itself does not depend on it, so that movements at other
+        positions would be similar in that representation.
         """
         described = paths
         if self.quantity == "forcing":

@@ -23,15 +23,15 @@ _TILE_PAIRS = 500_000  # at a time: each representation's kernel is held beside 
 
 @dataclass(frozen=True, eq=False)
 class AveragedSimilarity:
-    """An A-average of one RBF kernel per representation, each on its Procrustes distance.
+    """An A-average of one RBF kernel per representation, each on its own distance, see `squared_distances`.
 
     ``k_r(a, b) = exp(-d_r(a, b)^2 / (2 sigma_r^2))`` and ``K = mean_r k_r``, or ``sum_r w_r k_r``. Each kernel is
     narrow and bounded: a representation in which two movements are far contributes nothing, while in a sum of distances
     it would dominate the others. Logarithms keep the order of movements that are far in every representation, where
     each k_r underflows.
 
-    The arithmetic mean is positive semi-definite where each k_r is: with ``max_angle = 0``. A Procrustes distance is
-    not Euclidean, and no claim is made for it.
+    The arithmetic mean is positive semi-definite where each k_r is: with ``max_angle = 0`` and representations that are
+    compared sample by sample. Procrustes distances and those of pairs are not Euclidean, and no claim is made for them.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class AveragedSimilarity:
         The sigma_r.
     mean : str
     weights : ndarray of shape (R,) or None
-        Positive, summing to 1; equal if None.
+        At least 0, summing to 1; equal if None.
     """
 
     procrustes: Procrustes

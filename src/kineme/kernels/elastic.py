@@ -1,4 +1,4 @@
-"""Elastic distance of two movements by their segments, and a lower bound: the plain definition.
+"""Elastic and turning distances of two movements by their segments: the plain definition.
 
 For movements a and b and a rotation R that brings b onto a, two segments p, q cost
 

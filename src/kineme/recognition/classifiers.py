@@ -18,7 +18,7 @@ from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
 from kineme.validation import Array
 
-_WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-1)
+_WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-0.8)
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kineme.recognition.conformal import distances
-from kineme.recognition.left_out import LEAST
+from kineme.recognition.left_out import LEAST, distances
 from kineme.validation import Array
 
 #: Power of the ratio of distances. The right classes of 20 gestures in space by five people, one to four demonstrations

@@ -22,6 +22,7 @@ from kineme.recognition.left_out import (
     ClassDistances,
     Scored,
     broad_law,
+    distances,
     finite,
     law,
     score_classes,
@@ -45,11 +46,6 @@ def check_error_rate(error_rate: float) -> None:
     check_number("error_rate", error_rate, above=0.0)
     if error_rate >= 1:
         raise SpecificationError(f"expected error_rate below 1, got {error_rate!r}; 0.05 is one member in twenty")
-
-
-def distances(logs: Array) -> Array:
-    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K."""
-    return np.sqrt(np.maximum(-2.0 * logs, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

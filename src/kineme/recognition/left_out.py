@@ -20,6 +20,11 @@ LEAST = 5e-3
 REACH, REACH_OF_OTHERS = 0.75, 1.0
 
 
+def distances(logs: Array) -> Array:
+    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K."""
+    return np.sqrt(np.maximum(-2.0 * logs, 0.0))
+
+
 def broad_law(scores: Array) -> Array:
     """``exp(-pi/4 a^2)``: share of distances above a times their mean, of normal vectors in the plane (Rayleigh)."""
     return np.asarray(np.exp(-0.25 * math.pi * scores**2))
@@ -58,8 +63,9 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
         )
     try:
         return np.asarray(np.unique(given, return_inverse=True)[1], dtype=np.intp)
-    except TypeError as error:
-        raise TrajectoryError(f"expected groups that are texts or numbers, got {error}") from None
+    except TypeError:
+        kinds = " and ".join(sorted({type(one).__name__ for one in given.tolist()}))
+        raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
 @dataclass(frozen=True, eq=False)

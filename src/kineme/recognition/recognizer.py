@@ -80,7 +80,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     demonstrations_ : Demonstrations
         The training movements, ordered by class.
     representations_ : tuple of R Representation
-        Those with a weight above 0.
+        Those with a weight above 0, and positions over arc length if pairs are rotated by them.
     weights_ : ndarray of shape (R,)
         Their weights in the average; they sum to 1.
     widths_ : ndarray of shape (R,)
@@ -182,7 +182,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     @property
     def representations_(self) -> tuple[Representation, ...]:
-        """The representations with a weight above 0."""
+        """The representations that movements are compared in."""
         return self._fitted[0].representations
 
     @property
@@ -306,7 +306,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Parameters
         ----------
         recording : Trajectory or array_like of shape (T, d)
-            Unlabeled; pass a `Trajectory`, the time stamps matter.
+            Unlabeled. An array counts as one second and is refused where the demonstrations have time stamps.
         error_rate : float, default 0.05
             The smaller, the more a movement may differ from the demonstrations. Not the share of movements that are
             missed: a movement in a recording is cut by the search itself, see `kineme.recognition.window_scores`.

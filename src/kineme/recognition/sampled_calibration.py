@@ -11,8 +11,8 @@ from kineme.comparison.bounds import log_bounds
 from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
-from kineme.recognition.conformal import Calibration, distances
-from kineme.recognition.left_out import ClassDistances, score_classes, typical_scale
+from kineme.recognition.conformal import Calibration
+from kineme.recognition.left_out import ClassDistances, distances, score_classes, typical_scale
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 

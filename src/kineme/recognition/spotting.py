@@ -14,14 +14,16 @@ from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.segmentation.segmentation import pieces_of
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
     Known,
     Manner,
-    Scored,
+    ScoredWindows,
     compare_windows,
     durations_of,
     expected,
@@ -64,13 +66,13 @@ def spot(
     """Find movements like the references in a recording; see `Recognizer.spot`."""
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
-    whole = as_recording(recording)
+    lasting = durations_of(references)
+    whole = _as_timed(recording) if lasting is not None else as_recording(recording)
     if whole.n_dims != comparison.n_dims:
         raise TrajectoryError(
             f"expected a recording of {comparison.n_dims} dimensions as in fit, got {whole.n_dims}; "
             "select the dimensions"
         )
-    lasting = durations_of(references)
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
@@ -93,11 +95,22 @@ def spot(
     ]
 
 
+def _as_timed(recording: MovementsLike) -> Trajectory:
+    """The recording, whose time stamps are known, as those of the references are."""
+    if not isinstance(recording, Trajectory):
+        recording = Demonstrations.of(recording)
+        if recording.movements.times is None:
+            raise TrajectoryError(
+                "expected time stamps, as the demonstrations have, got an array, which counts as one second; pass "
+                "kineme.Trajectory(times, positions)"
+            )
+    return as_recording(recording)
+
+
 def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
-    motion = windows.motion
     motion, typical = windows.motion, expected(known.references)
     compared = compare_windows(known, motion, windows.rows)
     around = surroundings(motion, windows.bouts, compared.rows)
@@ -112,7 +125,7 @@ def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, ND
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), scored.best[chosen]
 
 
-def _best_windows(rows: Rows, scored: Scored) -> list[int]:
+def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:
     """The chain of windows of largest summed score."""
     boundaries = np.unique(np.append(0, rows))
     first, last = np.searchsorted(boundaries, rows).T

@@ -19,7 +19,8 @@ from kineme.comparison.stored_references import HeldReferences, OnDemand, Rows, 
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Verdict, verdicts_of, with_transforms
 from kineme.recognition.classifiers import Nearest
-from kineme.recognition.conformal import Calibration, check_error_rate, distances
+from kineme.recognition.conformal import Calibration, check_error_rate
+from kineme.recognition.left_out import distances
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 

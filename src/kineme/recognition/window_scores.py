@@ -64,7 +64,7 @@ class Manner:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparedWindows:
     """n windows, compared with C classes.
 
     Attributes
@@ -84,7 +84,7 @@ class Compared:
     slowness: Array
 
 
-class Scored(NamedTuple):
+class ScoredWindows(NamedTuple):
     """Best class of each window and its score, (n,); above 0 where it counts as known."""
 
     best: NDArray[np.intp]
@@ -118,7 +118,7 @@ def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
     return np.log(np.maximum(size, np.finfo(float).tiny)), slow
 
 
-def compare_windows(known: Known, motion: Motion, rows: Rows) -> Compared:
+def compare_windows(known: Known, motion: Motion, rows: Rows) -> ComparedWindows:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
     start, end = motion.times[rows].T
     scores = np.empty((len(rows), len(known.references.classes)))
@@ -129,12 +129,12 @@ def compare_windows(known: Known, motion: Motion, rows: Rows) -> Compared:
         paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
         sizes[tile], slowness[tile] = _size_and_slowness(paths)
         scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, nearest)[0])
-    return Compared(rows, scores, np.log(end - start), sizes, slowness)
+    return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 
 def score_windows(
-    compared: Compared, typical: Expected, around: Surroundings, manner: Manner, error_rate: float
-) -> Scored:
+    compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner, error_rate: float
+) -> ScoredWindows:
     """Scores of windows, such that a chain of windows is better the larger its sum.
 
     The cost of a window is its nonconformity to the class, in that at which a window counts as far, plus squared
@@ -160,10 +160,10 @@ def score_windows(
     closeness = 1.0 - costs[np.arange(len(best)), best]
     closeness -= _EDGE * around.edge_speeds + _FAR_FROM_REST * around.far_from_rest
     closeness -= _SPANNED * around.rests_inside
-    return Scored(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
+    return ScoredWindows(best, np.maximum(closeness, 0.0) * np.exp(lasting - usual) - _PER_MOVEMENT)
 
 
-def manner_of(compared: Compared, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
+def manner_of(compared: ComparedWindows, typical: Expected, chosen: list[int], best: NDArray[np.intp]) -> Manner:
     """The manner of a recording by the windows that are chosen; its tempo is shrunk towards that demonstrated."""
     if not chosen:
         return Manner()

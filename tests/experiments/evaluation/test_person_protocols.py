@@ -1,13 +1,12 @@
-"""Splits by person, recordings for spotting, and the measures of spotting and anchoring."""
+"""Splits by person, and the measures of anchoring."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme.experiments.evaluation.concatenated import concatenated
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.measures import Stretch, clustered, spotted
+from kineme.experiments.evaluation.measures import clustered
 from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.splits import one_person_out, within_person
 from kineme.experiments.evaluation.trials import Settings
@@ -83,41 +82,6 @@ def test_people_decide_what_runs(small, of_people):
         assert protocol.runs_by_default(of_people) is (protocol.by_person and chosen)
         assert protocol.runs_by_default(nobody) is (not protocol.by_person and chosen)
         assert ("which of at least two people" in protocol.unsuitable(nobody)) is protocol.by_person
-
-
-@pytest.mark.parametrize("rest", [0.0, 0.8])
-def test_a_recording_holds_every_movement_where_it_says(small, rest):
-    [made] = concatenated(small, rest, [0, 1])
-    t, x = made.recording.times, made.recording.positions
-    assert sorted(one.label for one in made.stretches) == sorted(small.labels)
-    assert (np.diff(t) > 0).all()
-    remaining = list(small)
-    for one, following in zip(made.stretches, [*made.stretches[1:], None], strict=True):
-        inside = (t >= one.start - 1e-9) & (t <= one.end + 1e-9)
-        same = [k for k, movement in enumerate(remaining) if np.array_equal(movement.positions, x[inside])]
-        del remaining[same[0]]
-        if following is not None:
-            assert following.start - one.end >= rest
-    assert remaining == []
-
-
-def test_the_same_seed_gives_the_same_recording(small):
-    times = [concatenated(small, 0.5, seed)[0].recording.positions for seed in ([0, 1], [0, 1], [0, 2])]
-    np.testing.assert_array_equal(times[0], times[1])
-    assert times[0].shape != times[2].shape or not np.array_equal(times[0], times[2])
-
-
-def test_long_recordings_are_split(small):
-    twice = type(small).from_arrays([one.positions for one in [*small, *small]], np.tile(small.labels, 2))
-    assert [len(one.stretches) for one in concatenated(twice, 0.0, [0])] == [20, 12]
-
-
-def test_precision_and_recall_of_stretches():
-    true = [[Stretch(0, 10, "a"), Stretch(20, 30, "b")], [Stretch(0, 4, "a")]]
-    assert spotted(true, true) == {"precision": 1.0, "recall": 1.0}
-    found = [[Stretch(1, 10, "a"), Stretch(1.5, 9.5, "a"), Stretch(20, 30, "a")], [Stretch(3, 7, "a")]]
-    assert spotted(found, true) == {"precision": 0.25, "recall": pytest.approx(1 / 3)}
-    assert spotted([[], []], true) == {"precision": 0.0, "recall": 0.0}
 
 
 def test_clusters_are_compared_with_classes():

@@ -1,5 +1,7 @@
 """What the protocols ask, and that they ask all methods the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.methods import METHODS, Method, Options
 from kineme.experiments.evaluation.protocols import PROTOCOLS, usable_shots
 from kineme.experiments.evaluation.score_split import does, score_split
+from kineme.experiments.evaluation.spotting import Stretch, concatenate_all
 from kineme.experiments.evaluation.trials import TASKS, Settings
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.early import cut
@@ -74,6 +77,45 @@ def test_who_knows_everything_is_always_right(of_people, logs, protocol):
     scores = score_split(of_people, protocol, "one", 0, SETTINGS)
     assert scores
     assert all(one.values == {"accuracy": 1.0} for one in scores)
+
+
+def test_recordings_with_rests_and_without_are_spotted(of_people, monkeypatch):
+    """Who finds every movement where it is has precision and recall 1, by oneself and by others."""
+    made = []
+
+    def noted(movements, labels, seed, *, rests):
+        made.append((rests, concatenate_all(movements, labels, seed, rests=rests)))
+        return made[-1][1]
+
+    class Oracle(Recording):
+        def spot(self, recording):
+            return next(one.truth for one in made[-1][1] if one.recording is recording)
+
+    monkeypatch.setattr(scoring, "concatenate_all", noted)
+    monkeypatch.setattr(scoring, "METHODS", {"one": Method("one", lambda _: Oracle([]))})
+    scores = score_split(of_people, "spotting", "one", 0, SETTINGS)
+    assert [one.values for one in scores] == [{"precision": 1.0, "recall": 1.0}] * 4
+    assert [rests for rests, _ in made] == [True, False] * 2
+    assert [one.condition.label for one in scores] == [
+        "own, with rests", "own, without rests", "others, with rests", "others, without rests",
+    ]  # fmt: skip
+    assert all(bool(one.transits) is rests for rests, several in made for one in several)
+
+
+def test_movements_of_unknown_classes_must_not_be_found(of_people, monkeypatch):
+    trial = next(iter(PROTOCOLS["spotting"].trials(of_people, SETTINGS, 0)))
+    known = np.arange(len(trial.split.test)) % 2 == 0
+    half = replace(trial, split=trial.split._replace(known=known))
+
+    class FindsAll(Recording):
+        def spot(self, recording):
+            return [Stretch(*one[:2], one.label or "class 0") for one in made[0].truth]
+
+    made = []
+    inner = concatenate_all
+    monkeypatch.setattr(scoring, "concatenate_all", lambda *args, rests: made.extend(inner(*args, rests=rests)) or made)
+    [scores] = scoring._spot(FindsAll([]), half, [0, 0])
+    assert scores.values == {"precision": known.mean(), "recall": 1.0}
 
 
 @pytest.mark.parametrize("method", AVAILABLE)

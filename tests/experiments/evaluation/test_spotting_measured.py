@@ -12,6 +12,7 @@ from kineme.experiments.evaluation.spotting import (
     Counts,
     Stretch,
     concatenate,
+    concatenate_all,
     count_boundaries,
     count_spotted,
     overlap,
@@ -64,6 +65,26 @@ def test_the_same_seed_gives_the_same_recording():
     np.testing.assert_array_equal(one.positions, other.positions)
 
 
+@pytest.mark.parametrize("rests", [True, False])
+def test_many_movements_make_several_recordings_in_random_order(rests):
+    movements = kineme.load_lasa(SHAPES)
+    both = movements[np.tile(np.arange(len(movements)), 2)]
+    made = [concatenate_all(both, both.labels.tolist(), seed, rests=rests) for seed in ([0, 1], [0, 1], [0, 2])]
+    assert [len(one.truth) for one in made[0]] == [20, 20, 16]
+    labels = [[one.label for recording in each for one in recording.truth] for each in made]
+    assert labels[0] == labels[1] != labels[2]
+    assert sorted(labels[0]) == sorted(labels[2]) == sorted(both.labels)
+    assert labels[0] != both.labels.tolist()
+    assert bool(made[0][0].transits) is rests
+    np.testing.assert_array_equal(made[0][0].recording.positions, made[1][0].recording.positions)
+
+
+def test_recordings_at_rest_are_linked_too():
+    movements = kineme.Demonstrations([kineme.Trajectory(np.arange(12) / 10, np.zeros((12, 2)))] * 3)
+    [made] = concatenate_all(movements, [None] * 3, [0], rests=False)
+    assert np.isfinite(made.recording.positions).all()
+
+
 @pytest.mark.parametrize(("a", "b", "share"), [((0, 2), (0, 2), 1), ((0, 2), (1, 3), 1 / 3), ((0, 1), (2, 3), 0)])
 def test_overlap_is_intersection_over_union(a, b, share):
     assert overlap(a, b) == overlap(b, a) == pytest.approx(share)
@@ -81,7 +102,7 @@ def test_a_spot_is_right_with_its_label_and_half_of_the_union():
     assert counts == Counts(n_right=1, n_found=3, n_true=2)
     assert (counts + counts).precision == pytest.approx(1 / 3)
     assert counts.recall == 0.5
-    assert Counts().precision == Counts().recall == 1.0
+    assert (Counts().precision, Counts().recall) == (0.0, 1.0)  # finding nothing is not rewarded
 
 
 def test_a_movement_in_two_halves_is_found_at_most_once():

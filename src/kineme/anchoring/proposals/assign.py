@@ -18,8 +18,8 @@ from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.similarity import compare
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.conformal import distances as in_widths
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes, open_set_labels
+from kineme.recognition.left_out import distances as in_widths
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_count
 

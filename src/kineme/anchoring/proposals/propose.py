@@ -21,8 +21,9 @@ from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_choice, check_count
 
+_SPECTRAL = "spectral"
 #: Of `propose` and of whatever clusters by it.
-DEFAULT_METHOD = "spectral"
+DEFAULT_METHOD = _SPECTRAL
 _LARGEST = 2000  # movements whose similarities are fused at once
 _REPEATS = 20  # subsets that clusters must come again in
 
@@ -73,7 +74,7 @@ def propose(
     SpecificationError
         Parameters out of range, fewer than three movements, or copies of one movement.
     """
-    check_choice("method", method, [DEFAULT_METHOD, *METHODS])
+    check_choice("method", method, [_SPECTRAL, *METHODS])
     check_count("min_members", min_members, 2)
     described = describe(movements, like)
     _check_count_of(n_clusters, method, len(described))
@@ -88,7 +89,7 @@ def propose(
 
 def _largest(method: str, n_dims: int) -> int:
     """Movements that are all compared with each other by default."""
-    return _LARGEST if method == DEFAULT_METHOD else largest_clustered(n_dims)
+    return _LARGEST if method == _SPECTRAL else largest_clustered(n_dims)
 
 
 def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
@@ -108,7 +109,7 @@ def _propose(
     K = similarities(described, widths=similarity.widths)
     order = own_order(K)
     clusters = np.empty(len(K), dtype=np.intp)
-    if method == DEFAULT_METHOD:
+    if method == _SPECTRAL:
         found, stable = _by_neighbors(described.take(order), n_clusters, min_members)
     else:
         found, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
@@ -137,8 +138,8 @@ def by_shape(described: Described) -> Described:
     """Without the forcing term, if movements are also compared pair by pair: across people it tells little."""
     if described.pairs is None:
         return described
-    n, rows = len(described.blocks), described.pairs.positions.rows
-    positions = [r for r, one in enumerate(described.blocks) if np.array_equal(one.rows, rows)]
+    n = len(described.blocks)
+    positions = [r for r, one in enumerate(described.blocks) if one is described.pairs.positions]
     return described.select([*positions, *range(n, described.n_representations)])
 
 

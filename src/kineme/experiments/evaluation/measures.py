@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +10,6 @@ from numpy.typing import NDArray
 from kineme.validation import Array
 
 FALSE_REJECTION = 0.05  # of known movements
-_OVERLAP = 0.5  # of the union of two stretches, from which on they count as one
-
-
-class Stretch(NamedTuple):
-    """A movement within a recording: from when to when [s], and its class."""
-
-    start: float
-    end: float
-    label: Any
 
 
 def accuracy(predicted: NDArray[Any], labels: NDArray[Any]) -> dict[str, float]:
@@ -54,33 +44,6 @@ def auroc(inside: Array, outside: Array) -> float:
     order = np.sort(outside)
     below = np.searchsorted(order, inside, side="left") + np.searchsorted(order, inside, side="right")
     return float(below.mean() / (2.0 * len(order)))
-
-
-def spotted(found: Sequence[Sequence[Stretch]], true: Sequence[Sequence[Stretch]]) -> dict[str, float]:
-    """Precision and recall of stretches found in several recordings.
-
-    A found stretch is right if a true one of its class overlaps it by at least half of their union; no true one counts
-    twice. Where nothing is found, precision is 0.
-    """
-    right = sum(_right(*both) for both in zip(found, true, strict=True))
-    n_found, n_true = sum(map(len, found)), sum(map(len, true))
-    return {"precision": right / n_found if n_found else 0.0, "recall": right / n_true}
-
-
-def _right(found: Sequence[Stretch], true: Sequence[Stretch]) -> int:
-    """Number of found stretches that are right; above half of the union, no two of either can overlap the same one."""
-    left = list(true)
-    for one in found:
-        matching = (k for k, other in enumerate(left) if one.label == other.label and _overlap(one, other) >= _OVERLAP)
-        if (k := next(matching, None)) is not None:
-            del left[k]
-    return len(true) - len(left)
-
-
-def _overlap(one: Stretch, other: Stretch) -> float:
-    """Length of the intersection over that of the union."""
-    union = max(one.end, other.end) - min(one.start, other.start)
-    return max(min(one.end, other.end) - max(one.start, other.start), 0.0) / union
 
 
 def clustered(found: NDArray[Any] | None, given: NDArray[Any], labels: NDArray[Any]) -> dict[str, float]:

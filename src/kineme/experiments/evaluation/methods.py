@@ -13,9 +13,9 @@ from kineme.anchoring import propose
 from kineme.experiments.evaluation.clouds import PlusCloud, PointCloud, QuickCloud
 from kineme.experiments.evaluation.generative import HiddenMarkov
 from kineme.experiments.evaluation.linear_classifiers import AlignmentSVM, MiniRocket
-from kineme.experiments.evaluation.measures import Stretch
 from kineme.experiments.evaluation.neighbors import DTWNeighbor, EuclideanNeighbor, PaperFeatures
 from kineme.experiments.evaluation.optional import why_missing
+from kineme.experiments.evaluation.spotting import Stretch
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.early.early import cut

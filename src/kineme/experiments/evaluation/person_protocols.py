@@ -15,7 +15,7 @@ from kineme.movements.trajectories.demonstrations import require_labels
 _SHOTS = (1, 2, 3, 4, 8)
 _SOME_SHOTS = (1, 4)  # where each trial costs more
 _FRACTIONS = (0.5, 0.7, 0.9, 1.0)
-_RESTS = ((0.6, "with rests"), (0.0, "without rests"))  # [s]
+_RESTS = ((True, "with rests"), (False, "without rests"))
 
 
 def _people(data: DataSet) -> list[str]:
@@ -81,10 +81,10 @@ def _early(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
 def _spotting(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
     for own in (True, False):
         split = _split(data, max(settings.shots or _SOME_SHOTS), settings.seed, index, own=own)
-        for k, (rest, label) in enumerate(_RESTS):
+        for k, (rests, label) in enumerate(_RESTS):
             if _usable(data, split):
                 condition = Condition(f"spotting {own}", k, f"{'own' if own else 'others'}, {label}")
-                yield Trial(condition, data.demonstrations, split, "spot", rest=rest)
+                yield Trial(condition, data.demonstrations, split, "spot", rests=rests)
 
 
 def _anchoring(data: DataSet, _: Settings, index: int) -> Iterator[Trial]:
@@ -127,10 +127,10 @@ PERSON_PROTOCOLS: dict[str, Protocol] = {
         "given.", _early, _n_splits, "classify partial", person=_person, by_person=True,
     ),
     "spotting": Protocol(
-        "Spotting", "The test movements of one person in random order, in recordings of up to twenty, with and without "
-        "rests between them, and straight transits; templates by the same person (own) or by the others. A movement is "
-        "found if its class is right and the stretch overlaps it by at least half of their union.", _spotting,
-        _n_splits, "spot", person=_person, by_person=True,
+        "Spotting", "The test movements of one person in random order, in recordings of up to twenty, with rests and "
+        "straight transits between them, or linked without a stop; templates by the same person (own) or by the "
+        "others. A movement is found if its class is right and the stretch overlaps it by half of their union or more.",
+        _spotting, _n_splits, "spot", person=_person, by_person=True,
     ),
     "anchoring": Protocol(
         "Anchoring", "Movements without labels are clustered, those of each person alone and those of all people "

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.experiments.evaluation.concatenated import concatenated
 from kineme.experiments.evaluation.conditions import Condition
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.measures import accuracy, clustered, open_set, spotted
+from kineme.experiments.evaluation.measures import accuracy, clustered, open_set
 from kineme.experiments.evaluation.methods import METHODS, Contender, Options
 from kineme.experiments.evaluation.protocols import PROTOCOLS
+from kineme.experiments.evaluation.spotting import Counts, concatenate_all, count_spotted
 from kineme.experiments.evaluation.trials import TASKS, Settings, Trial
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.recognition.early.early import cut
@@ -70,12 +70,17 @@ def _partial(contender: Any, trial: Trial) -> Iterator[Scores]:
 
 
 def _spot(contender: Any, trial: Trial, seed: list[int]) -> Iterator[Scores]:
-    recordings = concatenated(trial.demonstrations[trial.split.test], trial.rest, seed)
+    test = trial.demonstrations[trial.split.test]
+    labels = [a if known else None for a, known in zip(require_labels(test), trial.split.known, strict=True)]
+    recordings = concatenate_all(test, labels, [2, *seed], rests=trial.rests)
     began = time.perf_counter()
     contender.fit(trial.demonstrations[trial.split.train])
     found = [contender.spot(one.recording) for one in recordings]
     seconds = time.perf_counter() - began
-    yield Scores(trial.condition, spotted(found, [one.stretches for one in recordings]), seconds)
+    counts = sum(
+        (count_spotted(*both) for both in zip(found, [one.truth for one in recordings], strict=True)), Counts()
+    )
+    yield Scores(trial.condition, {"precision": counts.precision, "recall": counts.recall}, seconds)
 
 
 def _cluster(contender: Any, trial: Trial) -> Iterator[Scores]:

@@ -13,6 +13,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array
 
+_MOST = 20  # movements of one recording
 _LEAST_OVERLAP = 0.5  # intersection over union from which a movement counts as found where it is
 _RESTS = (0.2, 1.0)  # shortest and longest [s]
 _TRANSITS = (0.3, 0.8)  # from one position to the next, between rests [s]
@@ -59,13 +60,33 @@ class Counts:
 
     @property
     def precision(self) -> float:
-        """Share of what was found that is right; 1 where nothing was found."""
-        return self.n_right / self.n_found if self.n_found else 1.0
+        """Share of what was found that is right; 0 where nothing was found, so that finding nothing is not rewarded."""
+        return self.n_right / self.n_found if self.n_found else 0.0
 
     @property
     def recall(self) -> float:
         """Share of what there is that was found."""
         return self.n_right / self.n_true if self.n_true else 1.0
+
+
+def concatenate_all(
+    movements: Demonstrations, labels: Sequence[Any], seed: Sequence[int], *, rests: bool = True
+) -> list[Concatenated]:
+    """Recordings of up to twenty movements each, in random order; see `concatenate`.
+
+    Parameters
+    ----------
+    movements : Demonstrations
+    labels : sequence
+        Of each movement; None for one that is not to be found.
+    seed : sequence of int
+        Of the order, the rests and the motion between movements.
+    rests : bool, default True
+    """
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(movements))
+    parts = [order[start : start + _MOST] for start in range(0, len(order), _MOST)]
+    return [concatenate(movements[part], [labels[i] for i in part], rng, rests=rests) for part in parts]
 
 
 def concatenate(
@@ -133,7 +154,7 @@ def _link(ending: Array, following: Array, rng: np.random.Generator, step: float
     """A cubic curve that leaves and arrives at the velocities that the movements have there."""
     distance = float(np.linalg.norm(following[0] - ending[-1]))
     fast = max(float(np.quantile(np.linalg.norm(np.diff(x, axis=0), axis=1), 0.9)) for x in (ending, following))
-    n = max(3, round(rng.uniform(*_LINKS) / step), round(distance / fast))
+    n = max(3, round(rng.uniform(*_LINKS) / step), round(distance / fast) if fast > 0 else 0)
     u = (np.arange(1, n) / n)[:, None]
     leaving, arriving = (ending[-1] - ending[-3]) / 2 * n, (following[2] - following[0]) / 2 * n
     a, b = ending[-1], following[0]

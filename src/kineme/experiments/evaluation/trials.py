@@ -52,8 +52,8 @@ class Trial:
         Largest rotation, for methods that have such a limit.
     fractions : tuple of float
         The shares of the test movements' paths that are classified, for "classify partial".
-    rest : float
-        Rest between the merged test movements [s], for "spot".
+    rests : bool
+        Whether there are rests between the concatenated test movements, for "spot".
     """
 
     condition: Condition
@@ -62,7 +62,7 @@ class Trial:
     task: str = "classify"
     max_angle: float | None = None
     fractions: tuple[float, ...] = ()
-    rest: float = 0.0
+    rests: bool = True
 
 
 Trials = Callable[[DataSet, Settings, int], Iterator[Trial]]
