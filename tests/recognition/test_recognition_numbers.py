@@ -253,7 +253,7 @@ def test_copies_under_two_names_say_nothing_of_how_far_classes_are_apart():
 
 
 def test_a_movement_that_explains_a_beginning_does_so_at_one_in_twenty_values_of_progress():
-    """Two of forty perfect ones are evidence 1; unknown is as far as an impostor, and three typical differences off."""
+    """Two of forty perfect ones are evidence 1; unknown is 1.5 impostors away, and three typical differences off."""
     recognizer = Recognizer().fit(draw_shapes([1, 1]))
     stored = hypotheses(recognizer.comparison_, recognizer.references_, Early(n_progress=40))
     evidence = np.full((1, 2 * 40), -np.inf)
@@ -261,4 +261,4 @@ def test_a_movement_that_explains_a_beginning_does_so_at_one_in_twenty_values_of
     known, other, unknown = stored.log_classes(evidence)[0]
     assert known == pytest.approx(0.0)
     assert other == -np.inf
-    assert unknown == pytest.approx(-0.5 / 0.35**2 - 1.5)
+    assert unknown == pytest.approx(-0.5 * (1.5 / 0.4) ** 2 - 1.5)
