@@ -67,8 +67,9 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
         )
     try:
         return np.asarray(np.unique(given, return_inverse=True)[1], dtype=np.intp)
-    except TypeError as error:
-        raise TrajectoryError(f"expected groups that are texts or numbers, got {error}") from None
+    except TypeError:
+        kinds = " and ".join(sorted({type(one).__name__ for one in given.tolist()}))
+        raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
 @dataclass(frozen=True, eq=False)
