@@ -17,8 +17,10 @@ from kineme.anchoring.proposals.subsample import extend
 from kineme.comparison.describe import describe, describe_rows, feature_rows
 from kineme.comparison.similarity import averaged, similarities
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.errors import SpecificationError
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.recognizer import Recognizer
+from movement_samples import draw_shapes
 from unlabeled_samples import ALL_TOGETHER, draw_kinds, partition, recovered
 
 METHODS = ("spectral", "agglomerative", "hdbscan")
@@ -203,3 +205,11 @@ def test_movements_that_cannot_be_told_apart():
         describe_rows(np.zeros((8, 5)), 2)
     with pytest.raises(IndexError, match="one of 2 proposals, got 2"):
         propose(demos)[2]
+
+
+def test_movements_that_do_not_move_are_one_cluster_or_refused():
+    still = [np.full((30, 3), float(i)) for i in range(8)]
+    moving = [one.positions for one in draw_shapes([2] * 2, 3)]
+    with pytest.raises(SpecificationError, match="got copies of one movement"):
+        propose(still)
+    assert len(set(propose(still + moving).clusters[:8].tolist())) == 1

@@ -135,3 +135,9 @@ def test_numbers_that_are_not_finite_never_reach_a_file(recording, tmp_path):
     assert done.returncode == 1
     assert "numbers up to 1e+100 for goal" in done.stderr
     assert done.stdout == ""
+
+
+def test_help_states_no_range_where_there_is_none():
+    shown = run("--help").stdout
+    assert "--rate" in shown
+    assert "None" not in shown

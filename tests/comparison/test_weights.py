@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sklearn.base import clone
 
-from kineme import Recognizer
+from kineme import Recognizer, Representation
 from kineme.comparison.described import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
 from kineme.comparison.weights import aligned_weights
@@ -130,3 +130,28 @@ def test_weights_need_the_arithmetic_mean():
     with pytest.raises(SpecificationError, match="mean='arithmetic', got it with mean='min'"):
         Recognizer(mean="min", weights="fitted").fit(draw_shapes([8, 8]))
     np.testing.assert_allclose(Recognizer(mean="min").fit(draw_shapes([8, 8])).weights_, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("representations", "weights"),
+    [
+        ((Representation("positions"), Representation("elastic")), (0, 1)),
+        ((Representation("positions", n_points=50), Representation("elastic")), (0, 1)),
+        ((Representation("positions", n_points=50), Representation("positions"), Representation("cloud")), (0, 1, 1)),
+    ],
+    ids=["other weight", "other points", "the first of two"],
+)
+def test_any_positions_without_weight_still_give_the_rotation(representations, weights):
+    demos, fresh = draw_shapes([3] * 3), draw_shapes([5] * 3, seed=3)
+    some, every = Recognizer(representations, weights=weights).fit(demos), Recognizer(representations).fit(demos)
+    assert some.representations_ == representations
+    np.testing.assert_array_equal(some.widths_, every.widths_)
+    np.testing.assert_array_equal(
+        some.describe(fresh).pairs.positions.squares, every.describe(fresh).pairs.positions.squares
+    )
+
+
+def test_positions_are_kept_once_and_compared_once():
+    whole = Recognizer().fit(draw_shapes([3] * 3)).references_.described
+    for part in (whole, whole.take(slice(0, 2)), whole.empty(2), whole.select([0, 2])):
+        assert part.pairs.positions is part.blocks[0]

@@ -108,6 +108,12 @@ def test_priors_that_are_none(wrong):
         RotationPrior(**wrong)
 
 
+@pytest.mark.parametrize("vertical", ["z", "up!", 2, (0, 0, "up"), (0, 0, None), (0, 0, math.nan), (0, 0, 10**400)])
+def test_what_is_no_vertical_is_refused_in_words_that_say_what_is(vertical):
+    with pytest.raises(SpecificationError, match=r"a direction in space, such as \(0, 0, 1\), got"):
+        RotationPrior(vertical=vertical)
+
+
 def test_where_a_prior_has_no_place():
     with pytest.raises(SpecificationError, match="a prior with max_angle=pi in two or three dimensions"):
         Procrustes(4, 0.0, RotationPrior())

@@ -92,6 +92,15 @@ def test_a_large_library_answers_as_the_nearest_of_all(make, count, d):
         np.testing.assert_allclose(a.transform.matrix, b.transform.matrix, atol=1e-4)
 
 
+@pytest.mark.parametrize("weights", [(0, 1, 1, 1, 1), (0, 0, 0, 0, 1)], ids=["no positions", "point cloud alone"])
+def test_a_large_library_without_weight_on_positions_answers_as_the_nearest_of_all(make, weights):
+    demos, asked = _kinds([4] * 6), _questions([4] * 6)
+    library = make(demos, recognizer=Recognizer(weights=weights, classifier="nearest"))
+    found = LibraryRecognizer(library.store, exhaustive=0).recognize(asked)
+    expected = Recognizer(weights=weights).fit(demos).predict(asked)
+    assert [one.ranked[0] for one in found] == expected.tolist()
+
+
 def test_large_classes_keep_the_error_rate(make):
     """New members of classes larger than what is sampled of them are unknown about as often as was asked for."""
     kinds = _kinds([200] * 4, seed=7, spread=0.1)

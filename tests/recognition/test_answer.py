@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import Demonstrations, Recognizer, Trajectory
+from kineme import Demonstrations, Recognizer, Representation, Trajectory
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.recognition.conformal import RULES
 from movement_samples import draw_shapes, turn
@@ -147,3 +147,12 @@ def test_labels_that_are_numbers_stay_numbers():
     answer = Recognizer().fit(demos, np.repeat([3, 5, 8], 2)).recognize(Demonstrations.of(demos[2:3]))[0]
     assert answer.label == 5
     assert isinstance(answer.label, int)
+
+
+def test_representations_of_one_name_share_their_responsibility():
+    one = (Representation("positions", n_points=50), Representation("positions", weight=2.0))
+    demos = draw_shapes([2] * 4)
+    recognizer = Recognizer(one).fit(demos)
+    answer = recognizer.recognize(demos)[0]
+    assert answer.responsibilities == pytest.approx({"positions over arc length": 1.0})
+    assert answer.transform.scale == pytest.approx(1.0)

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from sklearn.utils import Bunch
 
+import kineme
 from kineme.comparison.widths import SHARE
-from kineme.recognition.early.hypotheses import Hypotheses
+from kineme.recognition.early.early import cut, partial_shares
+from kineme.recognition.early.hypotheses import Early, Hypotheses, hypotheses
 
 
 def log_classes(*movements):
@@ -33,5 +35,30 @@ def test_the_evidence_for_a_class_is_the_mean_over_its_movements():
     assert log_classes(explains(2), explains(2), explains(2))[0] == pytest.approx(0.0)
 
 
-def test_the_unknown_is_as_far_as_an_impostor_and_a_little_less_likely():
-    assert log_classes(explains(2))[1] == pytest.approx(-0.5 / SHARE**2 - 1.5)
+def test_the_unknown_is_half_as_far_again_as_an_impostor_and_a_little_less_likely():
+    assert log_classes(explains(2))[1] == pytest.approx(-0.5 * (1.5 / SHARE) ** 2 - 1.5)
+
+
+def test_shares_are_those_of_the_evidence_to_the_power_of_four_fifths():
+    evidence = np.log(np.concatenate([np.maximum(explains(2), 1e-300), np.maximum(0.1 * explains(2), 1e-300)]))[None]
+    classes = Bunch(progress=np.arange(1, 41) / 40, first=np.arange(2), durations=np.ones(2))
+    classes.log_classes = lambda rows: Hypotheses.log_classes(classes, rows)
+    first, second, unknown = Hypotheses.shares(classes, evidence)[0]
+    assert first + second + unknown == pytest.approx(1.0)
+    assert first / second == pytest.approx(10**0.8)
+    assert math.log(unknown / first) == pytest.approx(0.8 * (-0.5 * (1.5 / SHARE) ** 2 - 1.5))
+
+
+def test_most_labels_are_decided_before_the_end_and_are_right():
+    """At 0.7 of the path of LASA's first 13 shapes, 3 demonstrations of each: half of them with an unknown that is as
+    far as an impostor.
+    """
+    demos = kineme.load_lasa()[: 13 * 7]
+    own = np.arange(len(demos)) % 7
+    recognizer = kineme.Recognizer().fit(demos[own < 3])
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    test = demos[own >= 5]
+    shares = partial_shares(recognizer.comparison_, stored, cut(test, 0.7))[:, :-1]
+    decided = shares.max(axis=1) >= 0.9
+    assert decided.mean() > 0.7
+    np.testing.assert_array_equal(recognizer.classes_[shares.argmax(axis=1)][decided], test.labels[decided])

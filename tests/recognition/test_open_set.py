@@ -173,3 +173,13 @@ def test_fitting_again_forgets_the_calibration():
     recognizer.p_values(demos)
     again = recognizer.fit(others).p_values(others)
     np.testing.assert_array_equal(again, Recognizer().fit(others).p_values(others))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_copies_are_known_where_all_demonstrations_have_copies(d):
+    """Distances between copies are rounding errors, of which none is more novel than another."""
+    demos = draw_shapes([3] * 4, d)
+    twice = demos[np.repeat(np.arange(len(demos)), 2)]
+    recognizer = Recognizer().fit(twice)
+    assert (recognizer.predict_known(demos) == demos.labels).all()
+    assert all(recognizer.recognize(one).label is not None for one in demos)

@@ -14,12 +14,16 @@ from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRES
 from kineme.comparison.weights import aligned_weights
 from kineme.kernels.procrustes import Prepared, Procrustes
 from kineme.movements.preparation.perturbations import Perturbation
+from kineme.movements.segmentation.motion import observe
+from kineme.recognition import spotting
+from kineme.recognition.candidate_windows import Surroundings
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.early.decision import Decision
+from kineme.recognition.early.evidence import _log_priors, describe_begun
 from kineme.recognition.early.hypotheses import Early, hypotheses
-from kineme.recognition.early.prefixes import beginnings, smooth_paths
+from kineme.recognition.early.prefixes import smooth_paths
 from kineme.recognition.left_out import typical_scale
-from kineme.recognition.spotting import _recognized
+from kineme.recognition.window_scores import Known, Manner, compare_windows, expected, score_windows
 from movement_samples import draw_shapes
 
 
@@ -125,54 +129,87 @@ def test_three_percent_of_noise_are_smoothed_away_and_shapes_are_not():
     assert Recognizer().fit(noisy[::7]).score(noisy, demos.labels) >= 0.975
 
 
-def _records(recognizer):
-    return recognizer.comparison_, recognizer.references_, recognizer.calibration()
-
-
-def _stretched(factor):
-    """A demonstration done slower, as one piece of a recording."""
+def _scored(factor, manner=Manner(), around=(0.0, 0.0, 0.0)):  # noqa: B008 - a frozen record
+    """Score of a window that holds a demonstration done slower, and its cost for not being the demonstration itself."""
     demos = draw_shapes([1, 1, 1])
     demos = Demonstrations([Trajectory(np.linspace(0, 2, 80), x.positions, x.label) for x in demos])
+    recognizer = Recognizer().fit(demos)
+    known = Known(recognizer.comparison_, recognizer.references_, recognizer.calibration())
     whole = Trajectory(np.linspace(0.0, 2.0 * factor, 80), demos[0].positions)
-    best, p, score = _recognized(*_records(Recognizer().fit(demos)), whole, np.array([[0, 80]]), 0.05)
-    return int(best[0]), float(p[0, best[0]]), float(score[0])
+    compared = compare_windows(known, observe(whole, 0.04), np.array([[0, 79]]))
+    edges, far, inside = (np.array([value]) for value in around)
+    surrounded = Surroundings(edges, far, np.zeros(1), inside)
+    scored = score_windows(compared, expected(recognizer.references_), surrounded, manner, 0.05)
+    assert scored.best.tolist() == [0]
+    unlike = float(compared.scores[0, 0]) / (0.975 * math.sqrt(4.0 / math.pi * math.log(20.0)))
+    assert unlike < 0.02
+    return float(scored.score[0]), 1.0 - unlike
 
 
-def test_a_spotted_movement_counts_its_duration_less_half_a_typical_one():
-    best, p, score = _stretched(1.0)
-    assert best == 0
-    assert p > 0.99
-    assert score == pytest.approx(2.0 - 0.5 * 2.0, abs=1e-3)
+def test_a_window_counts_its_duration_in_typical_ones_less_a_sixth():
+    score, closeness = _scored(1.0)
+    assert score == pytest.approx(closeness - 0.165)
 
 
-@pytest.mark.parametrize("factor", [1.5, 2.0, 2.9, 1 / 2.9])
-def test_another_tempo_counts_against_it_as_a_normal_density(factor):
-    """A ratio of 1.5 is one standard deviation; log K of a typical impostor is -4."""
-    _, p, score = _stretched(factor)
-    closeness = 1.0 - 0.5 * (math.log(factor) / math.log(1.5)) ** 2 / 4.0
-    assert p > 0.99
-    assert score == pytest.approx(2.0 * factor * closeness - 1.0, abs=2e-3)
+@pytest.mark.parametrize("factor", [1.05, 1.5, 2.0, 2.9, 1 / 2.9])
+def test_another_duration_costs_the_squared_logarithm_of_the_ratio(factor):
+    """Half as much, and a tenth for nothing, while the tempo of the recording is unknown."""
+    score, closeness = _scored(factor)
+    cost = 0.2 * max(abs(math.log(factor)) - 0.1, 0.0) ** 2
+    assert score == pytest.approx(factor * (closeness - cost) - 0.165)
+    score, closeness = _scored(factor, Manner(tempo=math.log(1.5)))
+    cost = 0.4 * math.log(factor / 1.5) ** 2
+    assert score == pytest.approx(factor / 1.5 * (closeness - cost) - 0.165)
 
 
-@pytest.mark.parametrize("factor", [3.1, 1 / 3.1])
-def test_beyond_three_times_the_duration_nothing_is_looked_for(factor):
-    assert _stretched(factor)[1:] == (0.0, 0.0)
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_another_size_than_that_of_the_recording_costs_the_squared_logarithm_of_the_ratio(ratio):
+    score, closeness = _scored(1.0, Manner(size=math.log(ratio)))
+    assert score == pytest.approx(closeness - 0.2 * math.log(ratio) ** 2 - 0.165, abs=1e-3)
+
+
+def test_ends_in_motion_and_far_from_rests_and_rests_inside_cost():
+    score, closeness = _scored(1.0, around=(1.5, 2.0, 3.0))
+    assert score == pytest.approx(closeness - 0.14 * 1.5 - 0.03 * 2.0 - 0.02 * 3.0 - 0.165)
+
+
+def test_what_is_spotted_takes_from_half_the_shortest_duration_to_three_times_the_longest(monkeypatch):
+    demos = draw_shapes([1, 1, 1])
+    lasting = (1.0, 2.0, 4.0)
+    demos = Demonstrations(
+        [Trajectory(np.linspace(0, t, 80), x.positions, x.label) for t, x in zip(lasting, demos, strict=True)]
+    )
+    asked = []
+    inner = spotting.candidate_windows
+
+    def noted(recording, durations, most_bouts):
+        asked.append((durations, inner(recording, durations, most_bouts)))
+        return asked[-1][1]
+
+    monkeypatch.setattr(spotting, "candidate_windows", noted)
+    positions = np.concatenate([demos[i].positions for i in (0, 1, 2, 0, 1)])
+    at = np.linspace(0.0, len(positions) - 1, 2000)
+    positions = np.column_stack([np.interp(at, np.arange(len(positions)), x) for x in positions.T])
+    Recognizer().fit(demos).spot(Trajectory(np.linspace(0.0, 40.0, 2000), positions))
+    [(durations, windows)] = asked
+    assert durations == (0.5, 12.0)
+    start, end = windows.motion.times[windows.rows].T
+    assert 0.5 <= (end - start).min() < 0.8
+    assert 11.0 < (end - start).max() <= 12.0 + 1e-6
 
 
 def _evidence(recognizer, early, size=1.0, slower=1.0, late=0.0):
-    """How much the best hypothesis loses when the same movement is larger, slower or late on its way, in logarithms."""
-    known = hypotheses(recognizer.comparison_, recognizer.references_, early)
-    paths = smooth_paths(recognizer.demonstrations_[:1], None)
-    plain = beginnings(paths, np.ones(1))
-    moved = beginnings(size * paths, np.ones(1))
-    moved = moved._replace(timing=moved.timing + late / math.sqrt(moved.timing.shape[1]))
-    durations = recognizer.demonstrations_.durations[:1]
-    whole = len(known.progress) - 1  # the hypothesis that it is this movement, all of it
-    before, after = (
-        known.log_evidence(plain, durations)[0, whole],
-        known.log_evidence(moved, slower * durations)[0, whole],
-    )
-    return float(after - before)
+    """How much the same movement loses when it is larger, slower or late on its way, in logarithms."""
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, early)
+    first = recognizer.demonstrations_[:1]
+    paths, durations = smooth_paths(first, None), first.durations
+    start = np.zeros((1, first.n_dims))
+    plain = describe_begun(stored, paths, start, durations)
+    moved = describe_begun(stored, size * paths, start, slower * durations)
+    timing = moved.prefixes.timing + late / math.sqrt(moved.prefixes.timing.shape[1])
+    moved = moved._replace(prefixes=moved.prefixes._replace(timing=timing))
+    whole = len(stored.progress) - 1  # the hypothesis that it is this movement, all of it
+    return float(_log_priors(stored, moved)[0, whole] - _log_priors(stored, plain)[0, whole])
 
 
 def test_how_much_size_duration_and_timing_may_vary_by_default():
@@ -216,12 +253,12 @@ def test_copies_under_two_names_say_nothing_of_how_far_classes_are_apart():
 
 
 def test_a_movement_that_explains_a_beginning_does_so_at_one_in_twenty_values_of_progress():
-    """Two of forty perfect ones are evidence 1; unknown is as far as an impostor, and three typical differences off."""
+    """Two of forty perfect ones are evidence 1; unknown is 1.5 impostors away, and three typical differences off."""
     recognizer = Recognizer().fit(draw_shapes([1, 1]))
-    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
-    evidence = np.full((1, 80), -np.inf)
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early(n_progress=40))
+    evidence = np.full((1, 2 * 40), -np.inf)
     evidence[0, :2] = 0.0
     known, other, unknown = stored.log_classes(evidence)[0]
     assert known == pytest.approx(0.0)
     assert other == -np.inf
-    assert unknown == pytest.approx(-0.5 / 0.35**2 - 1.5)
+    assert unknown == pytest.approx(-0.5 * (1.5 / 0.4) ** 2 - 1.5)

@@ -189,6 +189,7 @@ BAD = {
     "rest": ((Trajectory(np.arange(20.0), np.zeros((20, 2))),), TrajectoryError, "expected some movement, got 19 s at rest"),
     "error rate 1": ((np.zeros((20, 2)), 1.0), SpecificationError, "expected error_rate below 1, got 1.0; 0.05 is one member in twenty"),
     "error rate 0": ((np.zeros((20, 2)), 0.0), SpecificationError, "expected error_rate to be a number above 0, got 0.0"),
+    "no time stamps": ((np.cumsum(np.ones((500, 2)), axis=0),), TrajectoryError, "expected time stamps, as the demonstrations have, got an array, which counts as one second; pass kineme.Trajectory(times, positions)"),
     "pieces": ((np.zeros((20, 2)), 0.05, 0), SpecificationError, "expected max_pieces to be a whole number of at least 1, got 0"),
 }  # fmt: skip
 

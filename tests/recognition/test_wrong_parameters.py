@@ -73,3 +73,11 @@ def test_movements_with_labels_are_scored_by_them():
         recognizer.score([one.positions for one in fresh])
     with pytest.raises(TrajectoryError, match="one label for each of the 10 movements"):
         recognizer.score(fresh, ["a"])
+
+
+@pytest.mark.parametrize(
+    ("groups", "kinds"), [([None] * 4, "NoneType"), ([1, "a", None, 2.0], "NoneType and float and int and str")]
+)
+def test_groups_that_are_none(groups, kinds):
+    with pytest.raises(TrajectoryError, match=f"expected groups to be all texts or all numbers, got {kinds}$"):
+        Recognizer().fit(DEMOS, groups=groups)

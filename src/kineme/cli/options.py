@@ -30,6 +30,9 @@ ID = whole(0, _LARGEST_ID)
 class Finite(click.FloatRange):
     """A number in a range, neither NaN nor infinite."""
 
+    def _describe_range(self) -> str:
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
         """Text as a number."""
         number = float(super().convert(value, param, ctx))

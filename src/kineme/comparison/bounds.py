@@ -95,7 +95,7 @@ def log_bounds(
     similarity = similarity.by_rows(len(stored))
     bounds = np.empty((n, m), dtype=np.float32)
     average: Any = LOG_MEANS[similarity.mean]  # Any keeps single precision
-    log_weights = np.zeros(len(stored)) if similarity.weights is None else np.log(len(stored) * similarity.weights)
+    log_weights = similarity.log_weights()
     # Factors that do not depend on the stored movements include 1 / sigma^2.
     scaled = [
         ReducedFeatures(*(np.asarray(part / width**2, dtype=np.float32) for part in one))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from kineme.comparison.described import Described, Pairs
-from kineme.comparison.representation import PAIR_QUANTITIES
+from kineme.comparison.representation import PAIR_QUANTITIES, rotating
 from kineme.comparison.specification import Compares, ComparisonSpecification, specification_of
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Procrustes
@@ -84,7 +84,7 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
     if not how.by_pairs:
         return Described(blocks, procrustes, how.mean)
-    r = next(r for r, one in enumerate(how.by_rows) if one.quantity == "positions" and one.arc_share == 1)
+    r = rotating(how.representations)
     single = np.ascontiguousarray(rows[r], dtype=np.float32)  # so that stored rows say the same
     shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
     measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)

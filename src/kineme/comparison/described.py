@@ -106,6 +106,10 @@ class Described:
         )
 
     def sizes(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents."""
-        by_rows = [float(np.sqrt(np.median(block.squares))) for block in self.blocks]
+        """Typical size in each representation, (R,): the median norm of rows, or the distance of opposite tangents.
+
+        Movements that do not move have no size, and do not count; of such alone the norm is 0.
+        """
+        moving = [block.squares[block.squares > 0] for block in self.blocks]
+        by_rows = [float(np.sqrt(np.median(squares))) if len(squares) else 0.0 for squares in moving]
         return np.array(by_rows + [2.0] * (self.n_representations - len(by_rows)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import feature_rows, prepare
 from kineme.comparison.references import References
-from kineme.comparison.representation import POSITIONS
+from kineme.comparison.representation import rotating
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import WEIGHTS, given_weights
@@ -83,7 +83,7 @@ def fit_to_references(
             values = given_weights(weights, len(representations))
     in_pairs = any(one.in_pairs and value > 0 for one, value in zip(representations, values, strict=True))
     # Where movements are compared pair by pair, their rotation comes from their positions, even with a weight of 0.
-    needed = np.array([in_pairs and one == POSITIONS for one in representations])
+    needed = np.arange(len(values)) == rotating(representations) if in_pairs else False
     kept = np.flatnonzero((values > 0) | needed)
     whole = Comparison(
         specification.representations,

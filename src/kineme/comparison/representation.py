@@ -161,6 +161,11 @@ def check_representations(representations: Any) -> tuple[Representation, ...]:
     return tuple(sorted(given, key=lambda one: one.in_pairs))  # the order within each sort stays
 
 
+def rotating(representations: tuple[Representation, ...]) -> int:
+    """Which of them gives the rotation to those compared pair by pair: the first of positions over arc length."""
+    return next(r for r, one in enumerate(representations) if one.quantity == "positions" and one.arc_share == 1)
+
+
 @lru_cache(maxsize=32)
 def _forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""

@@ -56,8 +56,7 @@ class AveragedSimilarity:
         """Logarithms of each representation's kernel times R times its weight, of squared distances (R, n, m)."""
         logs = np.asarray(squares / (-2.0 * self.widths**2)[:, None, None])
         if self.weights is not None and (self.weights != self.weights[0]).any():
-            with np.errstate(divide="ignore"):  # positions of weight 0, which give the rotation
-                logs += np.log(len(logs) * self.weights)[:, None, None]
+            logs += self.log_weights()[:, None, None]
         return logs
 
     def logs(self, A: Described, B: Described) -> Array:
@@ -69,9 +68,19 @@ class AveragedSimilarity:
         return LOG_MEANS[self.mean](self.logs(A, B))
 
     def by_rows(self, n: int) -> AveragedSimilarity:
-        """The average over the first n representations alone."""
-        weights = None if self.weights is None else self.weights[:n] / self.weights[:n].sum()
-        return self if n == len(self.widths) else replace(self, widths=self.widths[:n], weights=weights)
+        """The average over the first n representations alone; of equal weights where theirs are all 0."""
+        if n == len(self.widths):
+            return self
+        weights = None if self.weights is None or not self.weights[:n].any() else self.weights[:n]
+        weights = None if weights is None else weights / weights.sum()
+        return replace(self, widths=self.widths[:n], weights=weights)
+
+    def log_weights(self) -> Array:
+        """Logarithms of R times the weights, (R,): -inf for positions of weight 0, which give the rotation."""
+        if self.weights is None:
+            return np.zeros(len(self.widths))
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.log(len(self.weights) * self.weights))
 
     def widened(self, factor: float) -> AveragedSimilarity:
         """The same average of kernels `factor` times as wide."""

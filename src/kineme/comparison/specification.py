@@ -82,8 +82,7 @@ class ComparisonSpecification:
 
     def procrustes(self, n_dims: int) -> Procrustes:
         """The distance between rows of movements of `n_dims` dimensions."""
-        if self.max_angle is not None and self.max_angle >= math.pi and n_dims in (2, 3):
-            check_number("max_angle", self.max_angle, most=math.pi + 1e-12)
+        if self.max_angle is not None and 0 <= self.max_angle - math.pi <= 1e-12 and n_dims in (2, 3):
             return Procrustes(n_dims, math.pi, RotationPrior(0.0))  # no limit: the fast way
         if self.max_angle is not None:
             return Procrustes(n_dims, float(self.max_angle))

@@ -135,5 +135,6 @@ def _beyond_the_gap(ordered: Array, same: float) -> Array:
     """First distance (k,) beyond the largest ratio, of distances (k, n - 1) in rising order."""
     ordered = np.maximum(ordered, same)
     last = max(2, (ordered.shape[1] + 1) // 2)
-    ratios = np.log(ordered[:, 1:last] / ordered[:, : last - 1])
+    logs = np.log(np.maximum(ordered[:, :last], np.finfo(np.float64).tiny))  # all are 0 where nothing moves
+    ratios = np.diff(logs, axis=1)
     return np.asarray(np.take_along_axis(ordered, ratios.argmax(axis=1)[:, None] + 1, axis=1)[:, 0])

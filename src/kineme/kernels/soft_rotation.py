@@ -17,7 +17,9 @@ Astronautical Sciences 41(2), 1993, Eq. (17)).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,12 +69,7 @@ class RotationPrior:
             check_number("concentration", self.concentration, least=0.0)
         check_number("tilt", self.tilt, least=0.0)
         if self.vertical is not None:
-            u = np.asarray(self.vertical, dtype=np.float64)
-            if u.shape != (3,) or not np.isfinite(u).all() or not u.any():
-                raise SpecificationError(
-                    f"expected vertical to be a direction in space, such as (0, 0, 1), got {self.vertical!r}"
-                )
-            object.__setattr__(self, "vertical", tuple(u.tolist()))
+            object.__setattr__(self, "vertical", _direction(self.vertical))
 
     def matrix(self, n_dims: int) -> Array:
         """F, (n_dims, n_dims).
@@ -92,6 +89,16 @@ class RotationPrior:
             u = np.asarray(self.vertical) / np.linalg.norm(self.vertical)
             F += self.tilt * np.outer(u, u)
         return F
+
+
+def _direction(vertical: Any) -> tuple[float, float, float]:
+    try:
+        x, y, z = map(float, vertical)
+    except (TypeError, ValueError, OverflowError):
+        x = y = z = 0.0
+    if not (any((x, y, z)) and math.isfinite(x + y + z)):
+        raise SpecificationError(f"expected vertical to be a direction in space, such as (0, 0, 1), got {vertical!r}")
+    return x, y, z
 
 
 def soft_products_in_plane(re: Array, im: Array, weight: Array) -> tuple[Array, Array, Array]:

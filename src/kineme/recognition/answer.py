@@ -162,7 +162,7 @@ def answers_to(
 
 
 class Verdict(NamedTuple):
-    """An `Answer` without its transform."""
+    """An `Answer` without its transform, and the `shares` (R,) of the representations."""
 
     label: Label | None
     confidence: float
@@ -173,6 +173,7 @@ class Verdict(NamedTuple):
     ranked: tuple[Label, ...]
     nearest: tuple[Neighbor, ...]
     responsibilities: Mapping[str, float]
+    shares: Array
 
 
 def verdicts_of(
@@ -207,7 +208,8 @@ def verdicts_of(
             calibrated,
             tuple(classes[c] for c in ranks[i].tolist()),
             like[i],
-            dict(zip(names, share[:, i].tolist(), strict=True)),
+            _by_name(names, share[:, i]),
+            share[:, i],
         )
         for i in range(len(labels))
     ]
@@ -222,9 +224,20 @@ def with_transforms(
 ) -> list[Answer]:
     """The answers to movements: with the transforms from those of the references that they are most like."""
     example = np.array([one.nearest[0].index for one in verdicts], dtype=np.intp)
-    share = np.array([list(one.responsibilities.values()) for one in verdicts]).T
+    share = np.stack([one.shares for one in verdicts], axis=1)
     transforms = map_onto(comparison, references, example, demos, paths, share)
-    return [Answer(**one._asdict(), transform=each) for one, each in zip(verdicts, transforms, strict=True)]
+    parts = [one._asdict() for one in verdicts]
+    for one in parts:
+        del one["shares"]
+    return [Answer(**one, transform=each) for one, each in zip(parts, transforms, strict=True)]
+
+
+def _by_name(names: Sequence[str], share: Array) -> dict[str, float]:
+    """Shares of the representations (R,); those of one name, which differ in resolution only, together."""
+    found = dict.fromkeys(names, 0.0)
+    for name, one in zip(names, share.tolist(), strict=True):
+        found[name] += one
+    return found
 
 
 def _nearest(references: References, logs: Array, rows: slice) -> tuple[Neighbor, ...]:

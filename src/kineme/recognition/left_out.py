@@ -15,14 +15,18 @@ _PRIOR = 4.0  # demonstrations that the common scale counts for beside those of 
 _DIMENSIONS = 8  # in which members of a class vary, about: even, for the closed form of the law of distances
 #: Smallest scale, in kernel widths: rounding of single precision puts copies up to 0.002 apart.
 LEAST = 5e-3
+_ROUNDING = 1e-5  # of log similarities, in single precision
 #: Share of the typical distance to another class within which 95 % of members are expected, with one demonstration of
 #: each class: of movements by the same people, and by others.
 REACH, REACH_OF_OTHERS = 0.75, 1.0
 
 
 def distances(logs: Array) -> Array:
-    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K."""
-    return np.sqrt(np.maximum(-2.0 * logs, 0.0))
+    """``sqrt(-2 log K)``: the distance, in kernel widths, whose Gaussian is the averaged similarity K.
+
+    0 between copies: what rounding makes of them would make some more novel than others.
+    """
+    return np.sqrt(np.where(logs < -_ROUNDING, -2.0 * logs, 0.0))
 
 
 def broad_law(scores: Array) -> Array:
@@ -63,8 +67,9 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
         )
     try:
         return np.asarray(np.unique(given, return_inverse=True)[1], dtype=np.intp)
-    except TypeError as error:
-        raise TrajectoryError(f"expected groups that are texts or numbers, got {error}") from None
+    except TypeError:
+        kinds = " and ".join(sorted({type(one).__name__ for one in given.tolist()}))
+        raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
 @dataclass(frozen=True, eq=False)

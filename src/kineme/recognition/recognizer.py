@@ -121,6 +121,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         self.weights = weights
         self.rotation_prior = rotation_prior
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__({"rotation_prior": None, **state})  # earlier versions had a limit alone
+
     @property
     def specification(self) -> ComparisonSpecification:
         """How movements are compared, by the parameters alone."""
@@ -306,7 +309,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Parameters
         ----------
         recording : Trajectory or array_like of shape (T, d)
-            Unlabeled; pass a `Trajectory`, the time stamps matter.
+            Unlabeled. An array counts as one second and is refused where the demonstrations have time stamps.
         error_rate : float, default 0.05
             The smaller, the more a movement may differ from the demonstrations. Not the share of movements that are
             missed: a movement in a recording is cut by the search itself, see `kineme.recognition.window_scores`.
@@ -342,7 +345,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Parameters
         ----------
         confidence : float, default 0.9
-            Share of the evidence at which a label is decided.
+            Share of the evidence at which a label is decided. At 0.9, about nine in ten of the labels decided before
+            the end are right for people without demonstrations, more for people with some.
         patience : float, default 0.05
             How long it must be held, as a share of the time so far.
         early : Early, optional

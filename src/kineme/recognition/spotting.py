@@ -14,8 +14,10 @@ from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.segmentation.segmentation import pieces_of
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
@@ -64,13 +66,13 @@ def spot(
     """Find movements like the references in a recording; see `Recognizer.spot`."""
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
-    whole = as_recording(recording)
+    lasting = durations_of(references)
+    whole = _as_timed(recording) if lasting is not None else as_recording(recording)
     if whole.n_dims != comparison.n_dims:
         raise TrajectoryError(
             f"expected a recording of {comparison.n_dims} dimensions as in fit, got {whole.n_dims}; "
             "select the dimensions"
         )
-    lasting = durations_of(references)
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
@@ -91,6 +93,18 @@ def spot(
         Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], 1.0 - float(p[i].max()))
         for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
+
+
+def _as_timed(recording: MovementsLike) -> Trajectory:
+    """The recording, whose time stamps are known, as those of the references are."""
+    if not isinstance(recording, Trajectory):
+        recording = Demonstrations.of(recording)
+        if recording.movements.times is None:
+            raise TrajectoryError(
+                "expected time stamps, as the demonstrations have, got an array, which counts as one second; pass "
+                "kineme.Trajectory(times, positions)"
+            )
+    return as_recording(recording)
 
 
 def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:

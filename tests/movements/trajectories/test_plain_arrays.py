@@ -72,3 +72,9 @@ def test_stamps_close_to_zero_are_refused_within_a_movement_and_taken_from_one_t
     assert len(Demonstrations.from_arrays(arrays, times=fine)) == 2
     with pytest.raises(TrajectoryError, match="trajectory 1: expected at least 1e-50 s between stamps"):
         Demonstrations.from_arrays(arrays, times=[fine[0], np.array([0.0, 1e-60, 1.0, 2.0])])
+
+
+def test_a_list_of_reversed_arrays_is_taken():
+    arrays = [one[::-1] for one in _ragged()]
+    assert np.array_equal(Demonstrations.of(arrays).positions, np.concatenate(arrays))
+    assert np.array_equal(Demonstrations.of(arrays[:1]).positions, arrays[0])

@@ -10,14 +10,16 @@ from kineme.validation import Array
 
 
 def principal_axes(path: Array) -> Array:
-    """The two axes (2, d) along which a path (d, T) is widest, for movements of three dimensions and more.
+    """Two axes (2, d) of the plane in which a path (d, T) is widest, for movements of three dimensions and more.
 
-    The axis of largest spread lies across, and points as its largest component does.
+    Of the two recorded dimensions that lie most in that plane, the first points right and the second up, as far as both
+    can: what was written is not drawn on its side, nor as if seen from behind.
     """
     centered = path - path.mean(axis=1, keepdims=True)
-    axes = np.linalg.svd(centered, full_matrices=False)[0].T[:2]
-    largest = np.abs(axes).argmax(axis=1)
-    return np.asarray(axes * np.sign(axes[np.arange(2), largest])[:, None])
+    plane = np.linalg.svd(centered, full_matrices=False)[0].T[:2]
+    right, up = np.sort(np.argsort(-np.linalg.norm(plane, axis=0), kind="stable")[:2])
+    U, _, Vt = np.linalg.svd(plane[:, [right, up]])
+    return np.asarray((U @ Vt).T @ plane)
 
 
 def flat(paths: Array, like: Array) -> Array:

@@ -30,7 +30,7 @@ def plain_block(arrays: list[Any]) -> tuple[Array, NDArray[np.intp]] | None:
     n_dims = (
         strides.pop()[0] // _FLOAT64.itemsize
     )  # contiguous arrays of several rows with equal strides: of equal rows
-    if lengths.min() < MIN_SAMPLES or n_dims == 0:
+    if lengths.min() < MIN_SAMPLES or n_dims < 1:  # reversed arrays have negative strides
         return None
     offsets = np.concatenate(([0], np.cumsum(lengths)))
     joined = _joined(arrays, offsets * n_dims)

@@ -35,9 +35,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
     paths = even_paths(demos, 0, len(demos), comparison.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
-    logs = stored.log_classes(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
-    shares = np.exp(logs - logs.max(axis=1, keepdims=True))
-    return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+    return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))
 
 
 def cut(movements: MovementsLike, fraction: float) -> Demonstrations:

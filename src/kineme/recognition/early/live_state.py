@@ -52,7 +52,7 @@ class LiveState(NamedTuple):
     ranked : tuple of Guess
         All classes, the most likely first.
     unknown : float
-        Share of a movement of no known class.
+        Share of a movement of no known class. It grows late: many such movements begin as a known one does.
     label : label or None
         The decided one; None is undecided.
     progress : float

@@ -123,9 +123,7 @@ class Live:
         elapsed = float(kept[-1, 0] - kept[0, 0])
         so_far = describe_begun(self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed]))
         evidence = log_evidence(self._hypotheses, so_far)
-        logs = self._hypotheses.log_classes(evidence)[0]
-        shares = np.exp(logs - logs.max())
-        shares /= shares.sum()
+        shares = self._hypotheses.shares(evidence)[0]
         order = np.argsort(-shares[:-1], kind="stable")
         leader = int(order[0])
         decided = self._decision.update(elapsed, leader, float(shares[leader]))
