@@ -8,6 +8,7 @@
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
 # make reference  docs/reference.md, from the stubs that list the public names
+# make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
@@ -15,7 +16,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures reference lock clean
+.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures reference tables lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -94,6 +95,9 @@ figures: $(DEV)/ready
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py
+
+tables: $(DEV)/ready
+	$(DEV)/bin/python docs/make_tables.py
 
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt

@@ -84,9 +84,10 @@ def log_bounds(
 ) -> Single:
     """Upper bounds (n, m) of the logarithms of the averaged kernel.
 
-    With ``x = P y + e``, and R a rotation within the limit, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
+    With ``x = P y + e``, and R a rotation that is allowed, ``<x_a, R x_b> <= max_R <y_a, R y_b> + |e_a| |e_b|``; so
     ``d^2 >= |x_a|^2 + |x_b|^2 - 2 (max_R <y_a, R y_b> + |e_a| |e_b|)``, and an A-average grows with each kernel.
-    In space the maximum is taken over all rotations, see `_over_rotations`.
+    Under a prior, what R costs is subtracted from both products. In space the maximum is taken over all rotations even
+    where there is a limit, see `_over_rotations`.
 
     Of an average with representations that are compared pair by pair, these are bounds of the average over the others.
     """

@@ -81,7 +81,7 @@ class Comparison:
         return demos
 
     def prepared(self, rows: tuple[NDArray[np.floating[Any]], ...]) -> Described:
-        """Feature rows, one block (n, d * S) for each representation, ready for comparison."""
+        """Feature rows, as from `feature_rows`, ready for comparison."""
         return prepare(rows, self, self.procrustes)
 
     def select(self, representations: NDArray[np.intp]) -> Comparison:

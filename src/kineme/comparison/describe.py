@@ -47,12 +47,12 @@ def describe(movements: Described | MovementsLike, like: Compares | None = None)
 
 
 def describe_rows(rows: NDArray[Any], n_dims: int, like: Compares | None = None) -> Described:
-    """Feature rows of n movements that were stored, the representations one after the other, as descriptions.
+    """Feature rows of n movements that were stored, as descriptions.
 
     Parameters
     ----------
     rows : array_like of shape (n, sum_r d S_r)
-        As `feature_rows` gives them, concatenated.
+        As `feature_rows` gives them, concatenated: of the representations that are compared sample by sample.
     n_dims : int
         Dimensions d of the movements.
     like : Recognizer, Comparison or ComparisonSpecification, optional

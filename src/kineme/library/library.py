@@ -198,7 +198,7 @@ class ActionLibrary:
         return read.movements(self.store, chosen, read.names_of(self.store, chosen))
 
     def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
-        """Rows of all representations of `specification`, concatenated, shape (k, sum of d * S)."""
+        """Rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""
         return read.features(self.store, self._choose(None, ids))
 
     def primitives(self, symbol: str | None = None, ids: ArrayLike | None = None) -> Primitives:
@@ -229,10 +229,11 @@ class ActionLibrary:
     def recognize(self, movements: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """Recognize movements: the symbol of each, or that it is unknown; labels are names of symbols.
 
-        With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, few are, which are
-        chosen by bounds from the reduced features of all: the label is the same, and p-values are given for the 64
-        nearest symbols. The first answer after a change takes longer; what it prepares is cached beside the database
-        unless `read_only`.
+        With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, some hundreds are,
+        which are chosen by bounds from the reduced features of all, and p-values are given for the 64 nearest symbols.
+        The label is that of comparing all if no representation compares pairs; else nearly always, as the bounds say
+        nothing of those, see `kineme.recognition.two_stage_search.TwoStageSearch`. The first answer after a change
+        takes longer; what it prepares is cached beside the database unless `read_only`.
 
         Parameters
         ----------

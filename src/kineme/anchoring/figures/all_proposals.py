@@ -49,7 +49,7 @@ def draw_proposals(movements: MovementsLike, proposals: Proposals, like: Compare
         )
     columns = min(n, max(3, int(np.ceil(np.sqrt(1.4 * n)))))
     rows = -(-n // columns)
-    figure = new_figure(_CELL * columns, (_CELL + 0.12) * rows + 0.4)
+    figure = new_figure(_CELL * max(columns, 2), (_CELL + 0.12) * rows + 0.5)
     cells = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
     for k, proposal in enumerate(proposals.proposals):
         check_members(proposal, len(demos))
@@ -61,8 +61,11 @@ def draw_proposals(movements: MovementsLike, proposals: Proposals, like: Compare
     for empty in cells[n:]:
         empty.set_axis_off()
     head = f"{len(proposals)} clusters among {len(demos)} movements"
-    key = "number: size, stability; bold: most typical; dot: start"
-    figure.suptitle(f"{head} ({key})" if columns > 4 else f"{head}\n{key}", fontsize=8 if columns > 4 else 7)
+    key = ["number: size, stability", "bold: most typical; dot: start"]
+    if columns > 4:
+        figure.suptitle(f"{head} ({'; '.join(key)})", fontsize=8)
+    else:  # a line holds less
+        figure.suptitle("\n".join((head, *(("; ".join(key),) if columns == 4 else key))), fontsize=7)
     return figure
 
 

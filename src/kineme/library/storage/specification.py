@@ -89,11 +89,11 @@ class Specification:
 
     @property
     def representations(self) -> tuple[Representation, ...]:
-        """The representations whose features are stored."""
+        """The representations that movements are compared in; features of those by pairs are made from stored ones."""
         return self.comparison.representations
 
     def widths(self, n_dims: int) -> tuple[int, ...]:
-        """Numbers per movement in the rows of each representation."""
+        """Numbers per movement in the stored rows: of each representation that is compared sample by sample."""
         return tuple(n_dims * one.n_points for one in self.comparison.by_rows)
 
     def recognizer(self) -> Recognizer:
