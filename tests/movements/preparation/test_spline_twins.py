@@ -224,3 +224,14 @@ def test_resampling_keeps_start_goal_and_duration(make_movement):
     np.testing.assert_allclose(one.positions[[0, -1]], x[[0, -1]], rtol=1e-12)
     assert one.duration == pytest.approx(t[-1])
     assert len(one) == 33
+
+
+def test_what_does_not_move_stays_where_it_is_beside_what_moves(compiled):
+    """What reached it from its neighbors would be all of its size."""
+    rng = np.random.default_rng(0)
+    arrays = [1e50 * rng.normal(size=(30, 2)), np.ones((20, 2)), rng.normal(size=(30, 2)), np.zeros((4, 2))]
+    arrays[2][:, 1] = 3.0
+    rows = smooth_rows(Demonstrations.from_arrays(arrays), 0, 4, 10.0, 50)
+    assert not rows[[1, 3]].any()
+    assert not rows[2, 1].any()
+    assert rows[2, 0].any()

@@ -38,6 +38,7 @@ def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], 
     lengths = np.diff(offsets)
     first, last = offsets[0], offsets[-1]
     x = positions[first:last] - np.repeat(positions[offsets[:-1]], lengths, axis=0)
+    moving = np.repeat(np.logical_or.reduceat(x != 0, offsets[:-1] - first, axis=0), lengths, axis=0)
     gaps = np.diff(times[first:last]) * np.repeat(scales, lengths)[:-1]
     gaps[offsets[1:-1] - first - 1] = _FAR
     inverse = 1.0 / gaps
@@ -54,7 +55,8 @@ def smoothing_spline(times: Array, positions: Array, offsets: NDArray[np.intp], 
     bends = np.diff(m, axis=0) * inverse[:, None]
     x[:-1] -= bends
     x[1:] += bends
-    return x, m
+    # What reaches a movement that does not move from those beside it is tiny, and would yet be all of its size.
+    return np.where(moving, x, 0.0), np.where(moving, m, 0.0)
 
 
 def even_rows_of_spline(v: Array, x: Array, m: Array, offsets: NDArray[np.intp], n_points: int) -> Array:
