@@ -114,6 +114,12 @@ def test_what_is_no_vertical_is_refused_in_words_that_say_what_is(vertical):
         RotationPrior(vertical=vertical)
 
 
+def test_about_a_vertical_rotations_are_as_likely_as_in_the_plane():
+    np.testing.assert_allclose(RotationPrior().matrix(3), 0.1 * np.eye(3))
+    np.testing.assert_allclose(RotationPrior(vertical=(0, 3.0, 0)).matrix(3), np.diag([0.03, 0.53, 0.03]))
+    np.testing.assert_allclose(RotationPrior(0.2, vertical=(0, 3.0, 0), tilt=0).matrix(3), 0.2 * np.eye(3))
+
+
 def test_where_a_prior_has_no_place():
     with pytest.raises(SpecificationError, match="a prior with max_angle=pi in two or three dimensions"):
         Procrustes(4, 0.0, RotationPrior())

@@ -34,7 +34,8 @@ class Choice(click.ParamType):  # type: ignore[type-arg]
 @click.command(short_help="Turn unlabeled movements into symbols.")
 @library_option
 @click.option("--method", type=click.Choice(["spectral", "agglomerative", "hdbscan"]),
-              help="Clustering.  [default: members as similar as those of the stored symbols]")  # fmt: skip
+              help="Clustering.  [default: members as similar as those of the stored symbols; spectral where there are "
+              "none]")  # fmt: skip
 @click.option("--clusters", type=whole(1), help="Number of clusters.  [default: chosen from the data]")
 @click.option(
     "--min-members", type=whole(2), default=3, show_default=True, help="Smallest number of movements in a proposal."

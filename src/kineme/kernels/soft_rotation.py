@@ -47,8 +47,8 @@ class RotationPrior:
     ----------
     concentration : float, optional
         k of ``F = k I``: a rotation by t costs ``2 k (1 - cos t)`` of |a| |b|. By default 0.03 in the plane and 0.1 in
-        space, where a movement can be rotated in three ways onto one of another class. 0 takes all rotations as equally
-        likely.
+        space, where a movement can be rotated in three ways onto one of another class; with a vertical 0.03, since one
+        of the three is left. 0 takes all rotations as equally likely.
     vertical : tuple of 3 floats, optional
         The direction of gravity, either way, for movements in space that are turned about it more often than tilted.
     tilt : float, default 0.5
@@ -79,7 +79,8 @@ class RotationPrior:
         SpecificationError
             A vertical for movements that are not in space.
         """
-        k = CONCENTRATION.get(n_dims, 0.0) if self.concentration is None else self.concentration
+        free = n_dims if self.vertical is None else 2  # about a vertical, movements are rotated as in the plane
+        k = CONCENTRATION.get(free, 0.0) if self.concentration is None else self.concentration
         F = k * np.eye(n_dims)
         if self.vertical is not None:
             if n_dims != 3:

@@ -128,7 +128,8 @@ CLASSIFIERS: dict[str, Callable[[Comparison, References], Classifier]] = {
 }
 
 
-#: What "auto" stands for: of 3 to 24 demonstrations of each class, by ten people, the SVM was never ahead of it.
+#: What "auto" stands for. Of people's gestures in space, 3 to 24 demonstrations of each class, the SVM was never ahead;
+#: of bent handwriting, twelve of each, it was, by 0.965 to 0.957 (``python -m bench --only defaults``).
 AUTO = "nearest"
 
 

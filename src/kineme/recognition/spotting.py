@@ -46,7 +46,8 @@ class Spotted(NamedTuple):
         Time stamps [s].
     label : label or None
     confidence : float
-        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all.
+        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all. Not the
+        probability that `Answer.confidence` is.
     """
 
     start: float
