@@ -177,3 +177,23 @@ def test_of_equally_good_rotations_one_is_given(compiled, monkeypatch):
     paths = rows.reshape(25, 3, -1)
     reached = np.einsum("iks,ijkh,jhs->ij", paths, R, paths)
     np.testing.assert_allclose(reached, best, rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("max_angle", "prior"), [(math.pi, RotationPrior()), (math.pi, RotationPrior(0.0)), (0.3, None)]
+)
+def test_rotations_in_the_plane_bring_the_second_closest_to_the_first(max_angle, prior):
+    """As `pair_distances` takes cosine and sine: counterclockwise, of the second movement."""
+    rows = np.random.default_rng(0).normal(size=(6, 40))
+    procrustes = Procrustes(2, max_angle, prior)
+    prepared = procrustes.prepare(rows)
+    best, entries = procrustes.align(prepared, prepared)
+    c, s = np.moveaxis(entries.astype(float), -1, 0)
+    R = np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2)
+    paths, norms = rows.reshape(6, 2, -1), np.linalg.norm(rows, axis=1)
+    reached = np.einsum("iks,ijkh,jhs->ij", paths, R, paths)
+    if prior is not None:
+        reached += norms[:, None] * norms * np.trace(prior.matrix(2)) * (c - 1.0)
+    np.testing.assert_allclose(reached, best, atol=1e-4)
+    np.testing.assert_allclose(best, procrustes.alignment(prepared, prepared), atol=1e-9)
+    assert (np.abs(np.arctan2(s, c)) <= max_angle + 1e-6).all()
