@@ -10,13 +10,14 @@ from kineme.experiments.evaluation import methods
 from kineme.experiments.evaluation.conclusions import conclusion, verdict
 from kineme.experiments.evaluation.conditions import UNTOUCHED
 from kineme.experiments.evaluation.data import DataSet
+from kineme.experiments.evaluation.figures import draw_protocol
 from kineme.experiments.evaluation.methods import METHODS
 from kineme.experiments.evaluation.optional import optional_module, why_missing
 from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.results import Results
 from kineme.experiments.evaluation.rows import to_csv
 from kineme.experiments.evaluation.run import Runner, evaluate
-from kineme.experiments.evaluation.trials import Settings
+from kineme.experiments.evaluation.trials import Settings, shots_label
 
 PLAN = (
     [name for name, one in PROTOCOLS.items() if name != "earliness" and not one.by_person],
@@ -204,3 +205,10 @@ def test_a_folder_that_cannot_be_written_is_found_out_first(data, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
         run(data, tmp_path / "file" / "out")
+
+
+def test_the_axis_of_shots_counts_whole_movements():
+    outcome = {shots_label(n): {"accuracy": [0.1 * n]} for n in (1, 3, 8)}
+    drawn = draw_protocol("user-independent", Results({"user-independent": {"kineme": outcome}}, {}, {}, {})).decode()
+    above = drawn[: drawn.index("movements per class")]
+    assert re.findall("<!-- (.*?) -->", above) == ["1", "3", "8"]

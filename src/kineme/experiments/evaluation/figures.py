@@ -45,6 +45,8 @@ def draw_protocol(protocol: str, results: Results) -> bytes | None:
     for k, (name, conditions) in enumerate(panels.items()):
         _draw_panel(axes.flat[k], protocol, results, conditions)
         axes.flat[k].set(xlabel=_AXES[name], ylim=(0, 1.03))
+        if name == "shots":  # no half movements
+            axes.flat[k].set_xticks([one.strength for one in conditions])
     for row in axes:
         row[0].set_ylabel("accuracy")
     for empty in axes.flat[len(panels) :]:
