@@ -294,7 +294,10 @@ def _in_space(
     def columns(start: int, stop: int) -> None:
         some, part = slice(start, stop), b[3 * start : 3 * stop]
         products = _few_products(a, part) if n < _MANY else a @ part.T
-        fill(products, p, q[some], best[:, some], R[:, some])
+        # Contiguous, as the rows are: for another layout the loops would be compiled once more.
+        own, turns = np.empty((n, stop - start)), np.empty((n, stop - start, *R.shape[2:]), np.float32)
+        fill(products, p, q[some], own, turns)
+        best[:, some], R[:, some] = own, turns
 
     if n >= m:
         for_tiles(rows, n, max(1, _PAIRS // m))
