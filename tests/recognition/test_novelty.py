@@ -180,8 +180,13 @@ def test_groups_are_one_for_each_movement(groups):
         Recognizer().fit(draw_shapes([2, 2]), groups=groups)
 
 
+def test_every_movement_has_a_group():
+    with pytest.raises(TrajectoryError, match="expected a group for each movement, got nan"):
+        Recognizer().fit(draw_shapes([2, 2]), groups=[1.0, np.nan, 2.0, 2.0])
+
+
 def test_groups_have_an_order():
-    with pytest.raises(TrajectoryError, match="expected groups that are texts or numbers"):
+    with pytest.raises(TrajectoryError, match="expected groups to be all texts or all numbers"):
         Recognizer().fit(draw_shapes([2, 2]), groups=np.array(["ann", 1, None, "bob"], dtype=object))
 
 

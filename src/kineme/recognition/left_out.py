@@ -57,13 +57,17 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
     Raises
     ------
     TrajectoryError
-        Not one group for each movement.
+        Not one group for each movement, or texts beside numbers.
     """
     given = np.asarray(groups)
     if given.shape != (n,):
         raise TrajectoryError(
             f"expected groups to be one name or number for each of the {n} movements, such as who did it, got an array "
             f"of shape {given.shape}"
+        )
+    if given.dtype.kind == "f" and np.isnan(given).any():
+        raise TrajectoryError(
+            "expected a group for each movement, got nan; give a name of its own to whoever is unknown"
         )
     try:
         return np.asarray(np.unique(given, return_inverse=True)[1], dtype=np.intp)
