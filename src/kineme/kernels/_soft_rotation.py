@@ -41,29 +41,17 @@ def _room():  # type: ignore[no-untyped-def]
 @jit
 def fill_soft_products(products, a, b, F, best):  # type: ignore[no-untyped-def]
     """``best[i, j]`` of the covariance ``products[3 i : 3 i + 3, 3 j : 3 j + 3]``, norms a[i] and b[j], and F."""
-    n_pairs, n_columns = best.size, best.shape[1]
-    lanes, prior = _room(), F[0, 0] + F[1, 1] + F[2, 2]
-    for first in range(0, n_pairs, _LANES):
-        width = min(_LANES, n_pairs - first)
-        _load(products, a, b, F, lanes, first, width, n_columns)
-        _solve(lanes)
-        for lane in range(width):
-            i, j = divmod(first + lane, n_columns)
-            best[i, j] = lanes.top[lane] * lanes.size[lane] - prior * a[i] * b[j]
+    lanes = _room()
+    for first in range(0, best.size, _LANES):
+        _fill_lanes(products, a, b, F, best, lanes, first)
 
 
 @jit
 def fill_soft_rotations(products, a, b, F, best, rotations):  # type: ignore[no-untyped-def]
     """The same, and the rotations (n, m, 3, 3)."""
-    n_pairs, n_columns = best.size, best.shape[1]
-    lanes, prior = _room(), F[0, 0] + F[1, 1] + F[2, 2]
-    for first in range(0, n_pairs, _LANES):
-        width = min(_LANES, n_pairs - first)
-        _load(products, a, b, F, lanes, first, width, n_columns)
-        _solve(lanes)
-        for lane in range(width):
-            i, j = divmod(first + lane, n_columns)
-            best[i, j] = lanes.top[lane] * lanes.size[lane] - prior * a[i] * b[j]
+    lanes, n_columns = _room(), best.shape[1]
+    for first in range(0, best.size, _LANES):
+        width = _fill_lanes(products, a, b, F, best, lanes, first)
         _rotate(lanes)
         if _break_ties(lanes, width):
             _solve(lanes)
@@ -73,6 +61,19 @@ def fill_soft_rotations(products, a, b, F, best, rotations):  # type: ignore[no-
             for k in range(3):
                 for h in range(3):
                     rotations[i, j, k, h] = lanes.R[k, h, lane]
+
+
+@jit
+def _fill_lanes(products, a, b, F, best, lanes, first):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
+    """Solve the pairs from number `first` on, one in each lane, and write their ``best``; how many they are."""
+    n_columns, prior = best.shape[1], F[0, 0] + F[1, 1] + F[2, 2]
+    width = min(_LANES, best.size - first)
+    _load(products, a, b, F, lanes, first, width, n_columns)
+    _solve(lanes)
+    for lane in range(width):
+        i, j = divmod(first + lane, n_columns)
+        best[i, j] = lanes.top[lane] * lanes.size[lane] - prior * a[i] * b[j]
+    return width
 
 
 @jit

@@ -16,13 +16,19 @@ def fill_plus(A: Any, B: Any, out: Any) -> None:
     squares = np.empty((size, size))
     for a in range(len(A)):
         for b in range(len(B)):
-            for i in range(size):
-                for j in range(size):
-                    total = 0.0
-                    for c in range(A.shape[2]):
-                        total += (A[a, i, c] - B[b, j, c]) ** 2
-                    squares[i, j] = total
+            _fill_squares(A[a], B[b], squares)
             out[a, b] = min(_one_way(squares), _one_way(squares.T))
+
+
+@jit
+def _fill_squares(A: Any, B: Any, squares: Any) -> None:
+    """Squared distances of every point of one cloud (N, k) to every point of another."""
+    for i in range(len(A)):
+        for j in range(len(B)):
+            total = 0.0
+            for c in range(A.shape[1]):
+                total += (A[i, c] - B[j, c]) ** 2
+            squares[i, j] = total
 
 
 @jit
@@ -58,12 +64,11 @@ def fill_nearest(A: Any, B: Any, step: int, squared: bool, nearest: Any, distanc
     for a in range(len(A)):
         best = np.inf
         for b in range(len(B)):
-            for i in range(size):
-                for j in range(size):
-                    total = 0.0
-                    for c in range(A.shape[2]):
-                        total += (A[a, i, c] - B[b, j, c]) ** 2
-                    costs[i, j] = total if squared else np.sqrt(total)
+            _fill_squares(A[a], B[b], costs)
+            if not squared:
+                for i in range(size):
+                    for j in range(size):
+                        costs[i, j] = np.sqrt(costs[i, j])
             found = _matched(costs, costs.T, step, best)
             if found < best:
                 best = found
