@@ -85,7 +85,7 @@ def test_without_what_must_lie_beside_the_marker_it_is_a_folder_of_files(toy):
     where = toy()
     (where / "a.bin").unlink()
     assert data_set_of(where) is None
-    with pytest.raises(kineme.DataError, match="found none; 3 could not be read, the first about.json"):
+    with pytest.raises(kineme.DataError, match=r"found none; 3 could not be read, the first about\.json"):
         read_recordings(where)
 
 
