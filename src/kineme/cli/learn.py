@@ -42,6 +42,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
+    from kineme.files.recordings import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -57,7 +58,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         reports = [
             _learn(
                 library,
-                path if path.is_dir() else path.parent,
+                root_of(path),
                 one,
                 options,
                 [None if no_labels else each if label is None else label for each in one.labels],
