@@ -122,7 +122,8 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     most = priors[G - 1 :: G]
     if most.max() < evidence.max() - _NEGLIGIBLE:
         return
-    whole = describe_paths(path, stored.comparison, stored.comparison.procrustes)
+    rotations = stored.comparison if stored.early.max_angle is None else stored
+    whole = describe_paths(path, stored.comparison, rotations.procrustes)
     similar = _POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
