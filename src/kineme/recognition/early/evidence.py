@@ -20,6 +20,8 @@ from kineme.validation import Array
 _COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
 _WIDENED = 2.0  # widths of positions where they choose those
 _ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
+_SPEED_SPREAD = 0.5  # of the logarithm of the speed at the end
+_PROGRESS = 0.25  # exponent of the density of progress
 _POWER = 3.0  # of the similarity of whole movements, beside the evidence for beginnings
 _NEGLIGIBLE = 5.0  # whole movements are not compared if they have less than exp(-5) of the largest evidence
 
@@ -47,9 +49,9 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
 
     ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over elastic path and point cloud, after the rotation that brings the
     positions closest, plus the logarithms of the density of that rotation, of a normal density of log size and log
-    duration ratio, of a Cauchy density of timing, and of the progress, all up to constants. Short beginnings are alike,
-    so that much of them fits by chance: the longer ones are the likelier. And the movement is not over, which its speed
-    tells, see `Ending`; if it is, the recognizer's similarity of whole movements counts.
+    duration ratio, of Cauchy densities of timing and of the speed at the end, and of the progress, all up to constants.
+    Short beginnings are alike, so that much fits them by chance: longer ones are a little likelier. And the movement is
+    not over, which its speed tells, see `Ending`; if it is, the recognizer's similarity of whole movements counts.
 
     The positions' own distances, which are much cheaper, choose the hypotheses for which it is computed: the 200 best
     and the best one of each class.
@@ -68,7 +70,7 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
 
 
 def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
-    """Logarithms of the densities of size, duration, timing and progress."""
+    """Logarithms of the densities of size, duration, timing, speed at the end, and progress."""
     sizes = np.log(positive(begun.prefixes.lengths))[:, None] - stored.log_lengths
     longer = np.log(positive(begun.durations))[:, None] - stored.log_durations
     timing = begun.prefixes.timing
@@ -76,8 +78,10 @@ def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
     late = np.maximum(norms - 2.0 * (timing @ stored.prefixes.timing.T), 0.0)
     early = stored.early
     normal = 0.5 * (sizes / early.size_spread) ** 2 + 0.5 * (longer / early.duration_spread) ** 2
-    progress = np.tile(np.log(stored.progress), len(stored.durations))
-    return np.asarray(progress - normal - np.log1p(late / (2.0 * early.timing_spread**2)))
+    faster = (begun.prefixes.end_speeds[:, None] - stored.prefixes.end_speeds) / _SPEED_SPREAD
+    cauchy = (1.0 + late / (2.0 * early.timing_spread**2)) * (1.0 + 0.5 * faster**2)
+    progress = np.tile(_PROGRESS * np.log(stored.progress), len(stored.durations))
+    return np.asarray(progress - normal - np.log(cauchy))
 
 
 def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
