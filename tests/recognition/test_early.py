@@ -187,13 +187,13 @@ def test_speed_tells_that_a_movement_is_over():
     assert odds[:, -1].min() > 0.0
     assert np.median(odds[:, :-1]) < -3.0
     assert (np.diff(known.log_odds(np.linspace(-9.0, 9.0, 50))) <= 0.0).all()  # the slower, the rather
-    assert known.log_odds(np.array([-50.0, 50.0])) == pytest.approx([6.5, -9.5])
+    assert known.log_odds(np.array([-50.0, 50.0])) == pytest.approx([7.0, -13.0])
 
 
 def test_speed_tells_nothing_where_movements_were_recorded_at_full_speed_until_their_end():
     rng = np.random.default_rng(0)
     known = ending(rng.normal(0.0, 0.5, (30, 20)))
-    np.testing.assert_allclose(known.log_odds(np.linspace(-0.5, 0.5, 9)), -1.5, atol=1.0)
+    np.testing.assert_allclose(known.log_odds(np.linspace(-0.5, 0.5, 9)), -3.0, atol=1.0)
 
 
 def test_a_movement_that_is_over_is_recognized_as_a_whole(monkeypatch):

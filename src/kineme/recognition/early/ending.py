@@ -9,11 +9,10 @@ import numpy as np
 from kineme.validation import Array
 
 _LEAST_SPREAD = 0.4  # of the logarithm of the speed, where there are few movements
-_MOST = 8.0  # of the logarithm of the likelihood ratio: the speed alone settles nothing
-#: Logarithm of the odds that a movement is over before its speed is known. At 0 a movement of no known class is decided
-#: for a known one four times as often, since it slows down at corners; at -3 some movements that are over are taken for
-#: beginnings of others.
-_PRIOR = -1.5
+_MOST = 10.0  # of the logarithm of the likelihood ratio: the speed alone settles nothing
+#: Logarithm of the odds that a movement is over before its speed is known: about one in 20, as for any other progress.
+#: At 0 a movement slows down at a corner and is taken for a whole one of another class, or of a known one.
+_PRIOR = -3.0
 
 
 class Ending(NamedTuple):
@@ -26,9 +25,9 @@ class Ending(NamedTuple):
     before: tuple[float, float]
 
     def log_odds(self, speeds: Array) -> Array:
-        """Logarithm of the odds that movements of these speeds are over, between -9.5 and 6.5.
+        """Logarithm of the odds that movements of these speeds are over, between -13 and 7.
 
-        The likelihood ratio of two normal densities, times prior odds of 0.22. Being slower than at a typical end is no
+        The likelihood ratio of two normal densities, times prior odds of 0.05. Being slower than at a typical end is no
         evidence against one, nor is being faster than typical before the end evidence for one. Where movements were
         recorded at full speed until their last sample, the speed says nothing, and the odds stay near the prior ones.
         """
