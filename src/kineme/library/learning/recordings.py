@@ -39,7 +39,7 @@ def learn_recordings(
         Folder that was read; stored before the names of the files.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    told = {name: value for name, value in (options or {}).items() if value is not None}
+    told = {name: value for name, value in (options or {}).items() if value not in (None, ())}
     files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
     return learn(
         store,

@@ -23,6 +23,7 @@ LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activ
 _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
+_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
@@ -171,8 +172,8 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
     """Whether a column is redundant: a counter of samples, or the velocity or acceleration of another column."""
-    words = words_of(head)
-    if not head.strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+    words = {word for word in words_of(head) if not word.isdecimal()}
+    if not head.strip() or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
     return derived is not None and (derived[1] or derived[2]) in plain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -34,6 +34,9 @@ class Layout:
         unit. As a number, it is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
+    kinds : mapping, optional
+        Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
+        order of a quaternion.
 
     Raises
     ------
@@ -47,6 +50,7 @@ class Layout:
     label: Column | None = None
     units: str | float | None = None
     skip: str = "movement"
+    kinds: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
