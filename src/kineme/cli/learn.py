@@ -66,6 +66,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
     """Recordings with their folder, and problems; an error if nothing could be read."""
     from kineme.errors import DataError
+    from kineme.files.recordings import root_of
 
     parsed: list[tuple[Path, Any]] = []
     problems: list[str] = []
@@ -73,7 +74,7 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     for path in paths:
         try:
             one = read(path, options)
-            parsed.append((path if path.is_dir() else path.parent, one))
+            parsed.append((root_of(path), one))
             problems += map(str, one.problems)
         except DataError as error:
             first = first or error

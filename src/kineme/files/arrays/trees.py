@@ -138,7 +138,9 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
 def label_of(name: str) -> str | None:
     """The label in the name of a movement; None if it only counts: ``demo_3``, ``wave_2``, ``7``."""
     words = words_of(name)
-    counts = not words or words[-1].isdecimal() or set(words) <= MOVEMENT_WORDS | {"data", "movements", "demos", "trials"}
+    counts = (
+        not words or words[-1].isdecimal() or set(words) <= MOVEMENT_WORDS | {"data", "movements", "demos", "trials"}
+    )
     return None if counts else name
 
 

@@ -60,7 +60,9 @@ def _channels(lines: Sequence[str]) -> list[str]:
         elif key == "CHANNELS":
             count = words[1] if len(words) > 1 else ""
             if not joint or not count.isdecimal() or int(count) != len(words) - 2:
-                raise DataError(f"expected a joint's number of channels and their names in line {k}, got {line.strip()!r}")
+                raise DataError(
+                    f"expected a joint's number of channels and their names in line {k}, got {line.strip()!r}"
+                )
             names += [f"{joint}.{channel}" for channel in words[2:]]
     if not 0 < len(names) <= _MOST_CHANNELS:
         raise DataError(f"expected joints with channels in the hierarchy of a BVH file, got {len(names)} channels")
@@ -78,7 +80,9 @@ def _step(lines: Sequence[str], at: int) -> tuple[float, int]:
     raise DataError("expected 'Frame Time: SECONDS' below MOTION, got none: a truncated or damaged file")
 
 
-def _values(lines: Sequence[str], first: int, width: int) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], dict[int, str]]:
+def _values(
+    lines: Sequence[str], first: int, width: int
+) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.float64]], dict[int, str]]:
     """The numbers of all frames, NaN in a line that is not one number per channel, and what is wrong there."""
     rows = [line for line in lines[first:] if line.strip()]
     if not rows:

@@ -64,7 +64,9 @@ def _content(reader: Any, data: bytes) -> tuple[Any, list[str], str, float]:
     count, rate = int(reader.point_used), float(reader.point_rate)
     n_frames = int(reader.last_frame) - int(reader.first_frame) + 1
     if count < 1 or n_frames < 1 or not 0 < rate < float("inf"):
-        raise DataError(f"expected points over time in a C3D file, got {count} points and {n_frames} frames at {rate:g} Hz")
+        raise DataError(
+            f"expected points over time in a C3D file, got {count} points and {n_frames} frames at {rate:g} Hz"
+        )
     check_expanded(40 * count * n_frames)
     points = _points(reader, data, count, n_frames)
     labels = [label.strip() for label in reader.point_labels][:count]
@@ -81,11 +83,15 @@ def _points(reader: Any, data: bytes, count: int, n_frames: int) -> Any:
     is_float = reader.point_scale < 0
     dtype = np.dtype(reader._dtypes.float32 if is_float else reader._dtypes.int16)
     if reader._dtypes.is_dec and is_float:
-        raise DataError("expected a C3D file of Intel or MIPS numbers, got one of DEC; save it anew with a newer program")
+        raise DataError(
+            "expected a C3D file of Intel or MIPS numbers, got one of DEC; save it anew with a newer program"
+        )
     wide = 4 * count + int(reader.header.analog_count)
     start, size = (int(reader.header.data_block) - 1) * 512, n_frames * wide * dtype.itemsize
     if not 0 < start <= len(data) - size:
-        raise DataError(f"expected {n_frames} frames of {count} points in a C3D file, got fewer bytes: a truncated file")
+        raise DataError(
+            f"expected {n_frames} frames of {count} points in a C3D file, got fewer bytes: a truncated file"
+        )
     words = np.frombuffer(data, dtype, n_frames * wide, start).reshape(n_frames, wide)[:, : 4 * count]
     values = words.reshape(n_frames, count, 4).astype(np.float64)
     lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2)

@@ -45,7 +45,9 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
             heads.append(f"{name}.position.{axis}" if solved else f"{name}.{axis}")
         else:
             heads.append(f"{name}.{'orientation' if quaternions else 'rotation'}.{axis}")
-        units.append("" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length)
+        units.append(
+            "" if not heads[-1] or (what == "rotation" and quaternions) else "deg" if what == "rotation" else length
+        )
     rate = positive(said.get("export frame rate") or said.get("capture frame rate") or "")
     timed = len(rows[at]) > 1 and rows[at][1].lower().startswith("time")
     if not timed:

@@ -57,7 +57,9 @@ def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:
         return [f"{name}.{axis}" for name in names for axis in "xyz"], ["mm"] * 3 * len(names)
     one = [("position.", "mm")] * 3 + [("", "deg")] * 3 + [("", "")] * 10
     heads = [
-        f"{name}.{group}{what}" if unit else "" for name in names for what, (group, unit) in zip(_POSES, one, strict=True)
+        f"{name}.{group}{what}" if unit else ""
+        for name in names
+        for what, (group, unit) in zip(_POSES, one, strict=True)
     ]
     return heads, [unit for _ in names for _, unit in one]
 

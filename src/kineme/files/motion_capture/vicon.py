@@ -41,7 +41,9 @@ def vicon_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) 
     columns[0] = "frame"
     columns[1] = "sub frame" if n > 1 and heads[1].lower() == "sub frame" else columns[1]
     end = next((k for k in range(at + 5, len(lines)) if not lines[k].strip(" \t\r\n,")), None)
-    measured_in = tuple("" if quaternion else unit for unit, quaternion in zip((units + [""] * n)[:n], turned, strict=True))
+    measured_in = tuple(
+        "" if quaternion else unit for unit, quaternion in zip((units + [""] * n)[:n], turned, strict=True)
+    )
     return ExportHead("Vicon", separator, tuple(columns), measured_in, at + 5, end, rate)
 
 

@@ -58,9 +58,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     return Table(dialect.heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
 
 
-def _read_export(
-    data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout
-) -> tuple[Table, Roles]:
+def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
     """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
     head, dialect = export
     _check_memory(data, dialect)
