@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, arrays_movements, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names, parsed_arrays
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz, array_of_npy
@@ -76,11 +76,8 @@ def _read_parquet(data: bytes, layout: Layout) -> Parsed:
 
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
     arrays = Npz(data, Path("it"))
-    known = any(name in arrays or f"{name}_0" in arrays for name in POSITIONS)
-    return arrays_movements(arrays, layout, "NPZ") if known or not arrays else _read_keyed(arrays, layout)
-
-
-def _read_keyed(arrays: Npz, layout: Layout) -> Parsed:
+    if has_known_names(arrays):
+        return arrays_movements(arrays, layout, "NPZ")
     return tree_movements(nested(arrays), layout, "NPZ")
 
 
@@ -113,9 +110,9 @@ FORMATS: dict[str, Format] = {
     ".tsv": Format(_read_text),
     ".txt": Format(_read_text),
     ".npz": Format(_read_npz),
-    ".npy": Format(_read_npy),
     ".json": Format(json_movements),
     ".jsonl": Format(json_lines_movements),
+    ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
     ".mat": Format(_read_matlab, label_is_stem=True),
     ".bvh": Format(_read_bvh),

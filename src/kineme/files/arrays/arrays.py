@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,7 @@ def parsed_arrays(
     detected: tuple[str, str],
     places: list[str] | None = None,
 ) -> Parsed:
-    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`; by default numbered."""
+    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`."""
     labels, time = named
     dims = sorted({x.shape[1] for x in xs})
     if len(dims) != 1 or dims == [0]:
@@ -87,6 +87,12 @@ def parsed_arrays(
         places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
     block = Block(positions, stamps, offsets, list(labels), places)
     return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def has_known_names(names: Collection[str]) -> bool:
+    """Whether arrays have the names of `arrays_movements`, or none that could be other movements."""
+    known = any(name in names or f"{name}_0" in names for name in POSITIONS)
+    return known or not set(names) - {*TIMES, *LABELS, "offsets"}
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, arrays_movements
+from kineme.files.arrays.arrays import arrays_movements, has_known_names
 from kineme.files.arrays.tree_movements import tree_movements
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import is_time
@@ -27,12 +27,9 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
     except json.JSONDecodeError as error:
         raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
     if isinstance(entries, Mapping):
-        named = any(name in entries or f"{name}_0" in entries for name in POSITIONS)
-        tree = {} if named else as_tree(entries)
-        if named or not any(isinstance(one, (Mapping, list, np.ndarray)) for one in tree.values()):
+        if has_known_names(entries):
             return arrays_movements(entries, layout, "JSON")
-        return tree_movements(tree, layout, "JSON", many="take")
-    if not isinstance(entries, list):
+    elif not isinstance(entries, list) or not any(isinstance(one, (Mapping, list)) for one in entries[:1]):
         raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
     return tree_movements(as_tree(entries), layout, "JSON", many="take")
 

@@ -15,7 +15,7 @@ from kineme.files.arrays.trees import Found, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed, no_lines
+from kineme.movements.tables.parsed import Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.movements.trajectories.movements import axis_names
 
@@ -39,7 +39,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, separator: str = ".", m
     """
     found = [one for one in movements_in(tree, separator) if one.entries]
     if not found:
-        raise DataError("expected arrays of times and positions, got none of numbers")
+        got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
+        raise DataError(f"expected arrays times and positions, got {got}")
     stamped = any(len(one.entries) > 1 or one.rate is not None for one in found)
     if not stamped:
         return _bare(found, layout, kind)
@@ -122,7 +123,7 @@ def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]],
             if fault:
                 faults[int(start)] = fault
         arrays[name] = np.concatenate(parts)
-    numbers = {name: 0 for name in widths}
+    numbers = dict.fromkeys(widths, 0)
     filled: list[Any] = []
     for owner in owners:
         filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)

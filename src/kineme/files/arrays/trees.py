@@ -1,7 +1,7 @@
-"""Movements in trees of arrays: groups within groups, lists, structures; whatever JSON, NPZ, MATLAB and HDF5 can hold.
+"""Movements in trees of arrays: groups within groups, lists, structures; what JSON, NPZ, MATLAB and HDF5 can hold.
 
-A tree is a mapping of names to trees, a list of trees, an array, or a text. A group of arrays of one length, times among
-them or not, is a movement; arrays that differ in length are movements themselves; a group of groups holds movements.
+A tree is a mapping of names to trees, a list of trees, an array, or a text. A group of arrays with times is a movement,
+and so is one of arrays of one length but of several widths; other arrays are movements themselves; groups hold some.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _DEEPEST = 12  # groups within groups
 
 
 class Found(NamedTuple):
-    """A movement in a tree: its place, its label if known, its arrays by name (empty for a bare array), and its rate."""
+    """A movement in a tree: its place, its label if known, its arrays by name, empty for a bare one, and its rate."""
 
     place: str
     label: str | None

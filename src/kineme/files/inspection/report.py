@@ -70,8 +70,8 @@ def _understood(how: Detected) -> str:
     times = "no times" if how.time is None else f"time {how.time!r} in {how.units} ({how.units_from})"
     parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {_coordinates(how)}"]
     for what, columns in (("movement", how.movement), ("label", how.label), ("left aside", how.ignored)):
-        if columns:
-            parts.append(f"{what} {', '.join(columns)}")
+        if named := [column for column in columns if column]:
+            parts.append(f"{what} {', '.join(named)}")
     return "; ".join(parts)
 
 

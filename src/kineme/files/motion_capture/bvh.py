@@ -1,7 +1,7 @@
 """BVH: a hierarchy of joints with their channels, and one line of numbers for each frame.
 
-Source: Biovision's format as Meredith and Maddock, "Motion Capture File Formats Explained", 2001, describe it. Channels are
-named ``Joint.Xposition`` and ``Joint.Zrotation``; rotations are in degrees, positions in a unit that the file does not say.
+Source: Biovision's format as Meredith and Maddock, "Motion Capture File Formats Explained", 2001, describe it. Channels
+are named ``Joint.Xposition`` and ``Joint.Zrotation``; rotations are in degrees, positions in a unit that no file says.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Source: OptiTrack, "Data Export: CSV". The first line holds names and values in turn: ``Format Version,1.23,...,Export
 Frame Rate,120,...,Length Units,Meters``. After an empty line there are rows with the type, the name, the id and, since
-version 1.25, the parent of each column, then one with what it holds, and the row of heads ``Frame,Time (Seconds),X,...``.
+version 1.25, the parent of each column, then one with what it holds, and the row of heads ``Frame,Time (Seconds),X``.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     plain = without_common_subject(names[2:])
     quaternions = "quaternion" in said.get("rotation type", "quaternion").lower()
     heads, units = ["frame", "time [s]"], ["", "s"]
-    for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], rows[at][2:], strict=True):
-        what, axis = content.lower(), axis.lower()
+    axes = [cell.lower() for cell in rows[at][2:]]
+    for kind, name, content, axis in zip(kinds[2:], plain, contents[2:], axes, strict=True):
+        what = content.lower()
         left_out = (solved and kind.lower() in _EXPECTED) or axis not in "xyzw" or not axis
         if left_out or what not in ("position", "rotation"):
             heads.append("")

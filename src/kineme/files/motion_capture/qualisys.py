@@ -1,8 +1,8 @@
 """TSV exports of Qualisys Track Manager: motion data and rigid bodies (6DOF).
 
-Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value: ``NO_OF_FRAMES``,
-``FREQUENCY``, ``MARKER_NAMES`` or ``BODY_NAMES``, ...; then, if it was chosen, a row of heads; then the samples, with or
-without a frame and a time before them. Positions are in millimeters.
+Source: Qualisys, "Motion data (.tsv)" and "6DOF data (.tsv)". Lines of a keyword, a tab and its value: ``FREQUENCY``,
+``NO_OF_FRAMES``, ``MARKER_NAMES`` or ``BODY_NAMES``, ...; then, if asked for, a row of heads; then the samples, with
+or without a frame and a time before them. Positions are in millimeters.
 """
 
 from __future__ import annotations

@@ -71,9 +71,9 @@ class Table:
 def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Parsed:
     """The movements of a table.
 
-    Movements that the file itself tells apart are kept apart. With columns that tell movements apart, all rows with equal texts in them, and with equal labels, are one movement,
-    in any order. With a column of labels alone, a new movement begins where the label changes or the time decreases.
-    Otherwise the table is one movement.
+    Movements that the file itself tells apart stay apart. With columns that tell movements apart, all rows with equal
+    texts in them, and with equal labels, are one movement, in any order. With a column of labels alone, a new movement
+    begins where the label changes or the time decreases. Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
@@ -95,7 +95,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         units_from,
         tuple(heads[k] for k in roles.movement),
         () if roles.label is None else (heads[roles.label],),
-        tuple(heads[k] for k in roles.ignored if heads[k]),
+        tuple(heads[k] for k in roles.ignored),
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
     )
     places = [""] * n if n == 1 and not roles.movement and table.segments is None else keys
