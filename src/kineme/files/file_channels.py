@@ -40,6 +40,7 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
         np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
         np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks])))),
         given,
+        next(one.detected.measured_in for one in same if one.detected),
     )
     if len(same) < len(files) and is_plain(channels):
         return list(files), None, []

@@ -36,7 +36,9 @@ _COMPONENT = re.compile(r"(.*?)[\W_]*([wxyz])", re.IGNORECASE)
 _UNITS_IN_WORDS = {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "radian": "rad", "radians": "rad"}
 
 
-def find_channels(heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given) -> Channels:
+def find_channels(
+    heads: Sequence[str], columns: Array, offsets: NDArray[np.intp], given: Given, units: Sequence[str] = ()
+) -> Channels:
     """The channels of movements that have the same columns.
 
     Parameters
@@ -48,6 +50,8 @@ def find_channels(heads: Sequence[str], columns: Array, offsets: NDArray[np.intp
         Where each movement begins.
     given : mapping
         Heads -> kind, or for four heads separated by commas the order of a quaternion.
+    units : sequence of m str, optional
+        Units of the columns, empty where the file does not say; by default those in the heads.
 
     Raises
     ------
@@ -66,8 +70,9 @@ def find_channels(heads: Sequence[str], columns: Array, offsets: NDArray[np.intp
             name = _shared([heads[i] for i in four])
             channels.append(Channel(name, "orientation", tuple(heads[i] for i in four), None, order))
         elif k not in inside:
-            kind = kinds.get(k) or _kind(head, columns[:, k], offsets)
-            channels.append(Channel(head, kind, (head,), unit_of(head)))
+            unit = (units[k] if units else "") or unit_of(head)
+            kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets)
+            channels.append(Channel(head, kind, (head,), unit))
     if all(one.kind == "discrete" for one in channels):  # then they are what moves
         return tuple(one if one.columns[0] in given else one._replace(kind="position") for one in channels)
     return tuple(channels)
@@ -126,11 +131,11 @@ def _quaternion_named(stem: str, q: Array) -> bool:
     )
 
 
-def _kind(head: str, values: Array, offsets: NDArray[np.intp]) -> str:
+def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp]) -> str:
     words = set(words_of(head))
     if words & DISCRETE_WORDS and len(np.unique(values)) <= _LEVELS:
         return "discrete"
-    if words & ANGLE_WORDS or unit_of(head) in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
+    if words & ANGLE_WORDS or unit in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"
 
