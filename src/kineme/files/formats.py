@@ -1,9 +1,9 @@
-"""The table of formats: file extension -> reader."""
+"""The tables of formats: file extension -> reader, and what marks a folder that is one data set -> reader."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,10 +22,48 @@ _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
 class Format(NamedTuple):
-    """The reader of a format, and whether the name of the file is the label of its movements."""
+    """The reader of a format: of the bytes of a file, or of its path.
 
-    read: Callable[[bytes, Layout], Parsed]
+    A reader of a path keeps only what it returns, so that files may be larger than the memory; it alone checks
+    `kineme.files.limits`, against what it keeps. `read_bytes` or `read_path` is given, never both.
+
+    Attributes
+    ----------
+    read_bytes, read_path : callable or None
+    label_is_stem : bool
+        Whether the name of the file is the label of its movements.
+    """
+
+    read_bytes: Callable[[bytes, Layout], Parsed] | None = None
+    read_path: Callable[[Path, Layout], Parsed] | None = None
     label_is_stem: bool = False
+
+
+class DataSet(NamedTuple):
+    """A folder that is one source: its files have a meaning only together.
+
+    Attributes
+    ----------
+    marker : str
+        Path of the file that makes a folder such a data set.
+    beside : tuple of str
+        Patterns of file names in the folder, one of which must be there too; empty if the marker is enough.
+    parts : tuple of str
+        Patterns of the files that are read; their bytes identify the source.
+    format : Format
+        It reads the path of the folder.
+    """
+
+    marker: str
+    beside: tuple[str, ...]
+    parts: tuple[str, ...]
+    format: Format
+
+    def files(self, folder: Path) -> list[Path]:
+        """The files that are read, sorted; hidden ones are passed over."""
+        found = {path for pattern in (self.marker, *self.parts) for path in folder.glob(pattern) if path.is_file()}
+        relative = sorted(path.relative_to(folder) for path in found)
+        return [folder / one for one in relative if not any(part.startswith(".") for part in one.parts)]
 
 
 def _read_text(data: bytes, layout: Layout) -> Parsed:
@@ -67,7 +105,7 @@ def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     )
 
 
-def _read_bag(data: bytes, layout: Layout) -> Parsed:
+def _read_bag(path: Path, layout: Layout) -> Parsed:
     raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
 
 
@@ -80,7 +118,28 @@ FORMATS: dict[str, Format] = {
     ".json": Format(_read_json),
     ".parquet": Format(_read_parquet),
     ".mat": Format(_read_matlab, label_is_stem=True),
-    ".bag": Format(_read_bag),
-    ".db3": Format(_read_bag),
-    ".mcap": Format(_read_bag),
+    ".bag": Format(read_path=_read_bag),
+    ".db3": Format(read_path=_read_bag),
+    ".mcap": Format(read_path=_read_bag),
 }
+
+#: Folders that are one source.
+DATA_SETS: tuple[DataSet, ...] = (
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=_read_bag)),
+)
+
+
+def data_set_of(folder: Path) -> DataSet | None:
+    """The row of `DATA_SETS` for a folder; None for a folder of files and for what is no folder."""
+    return next((one for one in DATA_SETS if _is_marked(folder, one)), None)
+
+
+def _is_marked(folder: Path, data_set: DataSet) -> bool:
+    try:
+        return (folder / data_set.marker).is_file() and (not data_set.beside or any(_matches(folder, data_set.beside)))
+    except OSError:
+        return False
+
+
+def _matches(folder: Path, patterns: tuple[str, ...]) -> Iterator[Path]:
+    return (path for pattern in patterns for path in folder.glob(pattern))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from kineme.errors import DataError
 from kineme.files.folders import files_under
+from kineme.files.formats import data_set_of
 from kineme.files.limits import max_file_bytes
 from kineme.files.merge_files import Recordings, merge_files
 from kineme.files.read_file import format_of, read_bytes, read_file
@@ -28,7 +29,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     follow_links: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
-    """Read all movements of a folder or a file.
+    """Read all movements of a folder, a file, or a data set that is a folder.
 
     In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
     in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
@@ -37,7 +38,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     Parameters
     ----------
     path : str or Path
-        A folder, or a file of a format in `kineme.files.formats.FORMATS`.
+        A folder, a file of a format in `kineme.files.formats.FORMATS`, or a folder of `DATA_SETS` there: one source.
     time, label : str or int, optional
         Columns of a table, by head or counted from 0. By default they are found by their heads.
     columns, movement : str or int or sequence of them, optional
@@ -62,13 +63,24 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     max_file_bytes()
     layout = Layout(time, columns, movement, label, units, skip)
     path = Path(path)
-    if path.is_dir():
+    if path.is_dir() and data_set_of(path) is None:
         files, problems = files_under(path, follow_links)
         watched = files if progress is None else progress(files)
-        return merge_files([read_file(one, one.relative_to(path), layout) for one in watched], str(path), problems)
+        read = [read_file(one, one.relative_to(path), layout, follow_links) for one in watched]
+        return merge_files(read, str(path), problems)
     if not path.exists():
         raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
-    return merge_files([read_file(path, Path(path.name), layout)], str(path))
+    return merge_files([read_file(path, name_of(path), layout, follow_links)], str(path))
+
+
+def root_of(path: Path) -> Path:
+    """The folder that the names of sources are relative to: a folder of files itself, else the folder around it."""
+    return path if path.is_dir() and data_set_of(path) is None else path.parent
+
+
+def name_of(path: Path) -> Path:
+    """The name of a file or a data set; of the current folder too."""
+    return Path(path.name or path.resolve().name)
 
 
 def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
@@ -89,12 +101,13 @@ def read_recording(path: str | Path) -> Trajectory:
         The numbers are no movement, see `Trajectory`.
     """
     path = Path(path)
-    format_of(path)
+    if data_set_of(path) is None:
+        format_of(path)
     path.stat()
-    read = read_file(path, Path(path.name), Layout())
+    read = read_file(path, name_of(path), Layout())
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
     one = merge_files([read], str(path)).demonstrations
     if len(one) > 1:
         raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
-    return Trajectory(one[0].times, one[0].positions, name=path.name)
+    return Trajectory(one[0].times, one[0].positions, name=str(name_of(path)))

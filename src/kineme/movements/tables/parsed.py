@@ -87,10 +87,19 @@ class Block:
 
 
 class Parsed(NamedTuple):
-    """The content of one file or data frame."""
+    """The content of one file or data frame.
+
+    Attributes
+    ----------
+    detected : Detected
+    block : Block
+    left_out : tuple of str
+        Why parts of it could not be read: topics, episodes. Each becomes a problem of the file.
+    """
 
     detected: Detected
     block: Block
+    left_out: tuple[str, ...] = ()
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:
