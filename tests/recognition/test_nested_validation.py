@@ -8,10 +8,10 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from movement_samples import draw_shapes
 
 from kineme import Recognizer, RotationPrior
 from kineme.comparison import widths
+from movement_samples import draw_shapes
 
 ROOT = str(Path(__file__).parents[2])
 
