@@ -1,4 +1,4 @@
-"""Classifiers on the averaged kernel: nearest reference of all or in each representation, prototype, support vectors."""
+"""Classifiers on the averaged kernel: nearest reference of all or in each representation, prototype, SVM."""
 
 from __future__ import annotations
 
