@@ -12,6 +12,7 @@ from kineme.files.arrays.arrays import arrays_movements, parsed_arrays
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz
 from kineme.files.limits import check_expanded
+from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
@@ -105,10 +106,6 @@ def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     )
 
 
-def _read_bag(path: Path, layout: Layout) -> Parsed:
-    raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
-
-
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
 FORMATS: dict[str, Format] = {
     ".csv": Format(_read_text),
@@ -118,14 +115,14 @@ FORMATS: dict[str, Format] = {
     ".json": Format(_read_json),
     ".parquet": Format(_read_parquet),
     ".mat": Format(_read_matlab, label_is_stem=True),
-    ".bag": Format(read_path=_read_bag),
-    ".db3": Format(read_path=_read_bag),
-    ".mcap": Format(read_path=_read_bag),
+    ".bag": Format(read_path=read_bag),
+    ".db3": Format(read_path=read_bag),
+    ".mcap": Format(read_path=read_bag),
 }
 
 #: Folders that are one source.
 DATA_SETS: tuple[DataSet, ...] = (
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=_read_bag)),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
 )
 
 

@@ -61,7 +61,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     time = _time(heads, kinds, layout, named, taken)
     taken.add(time)
     if layout.coordinates is not None:
-        positions = _numbers(heads, layout.coordinates)
+        positions = numbers_of(heads, layout.coordinates)
     else:
         free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
         plain = set(map(_plain, heads))
@@ -76,10 +76,10 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
-    return _numbers(heads, [column])[0]
+    return numbers_of(heads, [column])[0]
 
 
-def _numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
+def numbers_of(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
     """Column numbers from heads or numbers; a string of digits is a number if no head equals it."""
     exact, plain = _places(heads), _places(map(_plain, heads))
     return tuple(_place(heads, one, exact, plain) for one in columns)
@@ -160,7 +160,7 @@ def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
 
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
     if layout.keys is not None:
-        return _numbers(heads, layout.keys)
+        return numbers_of(heads, layout.keys)
     if not named:
         return ()
     kind = MOVEMENT_WORDS
