@@ -79,6 +79,8 @@ def pair_of(text: str) -> Edge:
     parent, colon, child = text.partition(":")
     if not colon or not parent or not child or ":" in child:
         raise DataError(f"expected two frames as parent:child, got {text!r}")
+    if parent.removeprefix("/") == child.removeprefix("/"):
+        raise DataError(f"expected two frames, got {parent!r} twice")
     return parent.removeprefix("/"), child.removeprefix("/")
 
 

@@ -49,7 +49,7 @@ def read_transforms(bag: Bag, wanted: Sequence[Edge], skip: str) -> tuple[list[S
         for parent in sorted(set(counts) - {kept}):
             left_out.append(f"frame {child!r}: {counted(counts[parent], 'transform')} from another parent, {parent!r}")
     pairs = zip(wanted, steps, strict=True)
-    return [_composed(f"{parent}:{child}", way, edges, left_out) for (parent, child), way in pairs], left_out
+    return [_composed(f"{parent}:{child}", way, edges) for (parent, child), way in pairs], left_out
 
 
 def _collect(bag: Bag, needed: set[Edge], bad: list[str]) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
@@ -87,20 +87,18 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
     return replace(stream, values=stream.values[kept], recorded=stream.recorded[kept], stamped=stream.stamped[kept])
 
 
-def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_out: list[str]) -> Stream:
+def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream]) -> Stream:
     moving = [edges[step.edge] for step in way if not _is_fixed(edges[step.edge])]
     if not moving:
         raise DataError(f"frames {name}: expected a frame that moves in the other, got transforms that never change")
     of_headers, reason = clock_of(moving)
-    if not of_headers:
-        left_out.append(f"frames {name}: the stamps of headers, for the time of recording is used: {reason}")
     at = _common_stamps(name, moving, of_headers)
     start = int(at[0])
     seconds = (at - start) / SECOND
     p, q = np.zeros((len(at), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1))
     for step in way:
         p, q = _then(p, q, _at(seconds, start, edges[step.edge], of_headers), step.forward)
-    return Stream(name, POSE, np.hstack((p, continuous(unit(q)))), at, at if of_headers else None)
+    return Stream(name, POSE, np.hstack((p, continuous(unit(q)))), at, at if of_headers else None, reason)
 
 
 def _is_fixed(stream: Stream) -> bool:

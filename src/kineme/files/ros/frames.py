@@ -93,8 +93,6 @@ def chain(graph: Graph, parent: str, child: str) -> list[Step]:
             alike = get_close_matches(frame, frames, 3)
             meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
             raise DataError(f"expected a frame {frame!r}{meant}, got the frames {listed(frames)}")
-    if parent == child:
-        raise DataError(f"expected two frames, got {parent!r} twice")
     way = _way(edges, parent, child)
     if way is None:
         mine = sorted(_reached(edges, parent))

@@ -24,7 +24,7 @@ def clock_of(streams: Sequence[Stream]) -> tuple[bool, str]:
     """
     for one in streams:
         if one.stamped is None:
-            return False, f"{one.name} has no stamps in headers"
+            return False, one.why or f"{one.name} has no stamps in headers"
         if not one.stamped.any():
             return False, f"the stamps in the headers of {one.name} are 0"
         steps = np.diff(one.stamped)

@@ -39,6 +39,8 @@ class Stream:
         When each message was recorded [ns since 1970].
     stamped : ndarray of shape (n,) or None
         The stamps in the headers of the messages [ns]; None if they have no headers.
+    why : str
+        Why there are no such stamps, where it is not for want of headers.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Stream:
     values: Array
     recorded: Stamps
     stamped: Stamps | None
+    why: str = ""
 
 
 class Samples(NamedTuple):
