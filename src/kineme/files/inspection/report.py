@@ -68,8 +68,17 @@ def _range(values: Range) -> str:
 
 def _understood(how: Detected) -> str:
     times = "no times" if how.time is None else f"time {how.time!r} in {how.units} ({how.units_from})"
-    parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {', '.join(how.columns)}"]
+    parts = [f"{how.format}, {how.layout}: {times}", f"coordinates {_coordinates(how)}"]
     for what, columns in (("movement", how.movement), ("label", how.label), ("left aside", how.ignored)):
-        if columns:
-            parts.append(f"{what} {', '.join(columns)}")
+        if named := [column for column in columns if column]:
+            parts.append(f"{what} {', '.join(named)}")
     return "; ".join(parts)
+
+
+def _coordinates(how: Detected) -> str:
+    """The coordinates with their units, once if they have the same."""
+    known = set(how.measured_in)
+    if len(known) == 1:
+        return f"{', '.join(how.columns)} in {known.pop()}"
+    named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
+    return ", ".join(f"{name} [{unit}]" if unit else name for name, unit in named)

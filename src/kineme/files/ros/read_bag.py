@@ -16,7 +16,7 @@ from kineme.files.ros.merge_streams import SECOND, clock_of, merge_streams
 from kineme.files.ros.message_types import TYPES
 from kineme.files.ros.paths import Paths, read_paths
 from kineme.files.ros.streams import Stream, read_streams
-from kineme.movements.tables.columns import Roles, numbers_of
+from kineme.movements.tables.columns import Roles, column_numbers
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed, no_lines
 from kineme.movements.tables.table import Table, table_movements
@@ -89,9 +89,9 @@ def _roles(heads: tuple[str, ...], time: int, layout: Layout) -> Roles:
     """All columns are coordinates but those of stamps, unless the caller chooses: the names of joints are any words."""
     positions = tuple(range(2, len(heads)))
     if layout.time is not None:
-        time = numbers_of(heads, [layout.time])[0]
+        time = column_numbers(heads, [layout.time])[0]
     if layout.coordinates is not None:
-        positions = numbers_of(heads, layout.coordinates)
+        positions = column_numbers(heads, layout.coordinates)
     if layout.keys is not None or layout.label is not None:
         raise DataError("expected movements that are told apart by messages, got a column for that, or for labels")
     used = {time, *positions}
