@@ -35,6 +35,11 @@ class Heads(click.ParamType):  # type: ignore[type-arg]
         return value if isinstance(value, tuple) else tuple(part.strip() for part in value.split(","))
 
 
+def _or_none(ctx: Any, param: Any, value: tuple[str, ...]) -> tuple[str, ...] | None:
+    """None where an option is not given: libraries store those that are."""
+    return value or None
+
+
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
     click.option("--columns", type=Heads(), help="Columns of the coordinates."),
@@ -44,6 +49,11 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a missing or repeated sample.",
+    ),
+    click.option("--topic", multiple=True, callback=_or_none, help="Topic of a ROS bag; several are put side by side."),
+    click.option(
+        "--frame", multiple=True, callback=_or_none, metavar="PARENT:CHILD",
+        help="Pose of one frame of a ROS bag in another.",
     ),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
