@@ -29,6 +29,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     units: str | float | None = None,
     skip: str = "movement",
     kinds: Mapping[str, str] | None = None,
+    topic: str | Sequence[str] | None = None,
+    frame: str | Sequence[str] | None = None,
     follow_links: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
@@ -55,6 +57,11 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
         "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
         `Demonstrations.channels`.
+    topic : str or sequence of str, optional
+        Topics of ROS bags; of several, the others are interpolated to the stamps of the first. By default the only
+        one that can be read.
+    frame : str or sequence of str, optional
+        Frames of ROS bags as ``"parent:child"``: the pose of the child in the parent, composed of the transforms.
     follow_links : bool, default False
         Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
     progress : callable, optional
@@ -68,7 +75,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         An unknown unit or choice, or a limit of memory that is no number.
     """
     max_file_bytes()
-    layout = Layout(time, columns, movement, label, units, skip, kinds)
+    layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame)
     path = Path(path)
     if path.is_dir() and data_set_of(path) is None:
         files, problems = files_under(path, follow_links)

@@ -42,7 +42,7 @@ def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
         As for `ActionLibrary.learn`.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    told = {name: value for name, value in (options or {}).items() if value not in (None, ())}
+    told = {name: value for name, value in (options or {}).items() if value is not None}
     files = {one.path: _source(one, PurePath(root) / one.path, told, now) for one in recordings.sources}
     return learn(
         store,

@@ -37,6 +37,10 @@ class Layout:
     kinds : mapping, optional
         Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
         order of a quaternion.
+    topic : str or sequence of str, optional
+        Topics of a bag; of several, the others are interpolated to the stamps of the first.
+    frame : str or sequence of str, optional
+        Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
 
     Raises
     ------
@@ -51,6 +55,8 @@ class Layout:
     units: str | float | None = None
     skip: str = "movement"
     kinds: Mapping[str, str] | None = None
+    topic: str | Sequence[str] | None = None
+    frame: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
@@ -71,9 +77,23 @@ class Layout:
         """The columns that tell movements apart."""
         return _several(self.movement)
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics of a bag."""
+        return _texts(self.topic)
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The pairs of frames of a bag."""
+        return _texts(self.frame)
+
 
 def _several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | None:
     """One column or many, as a tuple."""
     if columns is None:
         return None
     return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # an empty one names none
+
+
+def _texts(names: str | Sequence[str] | None) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names or ())
