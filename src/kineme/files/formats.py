@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.errors import DataError
 from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names, parsed_arrays
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
@@ -16,6 +15,7 @@ from kineme.files.lerobot.info import MARKER
 from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
+from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
@@ -102,10 +102,6 @@ def _read_c3d(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_c3d_table(data, layout), layout, "C3D")
 
 
-def _read_bag(path: Path, layout: Layout) -> Parsed:
-    raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
-
-
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
 FORMATS: dict[str, Format] = {
     ".csv": Format(_read_text),
@@ -119,9 +115,9 @@ FORMATS: dict[str, Format] = {
     ".mat": Format(_read_matlab, label_is_stem=True),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
-    ".bag": Format(read_path=_read_bag),
-    ".db3": Format(read_path=_read_bag),
-    ".mcap": Format(read_path=_read_bag),
+    ".bag": Format(read_path=read_bag),
+    ".db3": Format(read_path=read_bag),
+    ".mcap": Format(read_path=read_bag),
 }
 
 #: Folders that are one source.
@@ -132,7 +128,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
         Format(read_path=lerobot_movements),
     ),
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=_read_bag)),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
 )
 
 

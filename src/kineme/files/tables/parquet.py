@@ -20,7 +20,7 @@ from kineme.movements.tables.time_stamps import nanoseconds
 
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
-_STATE = "observation.state"  # of LeRobot's episodes
+_STATE, _COMMANDS = "observation.state", frozenset({"action"})  # of LeRobot's episodes
 
 
 def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
@@ -91,14 +91,11 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
 
 
 def _told(heads: Sequence[str], kinds: Sequence[str], types: Sequence[Any], layout: Layout) -> list[str]:
-    """Heads without those of whole lists that nobody chose: a list named action is no label."""
-    import pyarrow as pa
-
+    """Heads without that of a vector of commands, ``action``, which is no label, unless it is chosen."""
     chosen = {layout.label, *(layout.keys or ()), *(layout.coordinates or ())}
     columns = zip(heads, kinds, types, strict=True)
-    return [
-        "" if pa.types.is_nested(t) and kind == "text" and head not in chosen else head for head, kind, t in columns
-    ]
+    lost = _COMMANDS - chosen
+    return ["" if head in lost and kind == "text" and is_list(t) else head for head, kind, t in columns]
 
 
 def _expanded(
