@@ -22,7 +22,7 @@ from kineme.validation import Array
 Single = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
-_LEAST_PAIRS = 1000  # with fewer it is faster to compare all
+_LEAST_ASKED, _LEAST_PAIRS = 16, 1000  # with fewer it is faster to compare all
 _ROUNDING = np.float32(1e-3)  # of a bar: bounds are computed in single precision
 
 
@@ -47,7 +47,8 @@ def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> 
 def _can_skip(similarity: AveragedSimilarity, A: Described, B: Described) -> bool:
     """Whether there are bounds, and enough pairs that they pay."""
     elastic = A.pairs is not None and PAIR_QUANTITIES.index("elastic") in A.pairs.measures
-    return elastic and similarity.mean == "arithmetic" and len(A) * len(B) >= _LEAST_PAIRS
+    enough = len(A) >= _LEAST_ASKED and len(A) * len(B) >= _LEAST_PAIRS
+    return elastic and similarity.mean == "arithmetic" and enough
 
 
 class _Search:
