@@ -26,6 +26,7 @@ SUBJECTS = (
     "binning",
     "anchoring",
     "by_person",
+    "nested",
 )
 
 

@@ -99,6 +99,46 @@ def test_labels_can_be_given_or_left_out(recordings, tmp_path):
     assert both.returncode == 2
 
 
+def test_people_are_said_or_read_from_folders(recordings, tmp_path):
+    library, plain = tmp_path / "actions", tmp_path / "plain"
+    assert answer("learn", recordings, "-l", plain)["people"] == []
+    assert "by 1 person; " in start("learn", recordings, "--person", "anna", "-l", library).stdout
+    by = tmp_path / "everybody"
+    by.mkdir()
+    recordings.rename(by / "ben")
+    first = next((by / "ben" / "CShape").iterdir())
+    (by / "cleo" / "CShape").mkdir(parents=True)
+    (by / "cleo" / "CShape" / "0.csv").write_text(first.read_text().replace(",0.", ",1."))
+    learned = answer("learn", by, "--by-person", "-l", library)
+    assert (learned["added"], learned["people"]) == (1, ["ben", "cleo"])
+    assert answer("library", "list", "-l", library)["people"] == {"anna": 14, "cleo": 1}  # who was known stays
+    assert answer("library", "list", "-l", plain)["people"] == {}
+    assert "15 by 2 people; version" in run("library", "list", "-l", library).stdout
+    shown = answer("library", "show", "CShape", "-l", library)["members"]
+    assert [one["person"] for one in shown] == ["anna"] * 7 + ["cleo"]
+    assert "person" in run("library", "show", "CShape", "-l", library).stdout
+    assert "person" not in run("library", "show", "CShape", "-l", plain).stdout
+
+
+def test_people_of_an_archive_are_those_of_its_array(demos, tmp_path):
+    people = np.array(["anna", "ben"])[np.arange(len(demos)) % 2]
+    np.savez(
+        tmp_path / "all.npz", positions=demos.positions, times=demos.times, offsets=demos.offsets,
+        labels=demos.labels.astype(str), people=people,
+    )  # fmt: skip
+    answer("learn", tmp_path / "all.npz", "--by-person", "-l", tmp_path / "actions")
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as library:
+        assert library.groups().tolist() == people.tolist()
+
+
+def test_people_whom_nothing_names_are_asked_for(recordings, tmp_path):
+    done = run("learn", recordings, "--by-person", "-l", tmp_path / "actions")
+    assert done.returncode == 1
+    assert "or an array people in an archive, got neither; name them with --person" in done.stderr
+    assert not (tmp_path / "actions").exists()
+    assert run("learn", recordings, "--by-person", "--person", "x", "-l", tmp_path / "actions").returncode == 2
+
+
 def test_the_standard_input_is_a_recording(recordings, tmp_path):
     table = (recordings / "CShape" / "0.csv").read_text()
     learned = answer("learn", "-", "--label", "piped", "-l", tmp_path / "actions", input=table, by=start)

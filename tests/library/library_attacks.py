@@ -30,6 +30,7 @@ def make_victim(folder):
             draw_movements(6, n_samples=SAMPLES, labels=kinds),
             source=Source("a.csv", "ab" * 32, 5, "csv", {"time": "t"}, "2024-01-01"),
             places=list(map(str, range(6))),
+            groups=["anna", "ben", "anna", None, "ben", "anna"],
         )
         library.learn(draw_movements(3, seed=1, ragged=True, labels=["wave"] * 3))
         library.annotate("wave", "with the hand", prototype=1, threshold=0.5)
@@ -272,6 +273,16 @@ ROWS = {
     "a member of no symbol": (["UPDATE member SET symbol = 77 WHERE id = 1"], "refers to a row of table symbol"),
     "a member of text": (["UPDATE member SET movement = 'two' WHERE id = 1"], "movement is not a whole number"),
     "a member of infinity": (["UPDATE member SET movement = 9e999 WHERE id = 1"], "movement is not a whole number"),
+    "shown by nobody": (["UPDATE shown_by SET person = '' WHERE movement = 2"], "person is not text of 1"),
+    "shown by bytes": (["UPDATE shown_by SET person = x'41' WHERE movement = 2"], "person is not text"),
+    "shown by whom a terminal ends": (
+        ["UPDATE shown_by SET person = 'a' || char(0) WHERE movement = 2"],
+        "person is not text .* without U[+]0000",
+    ),
+    "shown by somebody without a movement": (
+        ["UPDATE shown_by SET movement = 77 WHERE movement = 2"],
+        "refers to a row of table movement",
+    ),
     "a strange way to a symbol": (["UPDATE member SET how = 'magic' WHERE id = 1"], "how|CHECK constraint"),
     "removed before it was added": (
         ["UPDATE member SET added = 3, removed = 1 WHERE id = 1"],

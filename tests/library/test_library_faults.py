@@ -208,25 +208,30 @@ def test_a_library_of_a_later_version_is_refused_and_left_alone(folder):
         other.execute("PRAGMA user_version = 7")
     before = (folder / FILE).read_bytes()
     for options in ({}, {"create": True}, {"read_only": True}):
-        with pytest.raises(DataError, match=r"schema version 1 or earlier, got 7; upgrade kineme"):
+        with pytest.raises(DataError, match=r"schema version 2 or earlier, got 7; upgrade kineme"):
             ActionLibrary(folder, **options)
     assert (folder / FILE).read_bytes() == before
 
 
 def test_an_earlier_library_is_brought_up_to_date_in_one_step(folder, monkeypatch):
     for module in (connection, store):
-        monkeypatch.setattr(module, "SCHEMA_VERSION", 3)
-    steps = {1: ("CREATE TABLE extra (a)",), 2: ("INSERT INTO extra VALUES (1)", "not SQL")}
+        monkeypatch.setattr(module, "SCHEMA_VERSION", 4)
+    monkeypatch.setattr(store, "READABLE", 4)
+    steps = {
+        **connection.MIGRATIONS,
+        2: ("CREATE TABLE extra (a)",),
+        3: ("INSERT INTO extra VALUES (1)", "not SQL"),
+    }
     monkeypatch.setattr(connection, "MIGRATIONS", steps)
-    with pytest.raises(DataError, match=r"schema version 3, got an earlier one; open it once without read_only"):
+    with pytest.raises(DataError, match=r"schema version 4, got an earlier one; open it once without read_only"):
         ActionLibrary(folder, read_only=True)
     with pytest.raises(sqlite3.OperationalError, match="syntax"):
         ActionLibrary(folder)
-    steps[2] = steps[2][:1]
+    steps[3] = steps[3][:1]
     with ActionLibrary(folder) as library:  # the step before the one that failed has not been kept: it can run again
         assert len(library) == 12
     with closing(_raw(folder)) as other:
-        assert other.execute("PRAGMA user_version").fetchone() == (3,)
+        assert other.execute("PRAGMA user_version").fetchone() == (4,)
         assert other.execute("SELECT a FROM extra").fetchall() == [(1,)]
 
 

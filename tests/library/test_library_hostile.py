@@ -10,6 +10,7 @@ import time
 from contextlib import closing, suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 from library_attacks import DEFINITIONS, ROWS, attack, copy_of, make_endless, make_victim
 from library_samples import contents
@@ -18,6 +19,7 @@ from kineme import ActionLibrary, DataError, KinemeError
 from kineme.library.storage import defense
 from kineme.library.storage.connection import connect
 from kineme.library.storage.folder import FILE
+from kineme.library.storage.schema import SCHEMA_VERSION
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +110,25 @@ def test_a_library_of_the_first_release_opens_imports_and_is_whole(tmp_path):
         assert copy.verify() == []
 
 
+def test_a_library_of_the_first_release_is_read_as_it_is(tmp_path):
+    """Whoever only reads it changes no byte, and is told of no people; whoever writes adds the table of people."""
+    kept = Path(__file__).with_name("library_0.1.0.xz")
+    (tmp_path / "export").write_bytes(lzma.decompress(kept.read_bytes()))
+    planted = _opened(tmp_path / "export", tmp_path)
+    before = (planted / FILE).read_bytes()
+    with ActionLibrary(planted, read_only=True) as library:
+        expected, first = contents(library), library.ids()[:3]
+        assert library.verify() == []
+        assert library.groups().tolist() == [None] * len(library)
+        assert library.recognize(library.movements(ids=first))[0].label is not None
+    assert (planted / FILE).read_bytes() == before
+    with ActionLibrary(planted) as library:
+        assert contents(library) == expected
+        new = library.learn(library.movements(ids=first), groups=["anna"] * 3).ids
+        assert library.groups(np.append(new, first)).tolist() == ["anna"] * 3 + [None] * 3
+        assert library.verify() == []
+
+
 def _is_refused(path, tmp_path, words):
     with pytest.raises(DataError, match=words):
         ActionLibrary.import_(path, tmp_path / "copy")
@@ -170,7 +191,7 @@ def test_texts_in_another_encoding_are_refused(export, tmp_path):
         for statement in one.iterdump():
             other.execute(statement)
         other.execute(f"PRAGMA application_id = {one.execute('PRAGMA application_id').fetchone()[0]}")
-        other.execute("PRAGMA user_version = 1")
+        other.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
         other.commit()
     _is_refused(tmp_path / "wide", tmp_path, r"libraries? and nothing else, got texts in UTF-16|got texts in UTF-16le")
 

@@ -119,12 +119,14 @@ def test_calibration_finds_the_nearest_of_a_large_class(make, d):
     library = make(_kinds([400, 5], d, seed=7, spread=0.1))
     model = LibraryRecognizer(library.store, exhaustive=0).model()
     stored, similarity = model.stored, model.comparison.similarity
-    asked = sampled_calibration._rows(stored, 0)[::4]
-    others = sampled_calibration._proposed(similarity, stored, 0, asked)
-    own = stored.described(similarity, asked)
-    found = sampled_calibration._to_own(similarity, own, stored.described(similarity, others.ravel()))
-    every = np.setdiff1d(sampled_calibration._rows(stored, 0), asked)
-    nearest = distances(similarity.log_average(own, stored.described(similarity, every))).min(axis=1)
+    members, asked = stored.members, sampled_calibration._positions(stored, 0)[::4]
+    alone = np.arange(len(members))
+    others = sampled_calibration._proposed(similarity, stored, alone, 0, asked)
+    own = stored.described(similarity, members[asked])
+    found = sampled_calibration._to_own(similarity, own, stored.described(similarity, members[others.ravel()]))
+    every = np.setdiff1d(sampled_calibration._positions(stored, 0), asked)
+    away = distances(similarity.log_average(own, stored.described(similarity, members[every])))
+    found, nearest = found.min(axis=1), away.min(axis=1)
     assert (found >= nearest - 1e-4).all()
     assert found.mean() < 1.012 * nearest.mean()
     assert np.mean(found < nearest + 1e-4) > 0.85

@@ -55,7 +55,8 @@ def test_calibrated_where_enough_left_out_scores_tell_the_error_rate(fitted, cou
 
 def test_an_answer_is_calibrated_only_if_every_class_is():
     scores = np.linspace(0.5, 2, 30)
-    mixed = Calibration(np.ones(2), (scores, np.empty(0)), (scores, np.empty(0)))
+    some = (scores, np.empty(0))
+    mixed = Calibration(np.ones(2), some, some, some, some)
     assert mixed.calibrated(0.05).tolist() == [True, False]
 
 

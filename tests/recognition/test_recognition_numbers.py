@@ -43,7 +43,7 @@ def test_of_four_demonstrations_the_own_scale_counts_half():
 
 def test_what_is_not_calibrated_is_unknown_beyond_three_quarters_of_the_way_to_another_class():
     none = (np.empty(0),)
-    guess = Calibration(np.array([typical_scale(np.array([1.0, 2.0, 3.0]))]), none, none)
+    guess = Calibration(np.array([typical_scale(np.array([1.0, 2.0, 3.0]))]), none, none, none, none)
     logs = -0.5 * (2.0 * np.array([[0.74], [0.75], [0.76]])) ** 2
     p = guess.p_values(logs, 0.05)[:, 0]
     assert p[1] == pytest.approx(0.05)

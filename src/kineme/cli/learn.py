@@ -22,6 +22,13 @@ _SHOWN = 10  # problems that are listed
 @library_option
 @click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")
 @click.option("--no-labels", is_flag=True, help="Store movements without labels, for kineme anchor.")
+@click.option("--person", help="Name of who showed all movements, where others will be recognized.")
+@click.option(
+    "--by-person",
+    is_flag=True,
+    help="Who showed a movement is the folder above that of its label, as in person/label/recording.csv, or the array "
+    "people of an npz archive.",
+)
 @layout_options
 @json_option
 def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
@@ -30,25 +37,34 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements
     that are stored already are not stored again; what cannot be read is listed, and the rest is learned.
 
+    Where several people show movements and others will be recognized, say who showed what, with --person or
+    --by-person: kineme recognize then knows how much people differ, and calls fewer movements of new ones unknown.
+
     Example: kineme learn recordings/ --library actions/
     """
+    from kineme.files.recordings import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
+    person, by_person = options.pop("person"), options.pop("by_person")
     if label is not None and no_labels:
         raise click.UsageError("expected --label or --no-labels, not both")
+    if person is not None and by_person:
+        raise click.UsageError("expected --person or --by-person, not both")
     parsed, problems = _read_all(recordings, options)
+    people = [_people(path, one, person, by_person) for path, one in parsed]
     with ActionLibrary(folder, create=True) as library:
         before = library.version
         reports = [
             _learn(
                 library,
-                root,
+                root_of(path),
                 one,
                 options,
                 [None if no_labels else each if label is None else label for each in one.labels],
+                groups,
             )
-            for root, one in parsed
+            for (path, one), groups in zip(parsed, people, strict=True)
         ]
         data = {
             "library": str(folder),
@@ -57,6 +73,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "joined": _joined(library, before) if any(one.known for one in reports) else 0,
             "symbols": [name for one in reports for name in one.symbols],
             "movements": len(library),
+            "people": sorted({one for groups in people for one in groups or () if one is not None}),
             "version": library.version,
             "problems": problems,
         }
@@ -64,7 +81,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
 
 def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
-    """Recordings with their folder, and problems; an error if nothing could be read."""
+    """Recordings with their paths, and problems; an error if nothing could be read."""
     from kineme.errors import DataError
 
     parsed: list[tuple[Path, Any]] = []
@@ -73,7 +90,7 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     for path in paths:
         try:
             one = read(path, options)
-            parsed.append((path if path.is_dir() else path.parent, one))
+            parsed.append((path, one))
             problems += map(str, one.problems)
         except DataError as error:
             first = first or error
@@ -83,11 +100,27 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     return parsed, problems
 
 
-def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[str | None]) -> Any:
+def _people(path: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
+    """Who showed each movement, as far as the options and the recordings say."""
+    from kineme.errors import DataError
+    from kineme.files.people import each_person
+
+    if not by_person:
+        return None if person is None else [person] * len(recordings)
+    people = each_person(path, recordings.sources)
+    if not any(people):
+        raise DataError(
+            f"expected {path} to say who showed its movements, by folders person/label/recording or an array people in "
+            "an archive, got neither; name them with --person"
+        )
+    return people
+
+
+def _learn(library: Any, root: Path, recordings: Any, options: dict[str, Any], labels: list[Any], groups: Any) -> Any:
     from kineme.library.learning.recordings import learn_recordings
 
     with _progress(len(recordings)) as progress:
-        return learn_recordings(library.store, recordings, options, labels, progress, root)
+        return learn_recordings(library.store, recordings, options, labels, progress, root, groups)
 
 
 def _joined(library: Any, before: int) -> int:
@@ -111,8 +144,9 @@ def _text(data: dict[str, Any]) -> str:
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
     known = f", {data['known']:,} known already{joined}" if data["known"] else ""
     held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
-    problems = data["problems"]
-    lines = [f"learned {counted(data['added'], 'movement')}{known}{new}; {held}"]
+    problems, people = data["problems"], data["people"]
+    by = f", by {counted(len(people), 'person', 'people')}" if people else ""
+    lines = [f"learned {counted(data['added'], 'movement')}{known}{new}{by}; {held}"]
     lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
     if len(problems) > _SHOWN:
         lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +34,12 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
     with opened(folder) as actions:
         shown = actions if version is None else actions.at(version)
         symbols, unlabeled = shown.symbols(), len(shown.unlabeled())
+        people = Counter(one for one in shown.groups().tolist() if one is not None)
         data = {
             "movements": len(shown),
             "unlabeled": unlabeled,
             "dimensions": shown.n_dims,
+            "people": dict(sorted(people.items())),
             "version": shown.version,
             "symbols": [brief(symbol) for symbol in symbols],
         }
@@ -45,9 +48,10 @@ def list_symbols(folder: Path, version: int | None, as_json: bool) -> None:
         from kineme.output.table import Table, to_text
 
         rows = [(printable(s.name), f"{len(s)}", s.id, printable(s.description)) for s in symbols]
+        by = f", {sum(people.values()):,} by {counted(len(people), 'person', 'people')}" if people else ""
         title = (
             f"{counted(data['movements'], 'movement')}, {counted(len(symbols), 'symbol')}, "
-            f"{unlabeled} without a symbol; version {data['version']}"
+            f"{unlabeled} without a symbol{by}; version {data['version']}"
         )
         return to_text(Table(title, ("symbol", "movements", "id", "description"), rows)) if rows else title
 
@@ -203,15 +207,18 @@ def brief(symbol: Any) -> dict[str, Any]:
 def _report_text(data: dict[str, Any]) -> str:
     from kineme.output.table import Table, to_text
 
+    told = any(one["person"] for one in data["members"])
     rows = [
-        (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""), f"{one['duration']:.3g}",
+        (str(one["id"]), printable(one["name"] or ""), printable(one["source"] or ""),
+         *((printable(one["person"] or ""),) if told else ()), f"{one['duration']:.3g}",
          _point(one["start"], one), _point(one["goal"], one))
         for one in data["members"]
     ]  # fmt: skip
     head = f"{printable(data['name'])}  {data['id']}"
     if data["description"]:
         head += f"\n{printable(data['description'])}"
-    return to_text(Table(head, ("movement", "name", "file", "duration [s]", "start", "goal"), rows))
+    person = ("person",) if told else ()
+    return to_text(Table(head, ("movement", "name", "file", *person, "duration [s]", "start", "goal"), rows))
 
 
 def _point(point: list[float], member: dict[str, Any]) -> str:

@@ -65,6 +65,12 @@ class Compared:
         """Log similarity to the nearest reference of each class, (n, C)."""
         return np.asarray(np.maximum.reduceat(self.log_average, self.references.first, axis=1))
 
+    @cached_property
+    def nearest_each(self) -> Array:
+        """Log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
+        each = np.maximum.reduceat(self.logs, self.references.first, axis=2)
+        return LOG_MEANS[self.comparison.mean](each)
+
     def shares(self, chosen: NDArray[np.intp]) -> Array:
         """Share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
         return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])

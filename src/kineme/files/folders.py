@@ -6,14 +6,16 @@ import os
 from collections import deque
 from pathlib import Path
 
+from kineme.files.formats import data_set_of
 from kineme.files.problem import Problem
 
-_OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
+OUTSIDE = "a link that leads out of the folder; to read it, say follow_links=True, in the shell --follow-links"
 
 
 def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], list[Problem]]:
     """All files that are not hidden, sorted, and the problems with links and folders.
 
+    A folder that is one data set (`kineme.files.formats.DATA_SETS`) stands for all of its files.
     Names that begin with a dot are skipped. Links to folders are followed last, and no folder is entered twice. A link
     that leads out of the folder is a problem, and followed only with `follow_links`: a folder from elsewhere must not
     make the program read other files of this machine.
@@ -29,14 +31,17 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
             if (known.st_dev, known.st_ino) in visited:
                 continue
             visited.add((known.st_dev, known.st_ino))
+            if here != folder and data_set_of(here) is not None:
+                files.append(here)
+                continue
             entries = sorted((one for one in os.scandir(here) if not one.name.startswith(".")), key=lambda e: e.name)
         except OSError as error:
             problems.append(Problem(as_text(here.relative_to(folder)), None, f"the folder cannot be listed, {error}"))
             continue
         for entry in entries:
             path = here / entry.name
-            if entry.is_symlink() and not follow_links and _leads_out(path, folder):
-                problems.append(Problem(as_text(path.relative_to(folder)), None, _OUTSIDE))
+            if entry.is_symlink() and not follow_links and leads_out(path, folder):
+                problems.append(Problem(as_text(path.relative_to(folder)), None, OUTSIDE))
             elif not _is_folder(entry):
                 files.append(path)
             else:
@@ -44,7 +49,7 @@ def files_under(folder: Path, follow_links: bool = False) -> tuple[list[Path], l
     return sorted(files, key=lambda path: path.relative_to(folder).parts), problems
 
 
-def _leads_out(link: Path, folder: Path) -> bool:
+def leads_out(link: Path, folder: Path) -> bool:
     """Whether the target of a link exists and lies outside the folder."""
     target, top = os.path.realpath(link), os.path.realpath(folder)
     return os.path.exists(target) and os.path.commonpath([target, top]) != top

@@ -1,10 +1,12 @@
-"""Read one file: its bytes are read once, hashed, and parsed into checked movements; failures become problems."""
+"""Read one file: hashed, and parsed into checked movements; failures become problems."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import stat
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,12 +14,12 @@ import numpy as np
 
 from kineme.errors import DataError, KinemeError
 from kineme.files.check_block import check_block
-from kineme.files.folders import as_text
-from kineme.files.formats import FORMATS, Format
+from kineme.files.folders import OUTSIDE, as_text, leads_out
+from kineme.files.formats import FORMATS, Format, data_set_of
 from kineme.files.limits import check_expanded
 from kineme.files.problem import Problem
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected
+from kineme.movements.tables.parsed import Block, Detected, Parsed
 
 #: Exceptions of readers on invalid files; RecursionError is too deep nesting.
 _UNREADABLE = (
@@ -47,8 +49,8 @@ class FileRead(NamedTuple):
     problems: list[Problem]
 
 
-def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
-    """Read a file; it need not exist any more.
+def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:
+    """Read a file, or a folder that is one data set; it need not exist any more.
 
     Parameters
     ----------
@@ -57,37 +59,89 @@ def read_file(path: Path, relative: Path, layout: Layout) -> FileRead:
         Path in the result. Its innermost folder is the label of movements without one in the file, unless the format
         takes the name of the file itself.
     layout : Layout
+    follow_links : bool, default False
+        Whether links in a data set that lead out of it are read.
     """
     name = as_text(relative)
     try:
-        format_of(relative)
-        known = os.stat(path)
-        if not stat.S_ISREG(known.st_mode):  # reading a pipe would wait forever
+        parts, form = _parts(path, relative, follow_links)
+        known = [os.stat(part) for part in parts]
+        if not all(stat.S_ISREG(one.st_mode) for one in known):  # reading a pipe would wait forever
             raise DataError("expected a file, got a pipe or a device")
-        check_expanded(known.st_size)
-        data = path.read_bytes()
-    except (OSError, MemoryError) as error:
+        if form.read_path is None:
+            check_expanded(known[0].st_size)
+            data = path.read_bytes()
+    except (OSError, MemoryError, DataError) as error:
         reason = _NOWHERE if path.is_symlink() and not os.path.exists(path) else _plainly(error)
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, reason)])
-    return read_bytes(data, relative, layout, known.st_mtime)
+    if form.read_path is None:
+        return read_bytes(data, relative, layout, known[0].st_mtime)
+    size, mtime = sum(one.st_size for one in known), max(one.st_mtime for one in known)
+    read = _parsed(partial(form.read_path, path, layout), form, relative, layout)
+    if read.block is None:
+        return read._replace(size=size, mtime=mtime)
+    try:
+        return read._replace(sha256=_sha256(parts, path), size=size, mtime=mtime)
+    except OSError as error:  # it was there a moment ago
+        return FileRead(name, "", size, mtime, None, None, [Problem(name, None, _plainly(error))])
 
 
 def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) -> FileRead:
     """Read the content of a file of that name."""
-    name = as_text(relative)
-    sha256 = hashlib.sha256(data).hexdigest()
     form = format_of(relative)
+    sha256 = hashlib.sha256(data).hexdigest()
+    if form.read_bytes is None:
+        reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
+        read = FileRead(as_text(relative), "", 0, 0.0, None, None, [Problem(as_text(relative), None, reason)])
+    else:
+        read = _parsed(partial(_expanded, form.read_bytes, data, layout), form, relative, layout)
+    return read._replace(sha256=sha256, size=len(data), mtime=mtime)
+
+
+def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layout) -> Parsed:
+    check_expanded(len(data))
+    return read(data, layout)
+
+
+def _parsed(parse: Callable[[], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
+    """What a reader returns, checked, or the problem with it."""
+    name = as_text(relative)
     try:
-        check_expanded(len(data))
         with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
-            detected, block = form.read(data, layout)
+            detected, block, left_out = parse()
             block, problems = check_block(block, name, layout.skip)
     except _UNREADABLE as error:
-        return FileRead(name, sha256, len(data), mtime, None, None, [Problem(name, None, _plainly(error))])
+        return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     labels = [label if one is None else _storable(one) for one in block.labels]
     block = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
-    return FileRead(name, sha256, len(data), mtime, detected, block, problems)
+    problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
+    return FileRead(name, "", 0, 0.0, detected, block, problems)
+
+
+def _parts(path: Path, relative: Path, follow_links: bool) -> tuple[list[Path], Format]:
+    """The files that hold a source, and its format."""
+    data_set = data_set_of(path)
+    if data_set is None:
+        return [path], format_of(relative)
+    parts = data_set.files(path)
+    outside = [] if follow_links else [part for part in parts if leads_out(part, path)]
+    if outside:
+        raise DataError(f"{as_text(outside[0].relative_to(path))} is {OUTSIDE}")
+    return parts, data_set.format
+
+
+def _sha256(parts: Sequence[Path], path: Path) -> str:
+    """Of the bytes of a file; of a data set, of the names of its files and of their checksums."""
+    known = []
+    for part in parts:
+        with part.open("rb") as file:
+            known.append(hashlib.file_digest(file, "sha256").hexdigest())
+    if parts == [path]:
+        return known[0]
+    names = [as_text(part.relative_to(path)) for part in parts]
+    lines = [f"{one}  {name}\n" for one, name in zip(known, names, strict=True)]
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def format_of(path: Path) -> Format:

@@ -141,6 +141,7 @@ class ActionLibrary:
         labels: Sequence[Any] | None = None,
         source: Source | Sequence[Source | None] | None = None,
         *,
+        groups: Sequence[Any] | None = None,
         places: Sequence[Any] | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> LearnReport:
@@ -154,6 +155,10 @@ class ActionLibrary:
             Names of symbols, which are created if needed; by default the labels of the movements. None is unlabeled.
         source : Source, or sequence of n Source or None, optional
             The files of the movements.
+        groups : sequence of n str, int or None, optional
+            Who showed each movement, or what else makes some more alike than new ones will be, as for
+            `kineme.Recognizer.fit`: what is unknown is then decided for people who showed nothing. Those of None, whose
+            name is not known, count as of one more person. Without groups it is decided for the people who showed.
         places : sequence of n str, optional
             Position of each movement in its file: a movement at a stored position counts as stored already. If not
             given, duplicates are found by their samples alone.
@@ -175,11 +180,12 @@ class ActionLibrary:
         Notes
         -----
         A movement is stored already if its samples are, or its position in a file of the same content read with the
-        same options. Such a movement is added to the symbol of its label only if it belongs to none.
+        same options. Such a movement is added to the symbol of its label only if it belongs to none, and who showed it
+        is stored only if that was not known.
         """
         from kineme.library.learning.learn import learn
 
-        return learn(self.store, movements, labels, source, places, progress)
+        return learn(self.store, movements, labels, source, places, progress, groups)
 
     def ids(self, symbol: str | None = None) -> Ids:
         """Ids of all movements, or of those of a symbol, ascending."""
@@ -196,6 +202,10 @@ class ActionLibrary:
         """
         chosen = self._choose(symbol, ids)
         return read.movements(self.store, chosen, read.names_of(self.store, chosen))
+
+    def groups(self, ids: ArrayLike | None = None) -> NDArray[np.object_]:
+        """Who showed each movement, as told to `learn`, shape (k,): of all, or of `ids`; None where it is not known."""
+        return read.groups(self.store, self._choose(None, ids))
 
     def features(self, ids: ArrayLike | None = None) -> NDArray[np.float32]:
         """Rows of all representations that are compared sample by sample, concatenated, shape (k, sum of d * S)."""

@@ -51,9 +51,9 @@ def in_markup(text: Any) -> str:
     return escape(printable_lines(text))
 
 
-def counted(number: int, noun: str) -> str:
+def counted(number: int, noun: str, plural: str | None = None) -> str:
     """A number and its noun: ``1 movement``, ``2 movements``."""
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+    return f"{number:,} {noun if number == 1 else plural or noun + 's'}"
 
 
 def _escape_character(mark: str) -> str:

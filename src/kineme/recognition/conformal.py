@@ -26,6 +26,7 @@ from kineme.recognition.left_out import (
     finite,
     law,
     score_classes,
+    several,
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
@@ -94,15 +95,15 @@ class Calibration:
         Of each class, the scores of its demonstrations.
     pooled : tuple of C ndarrays
         For each class, the scores of all demonstrations, each scored against as many as the class has.
-    own_novelties, pooled_novelties : tuple of C ndarrays, or None
-        The same of novelties; where they are None, the scores of members, which are not smaller.
+    own_novelties, pooled_novelties : tuple of C ndarrays
+        The same of novelties; of `sampled_calibration` the scores of members, which are not smaller.
     """
 
     scales: Array
     own: tuple[Array, ...]
     pooled: tuple[Array, ...]
-    own_novelties: tuple[Array, ...] | None = None
-    pooled_novelties: tuple[Array, ...] | None = None
+    own_novelties: tuple[Array, ...]
+    pooled_novelties: tuple[Array, ...]
 
     def scores(self, nearest: Array) -> Array:
         """Nonconformity (n, C) of movements whose log similarity to each class's nearest demonstration is given."""
@@ -126,10 +127,9 @@ class Calibration:
         like = scores.argmin(axis=1)
         novelty = scores[np.arange(len(scores)), like]
         result = np.empty(len(scores))
-        counted = self._counted_novelties(error_rate)
+        counted = _counted(self.own_novelties, self.pooled_novelties, error_rate)
         for c in np.unique(like):
-            own, chosen = novelty[like == c], counted[c]
-            few = (self.pooled if self.pooled_novelties is None else self.pooled_novelties)[c]
+            own, chosen, few = novelty[like == c], counted[c], self.pooled_novelties[c]
             if chosen is not None:
                 result[like == c] = _shares(np.sort(chosen[1]), own)
             else:
@@ -138,7 +138,7 @@ class Calibration:
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
         """The rule of each movement's `known_p_values`: "class", "pooled" or "guess", see `RULES`."""
-        counted = self._counted_novelties(error_rate)
+        counted = _counted(self.own_novelties, self.pooled_novelties, error_rate)
         chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
         return ["guess" if one is None else one[0] for one in chosen]
 
@@ -151,21 +151,8 @@ class Calibration:
 
     def select(self, classes: NDArray[np.intp]) -> Calibration:
         """The calibration of some of the classes."""
-
-        def chosen(part: tuple[Array, ...]) -> tuple[Array, ...]:
-            return tuple(part[c] for c in classes)
-
-        novelties = (self.own_novelties, self.pooled_novelties)
-        return Calibration(
-            self.scales[classes],
-            chosen(self.own),
-            chosen(self.pooled),
-            *(None if part is None else chosen(part) for part in novelties),
-        )
-
-    def _counted_novelties(self, error_rate: float) -> list[tuple[str, Array] | None]:
-        own = self.own if self.own_novelties is None else self.own_novelties
-        return _counted(own, self.pooled if self.pooled_novelties is None else self.pooled_novelties, error_rate)
+        parts = (self.own, self.pooled, self.own_novelties, self.pooled_novelties)
+        return Calibration(self.scales[classes], *(tuple(part[c] for c in classes) for part in parts))
 
 
 def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[tuple[str, Array] | None]:
@@ -195,8 +182,7 @@ def calibrate(
     one group nothing could be compared; they then count as movements without groups.
     """
     counts = references.counts
-    if groups is not None and len(np.unique(groups)) == 1:
-        groups = None
+    groups = several(groups)
     blocks, others, impostors = [], [], []
     for own_class, count in zip(references.slices(), counts, strict=True):
         chosen = own_class.start + evenly_spaced(count, _CALIBRATED)

@@ -76,6 +76,11 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
         raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
+def several(groups: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
+    """The groups; None where all are one, in which nothing could be compared: they then count as no groups."""
+    return None if groups is None or len(np.unique(groups)) == 1 else groups
+
+
 @dataclass(frozen=True, eq=False)
 class ClassDistances:
     """Distances (k, n) of k calibrating demonstrations, at `indices`, to the n demonstrations of their class.

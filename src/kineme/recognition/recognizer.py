@@ -63,9 +63,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     weights : {"auto", "equal", "fitted"} or sequence of R numbers, default "auto"
         Of the representations in the arithmetic mean. "auto": their own; "fitted": half their own, half fitted to the
         training movements, see `kineme.comparison.weights.fitted_weights`.
-    classifier : {"auto", "nearest", "prototype", "svm"}, default "auto"
-        "nearest" stored movement, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is
-        the nearest.
+    classifier : {"auto", "nearest", "nearest-each", "prototype", "svm"}, default "auto"
+        "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
+        class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".
     rotation_prior : RotationPrior or None
         How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
         right angle costs 0.06 of the inner product of two equal paths in the plane and 0.2 in space, and none is

@@ -5,14 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kineme.comparison.bounds import log_bounds
 from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
 from kineme.recognition.conformal import Calibration
-from kineme.recognition.left_out import ClassDistances, distances, score_classes, typical_scale
+from kineme.recognition.left_out import (
+    REACH,
+    REACH_OF_OTHERS,
+    ClassDistances,
+    distances,
+    finite,
+    score_classes,
+    several,
+    typical_scale,
+)
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
@@ -27,8 +35,10 @@ _MORE = 16  # the same among all, where shapes differ
 _AT_ONCE = 64  # classes whose movements are read together
 
 
-def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
-    """The `Calibration` of movements that are stored elsewhere.
+def calibrate_sample(
+    similarity: AveragedSimilarity, stored: StoredReferences, groups: Rows | None = None
+) -> Calibration:
+    """The `Calibration` of movements that are stored elsewhere; `groups` are the numbers (m,) of the members' groups.
 
     As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
     compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a class
@@ -41,17 +51,19 @@ def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -
     most = int(np.clip(_BUDGET // len(sampled), _FEWEST, _CALIBRATED))
     blank = ClassDistances(np.full((1, 1), np.inf), np.zeros(1, dtype=np.intp))
     windows, wholes = [blank] * n_classes, [blank] * n_classes
-    for c, window, whole in _measured(similarity, stored, sampled, most):
+    groups = several(groups)
+    for c, window, whole in _measured(similarity, stored, groups, sampled, most):
         windows[c], wholes[c] = window, whole
-    several = any(len(one.distances) > 1 for one in windows)
-    typical = 0.0 if several else typical_scale(_impostors(similarity, stored))
+    typical = 0.0
+    if not any(np.isfinite(one.distances).any() for one in windows):
+        typical = typical_scale(_impostors(similarity, stored), REACH if groups is None else REACH_OF_OTHERS)
     levels = np.where(stored.counts > _SIZES[-1], 0, _SIZES[np.searchsorted(_SIZES, stored.counts, side="right") - 1])
     known = {int(s): score_classes(windows if s else wholes, int(s) or most + 1, typical) for s in np.unique(levels)}
     scales = np.array([known[int(level)].scales[c] for c, level in enumerate(levels)])
     own = [np.empty(0)] * n_classes
     for c in sampled:
         if stored.counts[c] > 1:
-            own[c] = wholes[c].nearest(most + _SIZES[-1] + 1)[0] / scales[c]
+            own[c] = finite(wholes[c].nearest(wholes[c].distances.shape[1])[0] / scales[c])
     pooled = {level: scored.pooled() for level, scored in known.items()}
     novelties = {level: scored.pooled_novelties() for level, scored in known.items()}
     return Calibration(
@@ -64,70 +76,94 @@ def calibrate_sample(similarity: AveragedSimilarity, stored: StoredReferences) -
 
 
 def _measured(
-    similarity: AveragedSimilarity, stored: StoredReferences, classes: NDArray[np.intp], most: int
+    similarity: AveragedSimilarity, stored: StoredReferences, groups: Rows | None, classes: Rows, most: int
 ) -> Iterator[tuple[int, ClassDistances, ClassDistances]]:
-    """For each class, distances of its calibrating movements to some others of it, and to the nearest of the others."""
+    """For each class, distances of its calibrating movements to some others of it, and to the nearest of the others.
+
+    With groups, to the nearest of each group among the others.
+    """
+    group_of = np.arange(len(stored.members)) if groups is None else groups
     for start in range(0, len(classes), _AT_ONCE):
         chosen = classes[start : start + _AT_ONCE]
         shuffled = [
-            np.random.default_rng(int(c)).permutation(_rows(stored, int(c)))[: most + _SIZES[-1]] for c in chosen
+            np.random.default_rng(int(c)).permutation(_positions(stored, int(c)))[: most + _SIZES[-1]] for c in chosen
         ]
         proposed = [
-            _proposed(similarity, stored, int(c), rows[:most]) for c, rows in zip(chosen, shuffled, strict=True)
+            _proposed(similarity, stored, group_of, int(c), some[:most])
+            for c, some in zip(chosen, shuffled, strict=True)
         ]
-        described = stored.described(similarity, np.concatenate([*shuffled, *(rows.ravel() for rows in proposed)]))
+        compared = np.concatenate([*shuffled, *(some.ravel() for some in proposed)])
+        described = stored.described(similarity, stored.members[compared])
         begin, later = 0, sum(map(len, shuffled))
-        for c, rows, more in zip(chosen, shuffled, proposed, strict=True):
-            own = described.take(slice(begin, begin + len(rows)))
+        for c, some, more in zip(chosen, shuffled, proposed, strict=True):
+            own = described.take(slice(begin, begin + len(some)))
             others = described.take(slice(later, later + more.size))
-            begin, later = begin + len(rows), later + more.size
-            k = min(most, len(rows))
-            asked = own.take(slice(0, k))
+            begin, later = begin + len(some), later + more.size
+            k = min(most, len(some))
+            asked, by = own.take(slice(0, k)), group_of[some[:k], None]
             away = distances(similarity.log_average(asked, own))
-            np.fill_diagonal(away, np.inf)
-            nearest = away[:, k:].min(axis=1, initial=np.inf)
-            if more.size:
-                nearest = np.minimum(nearest, _to_own(similarity, asked, others))
-            indices = np.arange(k)
-            whole = np.column_stack((away[:, :k], nearest)) if len(rows) > k else away
-            yield int(c), ClassDistances(away, indices), ClassDistances(whole, indices)
+            away[by == group_of[some]] = np.inf
+            window = ClassDistances(away, np.arange(k), None if groups is None else groups[some])
+            beyond = np.column_stack((away[:, k:], _to_own(similarity, asked, others)))
+            which = group_of[np.column_stack((np.broadcast_to(some[k:], (k, len(some) - k)), more))]
+            beyond[by == which] = np.inf
+            yield int(c), window, _whole(window, beyond, which) if beyond.size else window
+
+
+def _whole(window: ClassDistances, beyond: Array, which: Rows) -> ClassDistances:
+    """Distances to the k calibrating movements, and to the nearest `beyond` them, with groups to that of each."""
+    k, shown_by = len(window.distances), window.groups
+    if shown_by is None:
+        nearest = beyond.min(axis=1)
+        return ClassDistances(np.column_stack((window.distances[:, :k], nearest)), window.indices)
+    each = np.unique(which)
+    columns = [np.where(which == group, beyond, np.inf).min(axis=1) for group in each]
+    away = np.column_stack((window.distances[:, :k], *columns))
+    return ClassDistances(away, window.indices, np.concatenate((shown_by[:k], each)))
 
 
 def _to_own(similarity: AveragedSimilarity, asked: Described, others: Described) -> Array:
-    """Distance of each movement to the nearest of its own eight others; a few movements in one product."""
-    nearest = np.empty(len(asked))
-    for start in range(0, len(nearest), _TOGETHER):
+    """Distances of each movement to its own eight others, which may be none; a few movements in one product."""
+    if not len(others):
+        return np.empty((len(asked), 0))
+    away = np.empty((len(asked), _NEAREST))
+    for start in range(0, len(away), _TOGETHER):
         some = asked.take(slice(start, start + _TOGETHER))
         theirs = others.take(slice(_NEAREST * start, _NEAREST * (start + _TOGETHER)))
         k = np.arange(len(some))
-        away = distances(similarity.log_average(some, theirs)).reshape(len(k), len(k), _NEAREST)
-        nearest[start : start + _TOGETHER] = away[k, k].min(axis=1)
-    return nearest
+        every = distances(similarity.log_average(some, theirs)).reshape(len(k), len(k), _NEAREST)
+        away[start : start + _TOGETHER] = every[k, k]
+    return away
 
 
-def _rows(stored: StoredReferences, c: int) -> Rows:
-    return stored.members[stored.first[c] : stored.first[c] + stored.counts[c]]
+def _positions(stored: StoredReferences, c: int) -> Rows:
+    """Positions of a class among the members."""
+    return stored.first[c] + np.arange(stored.counts[c])
 
 
-def _proposed(similarity: AveragedSimilarity, stored: StoredReferences, c: int, asked: Rows) -> Rows:
-    """For each row asked, (k, 8) others of a large class, nearest by their bounds, that are not asked themselves."""
+def _proposed(similarity: AveragedSimilarity, stored: StoredReferences, group_of: Rows, c: int, asked: Rows) -> Rows:
+    """For each member asked, (k, 8) others of a large class, nearest by their bounds: of other groups, not asked."""
     if stored.counts[c] <= _CALIBRATED + _SIZES[-1]:
         return np.empty((len(asked), 0), dtype=np.intp)
-    own = np.setdiff1d(_rows(stored, c), asked)
-    bounds = log_bounds(similarity, stored.reduced_at(asked), stored.reduced_at(own))
+    own = np.setdiff1d(_positions(stored, c), asked)
+    both = (stored.reduced_at(stored.members[some]) for some in (asked, own))
+    bounds = log_bounds(similarity, *both)
+    bounds[group_of[asked, None] == group_of[own]] = -np.inf
     return np.asarray(own[np.argpartition(-bounds, _NEAREST - 1, axis=1)[:, :_NEAREST]])
 
 
 def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Array:
-    """Distances of some movements to the nearest other one, where each is a class of its own."""
+    """Distances of some movements to the nearest of other classes."""
     asked = evenly_spaced(len(stored.members), _CALIBRATED)
     bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
-    bounds[np.arange(len(asked)), asked] = -np.inf
+    shown = np.repeat(np.arange(len(stored.first)), stored.counts)
+    bounds[shown[asked, None] == shown] = -np.inf
     n_near = max(1, min(_MORE, len(stored.members) - 1))
     near = np.argpartition(-bounds, n_near - 1, axis=1)[:, :n_near]
     found = np.empty(len(asked))
-    for i, rows in enumerate(near):
+    for i, members in enumerate(near):
         one = stored.described(similarity, stored.members[asked[i : i + 1]])
-        others = stored.described(similarity, stored.members[rows])
-        found[i] = distances(similarity.log_average(one, others)).min()
+        others = stored.described(similarity, stored.members[members])
+        away = distances(similarity.log_average(one, others))
+        found[i] = away[:, shown[members] != shown[asked[i]]].min(initial=np.inf)
     return found

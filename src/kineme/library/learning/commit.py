@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from kineme.library.learning.deduplicate import Batch, Stored, find_stored
 from kineme.library.learning.serialize import evenly_sampled, serialize
+from kineme.library.storage.read import people_of
 from kineme.library.storage.rows import Row, among, as_text, listed, next_key
 from kineme.library.storage.source import Source
-from kineme.library.storage.store import Store
+from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.symbols import add_members, keys_by_name
 from kineme.library.storage.versions import Change
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -49,16 +50,18 @@ def commit(store: Store, batch: Batch) -> Committed:
             _insert_movements(change, batch, new, stored)
         made = _assign_labels(change, batch, keys)
         detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(made)}
+        if people := _insert_people(change, batch, keys):
+            detail["people"] = people
     return Committed(len(new), made, np.array(keys, dtype=np.int64))
 
 
 def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:
-    """The ids, if all movements are stored and those with labels have symbols, so that nothing changes; else None."""
+    """The ids, if all movements are stored, with what is said of them, so that nothing changes; else None."""
     with store.reading() as connection:
         stored = find_stored(connection, batch)
         keys = [stored.id_of(batch, i) for i in range(len(batch.digests))]
         ids = [key for key in keys if key is not None]
-        if len(ids) < len(keys) or _without_symbol(connection, batch, ids):
+        if len(ids) < len(keys) or _without_symbol(connection, batch, ids) or _without_person(connection, batch, ids):
             return None
         return np.array(ids, dtype=np.int64)
 
@@ -131,3 +134,17 @@ def _assign_labels(change: Change, batch: Batch, keys: list[int]) -> tuple[str, 
     symbols, made = keys_by_name(change, names)
     add_members(change, [(movement, symbols[name]) for movement, name in labeled.items()], "label")
     return made
+
+
+def _without_person(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
+    """Movement -> who showed it, for movements of which that is said and was not known."""
+    said = {key: group for key, group in zip(keys, batch.groups, strict=True) if group is not None}
+    known = people_of(connection, list(said), NOW) if said else {}
+    return {key: group for key, group in said.items() if key not in known}
+
+
+def _insert_people(change: Change, batch: Batch, keys: list[int]) -> list[str]:
+    """Store who showed the movements of which that was not known; return their names."""
+    new = _without_person(change.connection, batch, keys)
+    change.insert("shown_by", [(key, person, change.version) for key, person in new.items()])
+    return sorted(set(new.values()))

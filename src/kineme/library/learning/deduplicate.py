@@ -18,6 +18,7 @@ class Batch:
     demos: Demonstrations
     digests: list[int]
     labels: list[str | None]
+    groups: list[str | None]
     sources: list[Source | None]
     places: list[str | None]
     serialized: SerializedRows | None = None

@@ -56,20 +56,22 @@ class LearnReport:
         return f"LearnReport(added={self.added}, known={self.known}, symbols={self.symbols!r}, version={self.version})"
 
 
-def learn(
+def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     store: Store,
     movements: MovementsLike,
     labels: Sequence[Any] | None = None,
     source: Source | Sequence[Source | None] | None = None,
     places: Sequence[Any] | None = None,
     progress: Progress | None = None,
+    groups: Sequence[Any] | None = None,
 ) -> LearnReport:
     """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
     demos = Demonstrations.of(movements)
     _check_dimensions(store, demos)
     check(demos)
-    names = _as_names(demos, labels)
+    names = _as_names(demos, "label", demos.labels if labels is None else labels)
+    people = _as_names(demos, "group", groups)
     sources = _as_sources(source, len(demos))
     where = _as_places(places, sources)
     reports = []
@@ -78,7 +80,7 @@ def learn(
         done = 0
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
-            batch = _prepared(store, _part(demos, start, stop), (names[rows], sources[rows], where[rows]))
+            batch = _prepared(store, _part(demos, start, stop), (names[rows], people[rows], sources[rows], where[rows]))
             if pending is not None:  # one batch is written while the next one is described
                 reports.append(pending.result())
                 done = _tell(progress, done + len(reports[-1].ids), len(demos))
@@ -95,10 +97,9 @@ def learn(
     )
 
 
-def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any]) -> Batch:
+def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any, Any]) -> Batch:
     """A batch ready to be committed; only what is new is serialized."""
-    labels, sources, places = given
-    batch = Batch(demos, digests(demos, evenly_sampled(demos)), labels, sources, places)
+    batch = Batch(demos, digests(demos, evenly_sampled(demos)), *given)
     with store.reading() as connection:
         stored = find_stored(connection, batch)
     new = [i for i in range(len(demos)) if stored.id_of(batch, i) is None]
@@ -148,20 +149,20 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
         )
 
 
-def _as_names(demos: Demonstrations, labels: Sequence[Any] | None) -> list[str | None]:
-    """The name of each movement's symbol; None without a label."""
-    given = demos.labels if labels is None else labels
+def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:
+    """The name of each movement's symbol, from its "label", or of who showed it, its "group"; None without."""
     if given is None:
         return [None] * len(demos)
-    plain = _one_each("label", given, len(demos))
-    for i, label in enumerate(plain):
-        if isinstance(label, (list, tuple, dict, np.ndarray)) or (isinstance(label, float) and math.isnan(label)):
+    plain = _one_each(what, given, len(demos))
+    for i, one in enumerate(plain):
+        if isinstance(one, (list, tuple, dict, np.ndarray)) or (isinstance(one, float) and math.isnan(one)):
+            named = "the action" if what == "label" else "who showed it"
             raise TrajectoryError(
-                f"{name_of(i, demos.names)}: expected a label that is text or a number, got {label!r}; "
-                "name the action, or pass None where it has no name"
+                f"{name_of(i, demos.names)}: expected a {what} that is text or a number, got {one!r}; "
+                f"name {named}, or pass None where it has no name"
             )
-    known = {label: None if label is None else check_name(str(label)) for label in dict.fromkeys(plain)}
-    return [known[label] for label in plain]
+    known = {one: None if one is None else check_name(str(one)) for one in dict.fromkeys(plain)}
+    return [known[one] for one in plain]
 
 
 def _one_each(what: str, given: Any, n: int) -> list[Any]:

@@ -14,13 +14,14 @@ from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 
 
-def learn_recordings(
+def learn_recordings(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     store: Store,
     recordings: Recordings,
     options: Mapping[str, Any] | None = None,
     labels: Sequence[str | None] | None = None,
     progress: Progress | None = None,
     root: str | PurePath = "",
+    groups: Sequence[str | None] | None = None,
 ) -> LearnReport:
     """Store the recordings of `kineme.files.recordings.read_recordings`.
 
@@ -37,6 +38,8 @@ def learn_recordings(
         As for `ActionLibrary.learn`.
     root : str or Path, optional
         Folder that was read; stored before the names of the files.
+    groups : sequence of n str or None, optional
+        As for `ActionLibrary.learn`.
     """
     now = datetime.now(UTC).isoformat(timespec="seconds")
     told = {name: value for name, value in (options or {}).items() if value is not None}
@@ -48,6 +51,7 @@ def learn_recordings(
         [files[one.path] for one in recordings.sources],
         places=[one.place for one in recordings.sources],
         progress=progress,
+        groups=groups,
     )
 
 

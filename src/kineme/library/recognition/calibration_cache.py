@@ -44,7 +44,7 @@ def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, s
     if path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _deserialized(path.read_bytes(), key, len(members.names))
-    made = calibrate_sample(similarity, stored)
+    made = calibrate_sample(similarity, stored, members.groups)
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: it is computed again next time
             write_atomically(path, _serialized(made, key))
@@ -52,16 +52,16 @@ def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, s
 
 
 def _key(store: Store, members: Members) -> str:
-    """Cache validity key: changes with the library, its specification, and the members of symbols."""
+    """Cache validity key: changes with the library, its specification, the members of symbols, and their people."""
     text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
+    digest.update(b"" if members.groups is None else members.groups.tobytes())
     return digest.hexdigest()
 
 
 def _serialized(calibration: Calibration, key: str) -> bytes:
-    novelties = calibration.pooled if calibration.pooled_novelties is None else calibration.pooled_novelties
-    both = zip(calibration.pooled, novelties, strict=True)
+    both = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
     pooled = {id(one): (one, novelty) for one, novelty in both}  # classes of one size share arrays
     numbers = {name: k for k, name in enumerate(pooled)}
     arrays: dict[str, Any] = {f"pooled {k}": one for k, (one, _) in enumerate(pooled.values())}

@@ -29,6 +29,7 @@ class Members:
     ids: Ids  # (m,)
     names: NDArray[Any]  # (C,), sorted
     first: NDArray[np.intp]  # (C,)
+    groups: NDArray[np.intp] | None  # (m,), numbers of who showed them; None where that is known of none
 
     @property
     def labels(self) -> NDArray[Any]:
@@ -65,7 +66,19 @@ def members_of(store: Store) -> Members:
     names, place = np.unique(label_array([named[int(key)] for key in keys]), return_inverse=True)
     owner = place[which]
     order = np.lexsort((pairs[:, 0], owner))
-    return Members(pairs[order, 0], names, np.searchsorted(owner[order], np.arange(len(names))))
+    ids = pairs[order, 0]
+    return Members(ids, names, np.searchsorted(owner[order], np.arange(len(names))), groups_of(store, ids))
+
+
+def groups_of(store: Store, ids: Ids) -> NDArray[np.intp] | None:
+    """Numbers of who showed the movements, (k,), for a calibration; None where that is known of none.
+
+    Those of whom it is not known count as of one more person: nobody says that they are of different ones.
+    """
+    people = read.groups(store, ids).tolist()
+    if not any(people):
+        return None
+    return np.asarray(np.unique([one or "" for one in people], return_inverse=True)[1], dtype=np.intp)
 
 
 def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None) -> Described:

@@ -130,6 +130,7 @@ CHECKS: dict[str, dict[str, Check]] = {
         "how": Check("how IN ('label', 'anchored', 'recognized')", "how a movement came to its symbol"),
         **_ALIVE,
     },
+    "shown_by": {"movement": _whole("movement"), "person": _name("person"), **_ADDED},
 }
 
 #: Table -> the condition that is checked whenever a row is read, and the one of import and `verify`.

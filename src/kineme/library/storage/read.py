@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, listed, select, strange
+from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -222,6 +222,25 @@ def names_of(store: Store, ids: Ids) -> list[str | None]:
         raise damaged("symbol", (min(lost),))
     name_of = {row[1]: names[row[2]] for row in members}
     return [name_of.get(key) for key in ids.tolist()]
+
+
+def groups(store: Store, ids: Ids) -> NDArray[np.object_]:
+    """Who showed each movement, shape (k,); None where that is not known."""
+    people: dict[int, str] = {}
+    for k in range(0, len(ids), _ROWS):
+        with store.reading() as connection:
+            people |= people_of(connection, ids[k : k + _ROWS].tolist(), store.as_of)
+    result = np.empty(len(ids), dtype=object)
+    result[:] = [people.get(key) for key in ids.tolist()]
+    return result
+
+
+def people_of(connection: sqlite3.Connection, keys: Sequence[int], version: int) -> dict[int, str]:
+    """Movement -> who showed it, of those of which that was known at a version."""
+    if not has_table(connection, "shown_by") or not connection.execute("SELECT 1 FROM shown_by LIMIT 1").fetchone():
+        return {}
+    keyed = {"keys": listed(keys), "v": version}
+    return {row[0]: row[1] for row in select(connection, "shown_by", f"{among('movement')} AND added <= :v", keyed)}
 
 
 def _chunks(store: Store, table: str, column: str, wanted: Ids) -> Iterator[list[Row]]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage.column_checks import GOOD
-from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT
+from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT, SINCE
 
 Row = tuple[Any, ...]
 
@@ -66,6 +66,11 @@ def select(
         if not row[-1] or seal(table, row[:-2]) != row[-2]:
             raise damaged(table, row) if not sealed(table, row[:-1]) else strange(table, row)
     return [row[:-2] for row in rows]
+
+
+def has_table(connection: sqlite3.Connection, table: str) -> bool:
+    """Whether a library has a table: one of an earlier version that is only read lacks the later ones."""
+    return bool(connection.execute("PRAGMA user_version").fetchone()[0] >= SINCE.get(table, 1))
 
 
 def sealed(table: str, row: Row) -> bool:

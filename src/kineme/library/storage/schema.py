@@ -7,7 +7,8 @@ version numbers, so the state at version v is ``added <= v AND (removed IS NULL 
 from __future__ import annotations
 
 APPLICATION_ID = 0x6B696E65  # "kine", in the header of the file
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+READABLE = 1  # the earliest version that is read as it is, since later ones added tables only
 MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # largest number of bytes of a name, and of a description or JSON
 LARGEST_ID = (1 << 62) - 1  # of versions and rows; adding one does not overflow in SQLite and NumPy
 PAGE_SIZE = 32768  # a row of features fills at most a seventh of it, so that little of a page is unused
@@ -28,10 +29,14 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "id", "symbol", "name", "description", "prototype", "threshold", "parents", "added", "removed",
     ),
     "member": ("id", "movement", "symbol", "how", "added", "removed"),
+    "shown_by": ("movement", "person", "added"),
 }  # fmt: skip
 
 #: Keys of the table `meta`; the last one is written with the first movement.
 META = frozenset({"id", "recognizer", "dmp", "schema", "n_dims"})
+
+#: Table -> the schema version that added it, if not the first.
+SINCE = {"shown_by": 2}
 
 #: Tables of a key and bytes, one row per movement.
 BLOBS = ("raw", "primitive", "feature")
@@ -82,4 +87,10 @@ CREATE = (
 )
 
 #: Schema version -> the statements from it to the next one, for an existing library and for a new one.
-MIGRATIONS: dict[int, tuple[str, ...]] = {}
+MIGRATIONS: dict[int, tuple[str, ...]] = {
+    1: (
+        """CREATE TABLE shown_by (
+        movement INTEGER PRIMARY KEY REFERENCES movement, person TEXT NOT NULL,
+        added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
+    ),
+}

@@ -18,7 +18,7 @@ from kineme.library.storage import fork_safety
 from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
 from kineme.library.storage.defense import size_of
 from kineme.library.storage.rows import insert, parsed_column, select
-from kineme.library.storage.schema import COUNTED, LARGEST_ID, SCHEMA_VERSION
+from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_VERSION
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.library.storage.sqlite_errors import in_plain_words
 from kineme.library.storage.versions import Change, Moment, Version, moment_at
@@ -112,9 +112,10 @@ class Store:
         create(self.path, {"id": str(uuid.uuid4()), **specification.to_json()})
 
     def _check_kind(self) -> None:
-        """Refuse a file that is not a library; migrate an older one."""
+        """Refuse a file that is not a library; migrate an older one, unless it is only read and can be as it is."""
         self._file = self.path.stat().st_ino
-        if check_kind(self._reader, self.path) == SCHEMA_VERSION:
+        version = check_kind(self._reader, self.path)
+        if version == SCHEMA_VERSION or (self.read_only and version >= READABLE):
             return
         if self.read_only:
             raise DataError(

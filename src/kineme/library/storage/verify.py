@@ -13,7 +13,7 @@ from kineme.library.storage.connection import connect
 from kineme.library.storage.content_checks import CONTENTS, samples
 from kineme.library.storage.defense import limited
 from kineme.library.storage.lifetimes import lives
-from kineme.library.storage.rows import Row, row_name, sealed
+from kineme.library.storage.rows import Row, has_table, row_name, sealed
 from kineme.library.storage.schema import BLOBS, COLUMNS, META
 from kineme.library.storage.store import Store
 
@@ -56,7 +56,7 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
         connection.execute("BEGIN")
         checks: list[Check] = [
             *((_structure,) if pages else ()),
-            *(_rows(table, store) for table in COLUMNS),
+            *(_rows(table, store) for table in COLUMNS if has_table(connection, table)),
             _references,
             _completeness,
             _sizes(store),

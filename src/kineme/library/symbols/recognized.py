@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kineme.library.recognition.members import described, described_references
+from kineme.library.recognition.members import described, described_references, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
@@ -41,7 +41,7 @@ def known_symbols(store: Store) -> KnownClasses | None:
         return None
     ids, labels = evenly_many_members(store)
     how, references = store.specification, described_references(store, ids, labels)
-    return fit_known_classes(how.comparison, references, how.weights, how.classifier)
+    return fit_known_classes(how.comparison, references, how.weights, how.classifier, groups_of(store, ids))
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kineme.library.storage.read import movements, records
+from kineme.library.storage.read import groups, movements, records
 from kineme.library.storage.rows import among, listed, select
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
@@ -18,20 +18,22 @@ def symbol_report(store: Store, who: str) -> dict[str, Any]:
     -------
     dict
         ``id``, ``name``, ``description``, ``prototype``, ``parents``, and ``members``: per movement its id, name, file,
-        position in the file, n_samples, duration [s], start and goal.
+        position in the file, person, n_samples, duration [s], start and goal.
     """
     shown = symbol(store, who)
     members = []
     if len(shown):
         about = records(store, shown.members)
         files = _files(store, sorted({one["source"] for one in about if one["source"] is not None}))
-        for one, movement in zip(about, movements(store, shown.members), strict=True):
+        people = groups(store, shown.members).tolist()
+        for one, movement, person in zip(about, movements(store, shown.members), people, strict=True):
             members.append(
                 {
                     "id": one["id"],
                     "name": one["name"],
                     "source": files.get(one["source"]),
                     "place": one["place"],
+                    "person": person,
                     "samples": one["n_samples"],
                     "duration": one["duration"],
                     "start": movement.positions[0].tolist(),

@@ -20,10 +20,20 @@ _DEPTH = 3  # person/label/recording
 
 
 def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
-    """The person of each movement, shape (n,), or None where any of them is unknown.
+    """As `each_person`, shape (n,); None where any is unknown, or all are one, so that nothing tells people apart."""
+    people = each_person(path, sources)
+    if None in people or len(set(people)) < 2:
+        return None
+    named = np.empty(len(people), dtype=object)
+    named[:] = people
+    return named
+
+
+def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
+    """The person of each movement, or None where it is unknown.
 
     In an npz archive, an array named as in `NAMES`, one entry for each movement. Else the folder above that of the
-    label: ``person/label/recording``; where all these folders are one, nothing tells people apart.
+    label: ``person/label/recording``.
 
     Parameters
     ----------
@@ -38,12 +48,7 @@ def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
         Not one person for each movement of a file.
     """
     of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
-    people = [_person(source, of_file(source.path)) for source in sources]
-    if None in people or len(set(people)) < 2:
-        return None
-    named = np.empty(len(people), dtype=object)
-    named[:] = people
-    return named
+    return [_person(source, of_file(source.path)) for source in sources]
 
 
 def _person(source: Source, listed: list[str] | None) -> str | None:

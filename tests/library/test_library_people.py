@@ -1,0 +1,151 @@
+"""Who showed the movements of a library, and what follows for what is unknown."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from library_samples import draw_movements
+
+from kineme import ActionLibrary, Recognizer
+from kineme.errors import TrajectoryError
+from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library.storage.folder import FILE
+
+PEOPLE = ["anna", "ben", "cleo"]
+
+
+def _shown(n_kinds=4, people=PEOPLE, copies=2, seed=0, d=2):
+    """Every person shows every kind in a way of their own, `copies` times nearly alike; then what each is asked."""
+    kinds = draw_movements(n_kinds, d, seed)
+    rng = np.random.default_rng([seed, 1])
+    u = np.linspace(0, 1, 40)
+    waves = np.sin(np.pi * u[:, None] * np.arange(1, 5))
+    paths, labels, groups = [], [], []
+    for k in range(n_kinds):
+        for person in people:
+            own = kinds[k].positions + 0.25 * waves @ rng.normal(size=(4, d))
+            for _ in range(copies):
+                paths.append(own + 0.02 * waves @ rng.normal(size=(4, d)))
+                labels.append(f"kind {k}")
+                groups.append(person)
+    return np.array(paths), np.array(labels), np.array(groups)
+
+
+def _library(folder, *learned, **options):
+    library = ActionLibrary(folder, create=True, **options)
+    library.learn(*learned[:2], groups=learned[2])
+    return library
+
+
+@settings(deadline=None, max_examples=8)
+@given(seed=st.integers(0, 99), d=st.sampled_from([2, 3]), copies=st.integers(1, 3), nameless=st.booleans())
+def test_a_library_is_the_recognizer_fitted_with_the_same_groups(tmp_path_factory, seed, d, copies, nameless):
+    """Those of whom it is not known who they are count as of one more person."""
+    paths, labels, groups = _shown(copies=copies, seed=seed, d=d)
+    order = np.random.default_rng(seed).permutation(len(paths))
+    paths, labels, groups = paths[order], labels[order], groups[order]
+    told = [None if nameless and one == "ben" else one for one in groups]
+    asked = _shown(people=["dora"], seed=seed, d=d)[0]
+    with _library(tmp_path_factory.mktemp("people"), paths, labels, told) as library:
+        ours = library.recognize(list(asked), error_rate=0.1)
+    theirs = Recognizer().fit(paths, labels, groups=groups).recognize(list(asked), error_rate=0.1)
+    for a, b in zip(ours, theirs, strict=True):
+        assert (a.label, a.rule) == (b.label, b.rule)
+        assert a.p_known == pytest.approx(b.p_known, abs=1e-3)
+        assert a.p_values == pytest.approx(b.p_values, abs=1e-3)
+
+
+@pytest.mark.parametrize("copies", [1, 2, 6])
+def test_a_large_library_calibrates_people_as_the_recognizer_does(tmp_path, copies):
+    """Of classes of one size; of other classes it knows nothing, so the novelties are the scores of members."""
+    paths, labels, groups = _shown(people=[*PEOPLE, "dora"][: 2 if copies == 6 else 4], copies=copies)
+    with _library(tmp_path / "actions", paths, labels, groups) as library:
+        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        plain = _library(tmp_path / "plain", paths, labels, None)
+        other = LibraryRecognizer(plain.store, exhaustive=0).model().calibration
+        plain.close()
+    theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
+    np.testing.assert_allclose(ours.scales, theirs.scales, rtol=1e-3)
+    for mine, its in zip(ours.own + ours.pooled, theirs.own + theirs.pooled, strict=True):
+        np.testing.assert_allclose(np.sort(mine), np.sort(its), rtol=1e-3)
+    if copies > 1:
+        assert (other.scales < 0.7 * ours.scales).all()
+
+
+def test_large_classes_compare_no_one_with_oneself(tmp_path):
+    """Also where only some of a class calibrate it, and the others are compared by their bounds."""
+    paths, labels, groups = _shown(n_kinds=2, people=[f"p{k}" for k in range(12)], copies=18)
+    with _library(tmp_path / "actions", paths, labels, groups) as library:
+        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
+    np.testing.assert_allclose(ours.scales, theirs.scales, rtol=0.1)
+    np.testing.assert_allclose(*(np.quantile(one.own[0], 0.5) for one in (ours, theirs)), rtol=0.1)
+
+
+def test_classes_of_one_person_each_are_told_apart_by_how_far_they_are(tmp_path):
+    paths, labels, _ = _shown(people=["anna"])
+    groups = labels  # each kind by a person of its own: no two movements of a kind may be compared
+    with _library(tmp_path / "actions", paths, labels, groups) as library:
+        ours = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    theirs = Recognizer().fit(paths, labels, groups=groups).calibration()
+    np.testing.assert_allclose(ours.scales, theirs.scales, rtol=1e-3)
+
+
+def test_a_calibration_of_other_people_is_not_taken_from_the_cache(tmp_path):
+    paths, labels, groups = _shown(copies=3)
+    with _library(tmp_path / "actions", paths, labels, None) as library:
+        before = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        report = library.learn(paths, groups=groups)  # said later: nothing is added but who showed what
+        assert (report.added, report.known) == (0, len(paths))
+        after = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+        again = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    assert (after.scales > 1.4 * before.scales).all()
+    np.testing.assert_array_equal(after.scales, again.scales)
+
+
+def test_who_showed_what_is_kept_with_versions_and_in_exports(tmp_path):
+    demos = draw_movements(6)
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        ids = library.learn(demos, groups=["anna", "anna", None, 7, "o'ben; --", None]).ids
+        assert library.groups(ids).tolist() == ["anna", "anna", None, "7", "o'ben; --", None]
+        assert library.history()[-1].detail["people"] == ["7", "anna", "o'ben; --"]
+        version = library.version
+        library.learn(demos, groups=["cleo"] * 6)  # who is known stays
+        assert library.groups(ids[::-1]).tolist() == ["cleo", "o'ben; --", "7", "cleo", "anna", "anna"]
+        assert library.at(version).groups(ids).tolist()[2] is None
+        assert library.learn(demos, groups=["dora"] * 6).version == library.version == version + 1  # nothing new
+        assert library.verify() == []
+        library.export(tmp_path / "export")
+        expected = library.groups().tolist()
+    with ActionLibrary.import_(tmp_path / "export", tmp_path / "copy") as copy:
+        assert copy.groups().tolist() == expected
+        assert copy.verify() == []
+
+
+@pytest.mark.parametrize(
+    ("groups", "message"),
+    [
+        (["anna"], r"expected one group for each of the 3 movements, got 1"),
+        ("anna", r"expected one group for each of the 3 movements, got 'anna'"),
+        (["anna", float("nan"), "ben"], r"expected a group that is text or a number, got nan; name who showed it"),
+    ],
+)
+def test_groups_are_one_for_each_movement(tmp_path, groups, message):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        with pytest.raises(TrajectoryError, match=message):
+            library.learn(draw_movements(3), groups=groups)
+        assert len(library) == 0
+
+
+def test_a_damaged_person_is_found(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(draw_movements(3), groups=["anna", "ben", "cleo"])
+    with closing(sqlite3.connect(tmp_path / "actions" / FILE)) as connection, connection:
+        connection.execute("UPDATE shown_by SET person = 'dora' WHERE movement = 2")
+    with ActionLibrary(tmp_path / "actions", read_only=True) as library:
+        assert [str(one) for one in library.verify()] == ["row 2 of table shown_by: damaged bytes"]
