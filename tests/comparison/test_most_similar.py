@@ -56,7 +56,7 @@ def test_it_is_the_one_that_comparing_all_finds(d, seed, width, spread, weights,
 
 
 @pytest.mark.parametrize("choice", ["never", "always"])
-@pytest.mark.parametrize("classifier", ["nearest", "prototype"])
+@pytest.mark.parametrize("classifier", ["auto", "nearest", "prototype"])
 def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):
     monkeypatch.setenv("KINEME_COMPILED", choice)
     demos = kineme.load_lasa()

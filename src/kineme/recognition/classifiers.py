@@ -62,6 +62,12 @@ class NearestEach:
         """Logarithm of the average of the largest similarities to a reference of each class."""
         return compared.nearest_each
 
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Index (n,) of the class with the largest score."""
+        if len(compared.references) == len(compared.references.classes):
+            return Nearest().best(compared)
+        return self.scores(compared).argmax(axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Prototype:
