@@ -130,7 +130,7 @@ class Procrustes:
         if self.n_dims == 2:
             if self.prior is not None:
                 return self._soft_in_plane(A, B, rotations=True)
-            re, im = map(_double, _split(_products(A.rows, B.rows), len(B.rows)))
+            re, im = (part.astype(np.float64) for part in _split(_products(A.rows, B.rows), len(B.rows)))
             angle = np.clip(np.arctan2(-im, re), -self.max_angle, self.max_angle)
             c, s = np.cos(angle), np.sin(angle)
             return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
@@ -166,7 +166,7 @@ class Procrustes:
             norms = np.sqrt(trace * A.squares), np.sqrt(trace * B.squares)
             compiled_module("kineme.kernels._compiled").fill_soft_in_plane(parts, *norms, best, R)
             return best, R if rotations else None
-        re, im = map(_double, _split(parts, m))
+        re, im = (part.astype(np.float64) for part in _split(parts, m))
         best, c, s = soft_products_in_plane(re, im, trace * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
         return best, np.stack((c, -s), -1).astype(np.float32) if rotations else None
 
@@ -286,10 +286,6 @@ def _sizes(re: Array, im: Array, precision: np.dtype[Any]) -> Array:
 _PAIRS = 20_000  # covariances at a time: their intermediate results fit the cache of one core
 _PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
 _CALL_OPERATIONS = 10_000  # the time of a call of it for a few pairs, in such operations
-
-
-def _double(part: NDArray[Any]) -> Array:
-    return part.astype(np.float64)
 
 
 def _in_space(
