@@ -135,10 +135,17 @@ class Procrustes:
             c, s = np.cos(angle), np.sin(angle)
             return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
         n_pairs = len(A.rows) * len(B.rows)
-        best, rotations = _in_space(A, B, self._soft_filler(n_pairs, rotations=True), rotations=True)
-        if self.prior is None and rotations is not None:
-            return self.alignment(A, B), limited(rotations, self.max_angle)
-        return best, rotations
+        free = self._soft_filler(n_pairs, rotations=True)
+        if self.prior is not None:
+            return _in_space(A, B, free, rotations=True)
+        hard = self._hard_filler(n_pairs)
+
+        def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
+            free(products, a, b, best, R)
+            R[:] = limited(R, self.max_angle)
+            hard(products, a, b, best, R)
+
+        return _in_space(A, B, fill, rotations=True)
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.

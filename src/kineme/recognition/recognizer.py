@@ -67,9 +67,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".
     rotation_prior : RotationPrior or None
-        How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
-        right angle costs 0.06 of the inner product of two equal paths in the plane and 0.2 in space, and none is
-        forbidden. Pass
+        How rare rotations between movements of one class are, in two and three dimensions, where there is no
+        `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
+        product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
         is the default of earlier versions, ``max_angle=pi/3``.
 
