@@ -270,7 +270,8 @@ def _few_products(few: NDArray[Any], many: NDArray[Any]) -> NDArray[Any]:
 def _within(parts: tuple[NDArray[Any], NDArray[Any]], max_angle: float) -> Array:
     """Largest real part of ``(re + i im) exp(-i angle)`` within the angle."""
     re, im = (part.astype(np.float64) for part in parts)
-    size = _sizes(re, im, parts[0].dtype)
+    # In double precision the squares of single precision neither overflow nor vanish; others need more care.
+    size = np.sqrt(re * re + im * im) if parts[0].dtype == np.float32 else np.hypot(re, im)
     if max_angle >= math.pi:
         return np.asarray(size)
     # It is largest at the angle of the product, or at the end of the range next to it.
@@ -279,12 +280,6 @@ def _within(parts: tuple[NDArray[Any], NDArray[Any]], max_angle: float) -> Array
     at_end *= s
     at_end += c * re
     return np.where(re >= c * size, size, at_end)
-
-
-def _sizes(re: Array, im: Array, precision: np.dtype[Any]) -> Array:
-    """``|re + i im|`` of numbers that were computed in a precision."""
-    # In double precision the squares of single precision neither overflow nor vanish; others need more care.
-    return np.sqrt(re * re + im * im) if precision == np.float32 else np.hypot(re, im)
 
 
 _PAIRS = 20_000  # covariances at a time: their intermediate results fit the cache of one core
