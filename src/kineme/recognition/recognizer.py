@@ -19,7 +19,7 @@ from kineme.comparison.fit import fit_comparison
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.references import References
 from kineme.comparison.representation import Representation, default_representations
-from kineme.comparison.scores import Compared, Score, nearest, score
+from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -223,7 +223,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def predict(self, X: MovementsLike) -> NDArray[Any]:
         """The class with the largest score of each movement, shape (n,)."""
-        return np.asarray(self.classes_[self._scores(X).argmax(axis=1)])
+        comparison, references = self._fitted
+        best = best_classes(comparison, references, comparison.checked(X), self.classifier_.best)
+        return np.asarray(references.classes[best])
 
     def predict_proba(self, X: MovementsLike) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.
