@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.movements.tables.columns import column_numbers
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
@@ -44,7 +45,7 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     arrays = _axes_stacked(arrays)
     key = _named(arrays, POSITIONS)
     if key is not None:
-        xs, ts, how = _of_one(arrays, _numbers(arrays[key]), layout)
+        xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
     return parsed_arrays(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
@@ -56,6 +57,7 @@ def parsed_arrays(
     named: tuple[Sequence[str | None], str],
     layout: Layout,
     detected: tuple[str, str],
+    places: list[str] | None = None,
 ) -> Parsed:
     """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`."""
     labels, time = named
@@ -77,10 +79,20 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
-    columns = tuple(axis_names(xs[0].shape[1]))
-    places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
-    block = Block(np.concatenate(xs), stamps, offsets, list(labels), places)
+    columns, positions = tuple(axis_names(xs[0].shape[1])), np.concatenate(xs)
+    if layout.coordinates is not None:
+        chosen = column_numbers(columns, layout.coordinates)
+        columns, positions = tuple(columns[k] for k in chosen), positions[:, chosen]
+    if places is None:
+        places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
+    block = Block(positions, stamps, offsets, list(labels), places)
     return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def has_known_names(names: Collection[str]) -> bool:
+    """Whether arrays have the names of `arrays_movements`, or none that could be other movements."""
+    known = any(name in names or f"{name}_0" in names for name in POSITIONS)
+    return known or not set(names) - {*TIMES, *LABELS, "offsets"}
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -88,7 +100,7 @@ def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     axes = [name for name in "xyz" if name in arrays]
     if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
         return arrays
-    return _Joined(arrays, axes, np.column_stack([_numbers(arrays[name]) for name in axes]))
+    return _Joined(arrays, axes, np.column_stack([numbers_of(arrays[name]) for name in axes]))
 
 
 class _Joined(Mapping[str, Any]):
@@ -113,7 +125,7 @@ class _Joined(Mapping[str, Any]):
         return len(self._names)
 
 
-def _numbers(values: Any) -> Array:
+def numbers_of(values: Any) -> Array:
     """An array as float64; dates and durations as nanoseconds."""
     try:
         array = np.asarray(values)
@@ -145,7 +157,7 @@ def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = _named(arrays, TIMES)
-    t = None if key is None else _numbers(arrays[key])
+    t = None if key is None else numbers_of(arrays[key])
     if x.ndim == 3:
         if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
             raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
@@ -173,7 +185,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if prefix is None:
         raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
-    xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
+    xs = [numbers_of(arrays[f"{prefix}_{k}"]) for k in range(count)]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     if odd := [x.shape for x in xs if x.ndim != 2]:
         raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
@@ -181,7 +193,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if clock is None:
         return xs, None, "numbered"
     try:
-        return xs, [_numbers(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
+        return xs, [numbers_of(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
     except KeyError as error:
         raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
 
