@@ -11,6 +11,8 @@ from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
+from kineme.files.lerobot.info import MARKER
+from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.ros.read_bag import read_bag
@@ -120,6 +122,12 @@ FORMATS: dict[str, Format] = {
 
 #: Folders that are one source.
 DATA_SETS: tuple[DataSet, ...] = (
+    DataSet(
+        MARKER,
+        ("data",),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        Format(read_path=lerobot_movements),
+    ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
 )
 
