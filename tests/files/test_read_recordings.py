@@ -88,16 +88,6 @@ def test_labels_are_on_all_demonstrations_or_on_none_but_always_with_the_sources
     assert repr(read).endswith(" samples each), 2 files, 0 problems)")
 
 
-@pytest.mark.parametrize("ending", [".bag", ".db3", ".mcap"])
-def test_ros_bags_are_recognized_and_not_yet_read(tmp_path, ending, make_movement):
-    (tmp_path / f"run{ending}").write_bytes(b"#ROSBAG V2.0\n")
-    t, x = make_movement(1)
-    write_movement(tmp_path / "a.csv", {"times": t, "positions": x})
-    (problem,) = read_recordings(tmp_path).problems
-    assert problem.file == f"run{ending}"
-    assert "not supported yet" in problem.reason
-
-
 def test_nothing_to_read_is_an_error_with_the_first_reason(tmp_path):
     with pytest.raises(kineme.DataError, match="found nothing at 'nowhere'"):
         read_recordings("nowhere")

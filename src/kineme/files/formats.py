@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from kineme.errors import DataError
-from kineme.files.arrays.arrays import arrays_movements, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, Named, arrays_movements, has_known_names, parsed_arrays
+from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
-from kineme.files.arrays.npz import Npz
-from kineme.files.limits import check_expanded
+from kineme.files.arrays.npz import Npz, array_of_npy
+from kineme.files.arrays.tree_movements import nested, tree_movements
+from kineme.files.lerobot.info import MARKER
+from kineme.files.lerobot.read import lerobot_movements
+from kineme.files.motion_capture.bvh import read_bvh_table
+from kineme.files.motion_capture.c3d import read_c3d_table
+from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 from kineme.movements.tables.table import table_movements
-
-_NUMBER, _LIST = 32, 88  # bytes of a Python object
 
 
 class Format(NamedTuple):
@@ -75,38 +77,29 @@ def _read_parquet(data: bytes, layout: Layout) -> Parsed:
 
 
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
-    return arrays_movements(Npz(data, Path("it")), layout, "NPZ")
+    arrays = Npz(data, Path("it"))
+    if has_known_names(arrays):
+        return arrays_movements(arrays, layout, "NPZ")
+    return tree_movements(nested(arrays), layout, "NPZ")
 
 
-def _read_json(data: bytes, layout: Layout) -> Parsed:
-    lists = data.count(b"[") + data.count(b"{")
-    check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
-    try:
-        entries = json.loads(data, object_pairs_hook=_each_once)
-    except json.JSONDecodeError as error:
-        raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
-    if not isinstance(entries, dict):
-        raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
-    return arrays_movements(entries, layout, "JSON")
-
-
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    entries = dict(pairs)
-    if len(entries) < len(pairs):
-        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
-        raise DataError(f"expected each entry once, got {twice!r} several times")
-    return entries
+def _read_npy(data: bytes, layout: Layout) -> Parsed:
+    return arrays_movements({POSITIONS[0]: array_of_npy(data, Path("it"))}, layout, "NPY")
 
 
 def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
     return parsed_arrays(
-        demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
+        demos.positions, demos.times, Named([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
     )
 
 
-def _read_bag(path: Path, layout: Layout) -> Parsed:
-    raise DataError("a ROS bag, which is not supported yet; write its topics to CSV or Parquet")
+def _read_bvh(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_bvh_table(data, layout), layout, "BVH")
+
+
+def _read_c3d(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_c3d_table(data, layout), layout, "C3D")
 
 
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
@@ -115,17 +108,27 @@ FORMATS: dict[str, Format] = {
     ".tsv": Format(_read_text),
     ".txt": Format(_read_text),
     ".npz": Format(_read_npz),
-    ".json": Format(_read_json),
+    ".json": Format(json_movements),
+    ".jsonl": Format(json_lines_movements),
+    ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
     ".mat": Format(_read_matlab, label_is_stem=True),
-    ".bag": Format(read_path=_read_bag),
-    ".db3": Format(read_path=_read_bag),
-    ".mcap": Format(read_path=_read_bag),
+    ".bvh": Format(_read_bvh),
+    ".c3d": Format(_read_c3d),
+    ".bag": Format(read_path=read_bag),
+    ".db3": Format(read_path=read_bag),
+    ".mcap": Format(read_path=read_bag),
 }
 
 #: Folders that are one source.
 DATA_SETS: tuple[DataSet, ...] = (
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=_read_bag)),
+    DataSet(
+        MARKER,
+        ("data",),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        Format(read_path=lerobot_movements),
+    ),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
 )
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.movements.tables.columns import column_numbers
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
+from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array
 
+#: Entries that name the columns of positions, and those of velocities and accelerations.
+COLUMNS, RATES = "columns", "rates"
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
 
 _RAGGED = (
@@ -33,8 +36,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length.
 
     ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
-    and ``z`` that are all (T,) are the coordinates of one movement. Where there are no times, movements of
-    ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one second.
+    and ``z`` that are all (T,) are the coordinates of one movement; ``columns`` (d,) names the coordinates.
+    Where there are no times, movements of ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one
+    second.
 
     Raises
     ------
@@ -44,21 +48,27 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     arrays = _axes_stacked(arrays)
     key = _named(arrays, POSITIONS)
     if key is not None:
-        xs, ts, how = _of_one(arrays, _numbers(arrays[key]), layout)
+        xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
-    return parsed_arrays(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
+    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or "times", None, _column_names(arrays))
+    return parsed_arrays(xs, ts, named, layout, (kind, how))
+
+
+class Named(NamedTuple):
+    """What movements of arrays are called: labels, the array of time stamps, which movement each is, coordinates."""
+
+    labels: Sequence[str | None]
+    time: str
+    places: list[str] | None = None
+    columns: Sequence[str] | None = None
 
 
 def parsed_arrays(
-    xs: Sequence[Array],
-    ts: Sequence[Array] | None,
-    named: tuple[Sequence[str | None], str],
-    layout: Layout,
-    detected: tuple[str, str],
+    xs: Sequence[Array], ts: Sequence[Array] | None, named: Named, layout: Layout, detected: tuple[str, str]
 ) -> Parsed:
-    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`."""
-    labels, time = named
+    """Movements xs (T_i, d) with stamps ts (T_i,) as `Parsed`."""
+    labels, time, places, columns = named
     dims = sorted({x.shape[1] for x in xs})
     if len(dims) != 1 or dims == [0]:
         raise DataError(f"expected movements of the same dimensions, at least one, got {dims}")
@@ -77,10 +87,31 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
-    columns = tuple(axis_names(xs[0].shape[1]))
-    places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
-    block = Block(np.concatenate(xs), stamps, offsets, list(labels), places)
+    positions = np.concatenate(xs)
+    columns = distinct(columns or axis_names(positions.shape[1]))
+    if len(columns) != positions.shape[1]:
+        raise DataError(f"expected a name for each of the {positions.shape[1]} coordinates, got {listed(columns)}")
+    if layout.coordinates is not None:
+        chosen = column_numbers(columns, layout.coordinates)
+        columns, positions = tuple(columns[k] for k in chosen), positions[:, chosen]
+    if places is None:
+        places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
+    block = Block(positions, stamps, offsets, list(labels), places)
     return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
+    """The names of the coordinates, if there are such."""
+    names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
+    if names is None or names.ndim != 1 or names.dtype.kind != "U":
+        return None
+    return [str(name) for name in names.tolist()]
+
+
+def has_known_names(names: Collection[str]) -> bool:
+    """Whether arrays have the names of `arrays_movements`, or none that could be other movements."""
+    known = any(name in names or f"{name}_0" in names for name in POSITIONS)
+    return known or not set(names) - {*TIMES, *LABELS, "offsets"}
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -88,7 +119,7 @@ def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     axes = [name for name in "xyz" if name in arrays]
     if axes[:2] != ["x", "y"] or len({np.shape(arrays[name]) for name in axes}) > 1 or np.ndim(arrays["x"]) != 1:
         return arrays
-    return _Joined(arrays, axes, np.column_stack([_numbers(arrays[name]) for name in axes]))
+    return _Joined(arrays, axes, np.column_stack([numbers_of(arrays[name]) for name in axes]))
 
 
 class _Joined(Mapping[str, Any]):
@@ -113,7 +144,7 @@ class _Joined(Mapping[str, Any]):
         return len(self._names)
 
 
-def _numbers(values: Any) -> Array:
+def numbers_of(values: Any) -> Array:
     """An array as float64; dates and durations as nanoseconds."""
     try:
         array = np.asarray(values)
@@ -145,7 +176,7 @@ def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = _named(arrays, TIMES)
-    t = None if key is None else _numbers(arrays[key])
+    t = None if key is None else numbers_of(arrays[key])
     if x.ndim == 3:
         if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
             raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
@@ -173,7 +204,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if prefix is None:
         raise DataError(f"expected arrays times and positions, got no entry 'positions' but {listed(arrays)}")
     count = next(k for k in range(len(arrays) + 1) if f"{prefix}_{k}" not in arrays)
-    xs = [_numbers(arrays[f"{prefix}_{k}"]) for k in range(count)]
+    xs = [numbers_of(arrays[f"{prefix}_{k}"]) for k in range(count)]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     if odd := [x.shape for x in xs if x.ndim != 2]:
         raise DataError(f"expected positions of shape (T, d), got {odd[0]}")
@@ -181,7 +212,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if clock is None:
         return xs, None, "numbered"
     try:
-        return xs, [_numbers(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
+        return xs, [numbers_of(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
     except KeyError as error:
         raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
 

@@ -6,7 +6,7 @@ import io
 import math
 import sys
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ class Npz(Mapping[str, NDArray[Any]]):
         member = self._members[name]
         try:
             content = self._content(member)
-            return self._decoded(name, content)
+            return _decoded(content, repr(name), self._path, self._take)
         except DataError:
             raise
         except Exception as error:  # as above; array headers are Python literals, which can raise more
@@ -78,29 +78,6 @@ class Npz(Mapping[str, NDArray[Any]]):
             raise ValueError(f"a truncated entry {member.filename!r}")
         return content
 
-    def _decoded(self, name: str, content: bytes) -> NDArray[Any]:
-        """Decode an array; its header must agree with the number of bytes that follow."""
-        file = io.BytesIO(content)
-        shape, fortran_order, dtype = _HEADS[npy.read_magic(file)](file)
-        if dtype.hasobject:
-            raise DataError(
-                f"expected {self._path} to hold numbers and texts, got Python objects in {name!r}. Object arrays "
-                "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements "
-                "of unequal length as positions_0, positions_1, ..."
-            )
-        count = math.prod(shape)
-        self._take(count * max(8 - dtype.itemsize, 0))  # numbers become float64
-        at = file.tell()
-        if min(shape, default=1) < 0 or not dtype.itemsize or count * dtype.itemsize != len(content) - at:
-            raise ValueError(f"{len(content) - at} bytes for {name!r} of shape {shape} and type {dtype}")
-        if not count and max(shape) > _LONGEST_EMPTY:
-            raise ValueError(f"{name!r} of shape {shape}")
-        array = np.frombuffer(content, dtype, offset=at)
-        if dtype.kind == "U" and (array.view(np.dtype("u4").newbyteorder(dtype.byteorder)) > sys.maxunicode).any():
-            raise ValueError(f"texts in {name!r} that are none")
-        array = array.reshape(shape[::-1]).T if fortran_order else array.reshape(shape)
-        return np.require(array, requirements="A")
-
     def _take(self, n_bytes: int) -> None:
         self._taken += n_bytes
         check_expanded(self._taken)
@@ -110,3 +87,45 @@ class Npz(Mapping[str, NDArray[Any]]):
             f"expected {self._path} to be an archive of arrays, got something foreign, truncated or damaged ({error}); "
             "save it again, or take it from a backup"
         )
+
+
+def array_of_npy(data: bytes, path: Path) -> NDArray[Any]:
+    """The array in the bytes of an npy file.
+
+    Raises
+    ------
+    DataError
+        Not such a file, damaged, larger in memory than `kineme.files.limits` allows, or one of Python objects.
+    """
+    try:
+        return _decoded(data, "it", path, check_expanded)
+    except DataError:
+        raise
+    except Exception as error:  # headers are Python literals, which can raise much
+        raise DataError(
+            f"expected an array saved by numpy.save, got something foreign, truncated or damaged ({error})"
+        ) from error
+
+
+def _decoded(content: bytes, name: str, path: Path, take: Callable[[int], None]) -> NDArray[Any]:
+    """Decode an array; its header must agree with the number of bytes that follow."""
+    file = io.BytesIO(content)
+    shape, fortran_order, dtype = _HEADS[npy.read_magic(file)](file)
+    if dtype.hasobject:
+        raise DataError(
+            f"expected {path} to hold numbers and texts, got Python objects in {name}. Object arrays "
+            "cannot be loaded without executing what they say; save texts as labels.astype(str), and movements "
+            "of unequal length as positions_0, positions_1, ..., or each under its own name"
+        )
+    count = math.prod(shape)
+    take(count * max(8 - dtype.itemsize, 0))  # numbers become float64
+    at = file.tell()
+    if min(shape, default=1) < 0 or not dtype.itemsize or count * dtype.itemsize != len(content) - at:
+        raise ValueError(f"{len(content) - at} bytes for {name} of shape {shape} and type {dtype}")
+    if not count and max(shape) > _LONGEST_EMPTY:
+        raise ValueError(f"{name} of shape {shape}")
+    array = np.frombuffer(content, dtype, offset=at)
+    if dtype.kind == "U" and (array.view(np.dtype("u4").newbyteorder(dtype.byteorder)) > sys.maxunicode).any():
+        raise ValueError(f"texts in {name} that are none")
+    array = array.reshape(shape[::-1]).T if fortran_order else array.reshape(shape)
+    return np.require(array, requirements="A")

@@ -13,11 +13,23 @@ from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.time_stamps import is_date
 
 COMMENTS = ("#", "%", "//")
+#: What may stand in a row of units, in lower case; one alone is no name of an action or a person.
+UNITS_OF_COLUMNS = frozenset(
+    {
+        "mm", "cm", "dm", "km", "in", "inch", "inches", "ft", "feet", "meter", "meters", "millimeter",
+        "millimeters", "s", "sec", "second", "seconds", "ms", "millisecond", "milliseconds", "us", "µs", "ns",
+        "min", "hz", "deg", "degree", "degrees", "°", "rad", "radian", "radians", "mrad", "deg/s", "°/s", "rad/s",
+        "m/s", "mm/s", "cm/s", "deg/s^2", "deg/s²", "rad/s^2", "rad/s²", "m/s^2", "m/s²", "m/s2", "mm/s^2",
+        "mm/s²", "kg", "mv", "%", "n.m", "nm", "n·m", "n*m", "n.mm", "nmm", "mm.n", "n/kg", "w/kg", "count",
+        "counts", "frame", "frames",
+    }
+)  # fmt: skip
+_LETTERS = frozenset("mnwvag-")  # units that may be names
 _PEEK = 20  # samples from which the dialect is detected
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
-_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
-_COMMA_NUMBERS = re.compile(rf"\s*{_COMMA_NUMBER.pattern}(\s+{_COMMA_NUMBER.pattern})+\s*")  # between blanks
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
 
 class Dialect(NamedTuple):
@@ -29,6 +41,8 @@ class Dialect(NamedTuple):
     named: bool
     first: int  # line of the first sample, counted from 0
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
+    measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
+    end: int | None = None  # line after the last sample; None: the end of the file
 
     def is_sample(self, line: str) -> bool:
         """Whether a line holds a sample. A comment does not, but a name may begin like a comment.
@@ -96,16 +110,27 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     kept = _with_names_like_comments(lines, kept)
     separator = _separator([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
-    comma = separator != "," and any(_COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
+    comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
     named = not _is_sample(cells, comma)
     heads, first = cells[0] if named else _commented_head(lines[: kept[0]], separator, len(cells[0])), kept[0] + named
     numbered = not named and _counts_columns(cells)
     first += numbered
-    body = cells[named or numbered :]
+    units = units_in(cells[1]) if named and len(cells) > 2 and len(cells[1]) <= len(cells[0]) else ()
+    if units:
+        units, first = (*units, *[""] * (len(cells[0]) - len(units))), kept[1] + 1
+    body = cells[named + bool(units) or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
     if heads:
-        return Dialect(separator, comma, tuple(heads), True, first, kinds)
+        return Dialect(separator, comma, tuple(heads), True, first, kinds, units)
     return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
+
+
+def units_in(cells: Sequence[str]) -> tuple[str, ...]:
+    """The units in a row that holds nothing but units, without brackets; empty if it is no such row."""
+    plain = tuple(cell.strip("[]() ") for cell in cells)
+    known = sum(cell.lower() in UNITS_OF_COLUMNS for cell in plain)
+    others = sum(bool(cell) and cell.lower() not in UNITS_OF_COLUMNS | _LETTERS for cell in plain)
+    return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 
 def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int]:
@@ -137,7 +162,7 @@ def _separator(lines: Sequence[str]) -> str | None:
 
 def is_number(cell: str, comma: bool) -> bool:
     """Whether a cell reads as a number."""
-    return bool(_NUMBER.fullmatch(cell) or (comma and _COMMA_NUMBER.fullmatch(cell)))
+    return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
 
 
 def _is_sample(cells: Sequence[list[str]], comma: bool) -> bool:

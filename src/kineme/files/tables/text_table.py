@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from codecs import BOM_UTF8
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import chain, islice
 from typing import Any
@@ -13,7 +13,9 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
+from kineme.files.motion_capture.export_heads import ExportHead
 from kineme.files.tables.dialect import COMMENTS, Dialect, detect_dialect
+from kineme.files.tables.exports import export_head, export_table, with_times
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
@@ -36,17 +38,47 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         Not text, no samples, or no columns of numbers.
     """
     encoding = _encoding(data)
+    if (export := export_head(_lines(data, encoding), len(data))) is not None:
+        return _read_export(data, encoding, export, layout)
     dialect = detect_dialect(_lines(data, encoding))
     _check_memory(data, dialect)
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
-    dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
-    faults: dict[int, str] = {}
-    rows = _read_fast(data, encoding, dialect, dtype)
-    if rows is None:
-        rows, faults = read_slowly(_samples(data, encoding, dialect), dialect, dtype)
+    rows, faults = _rows(data, encoding, dialect, texts)
+    columns = [rows[name] for name in rows.dtype.names or ()]
+    if dated and roles.time is not None:
+        columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
+        head = dialect.heads[roles.time]
+        faults = {
+            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
+        } | faults
+    line_of = _line_numbers(data, encoding, dialect)
+    dates_in = "s" if dated else None
+    return Table(dialect.heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
 
+
+def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
+    """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
+    head, dialect = export
+    _check_memory(data, dialect)
+    heads, kinds, measured_in = with_times(head, dialect)
+    roles = choose_roles(heads, kinds, layout)
+    rows, faults = _rows(data, encoding, dialect, {k for k in (*roles.movement, roles.label) if k is not None})
+    columns = [rows[name] for name in rows.dtype.names or ()]
+    line_of = _line_numbers(data, encoding, dialect)
+    table = Table(heads, columns, len(rows), line_of, faults, None, measured_in)
+    return export_table(head, table, roles, layout.coordinates is not None)
+
+
+def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:
+    """The samples as a structured array, and row -> what is wrong there."""
+    dtype = np.dtype([(f"c{k}", "O" if k in texts else "f8") for k in range(len(dialect.heads))])
+    rows = _read_fast(data, encoding, dialect, dtype)
+    return read_slowly(_samples(data, encoding, dialect), dialect, dtype) if rows is None else (rows, {})
+
+
+def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int], int | None]:
     @cache
     def lines() -> Any:
         return np.fromiter((line for line, _ in _samples(data, encoding, dialect)), np.intp)
@@ -54,14 +86,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     def line_of(row: int) -> int | None:
         return int(lines()[row])
 
-    columns = [rows[name] for name in dtype.names or ()]
-    if dated and roles.time is not None:
-        columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
-        head = dialect.heads[roles.time]
-        faults = {
-            row: f"expected a date in {head!r}, got {cell or 'nothing'!r}" for row, cell in others.items()
-        } | faults
-    return Table(dialect.heads, columns, len(rows), line_of, faults, "s" if dated else None), roles
+    return line_of
 
 
 def _encoding(data: bytes) -> str:
@@ -95,7 +120,7 @@ def _checked_lines(data: bytes, encoding: str) -> Iterator[str]:
 
 def _samples(data: bytes, encoding: str, dialect: Dialect) -> Iterator[tuple[int, str]]:
     """Line number, counted from 1, and text of every sample."""
-    numbered = enumerate(islice(_lines(data, encoding), dialect.first, None), dialect.first + 1)
+    numbered = enumerate(islice(_lines(data, encoding), dialect.first, dialect.end), dialect.first + 1)
     return ((k, line) for k, line in numbered if dialect.is_sample(line))
 
 
@@ -113,7 +138,7 @@ def _read_fast(data: bytes, encoding: str, dialect: Dialect, dtype: np.dtype[Any
         return None  # a comma in a name is not a decimal mark
     if b'"' in data and not (encoding != "utf-16" and quotes_are_plain(data.removeprefix(BOM_UTF8), dialect)):
         return None
-    lines: Iterator[str] = islice(_lines(data, encoding), dialect.first, None)
+    lines: Iterator[str] = islice(_lines(data, encoding), dialect.first, dialect.end)
     if any(mark.encode() in data for mark in COMMENTS):
         lines = filter(dialect.is_sample, lines)
     if dialect.decimal_comma:

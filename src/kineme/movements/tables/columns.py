@@ -23,6 +23,8 @@ LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activ
 _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
+_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
+_TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
@@ -61,7 +63,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     time = _time(heads, kinds, layout, named, taken)
     taken.add(time)
     if layout.coordinates is not None:
-        positions = _numbers(heads, layout.coordinates)
+        positions = column_numbers(heads, layout.coordinates)
     else:
         free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
         plain = set(map(_plain, heads))
@@ -76,13 +78,21 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
-    return _numbers(heads, [column])[0]
+    return _place(heads, column, _places(heads), _places(map(_plain, heads)))
 
 
-def _numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
-    """Column numbers from heads or numbers; a string of digits is a number if no head equals it."""
+def column_numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
+    """Column numbers from heads or numbers; a string of digits is a number if no head equals it.
+
+    What several heads begin with, before a dot, stands for all of them: ``wrist`` for ``wrist.x``, ``wrist.y``.
+    """
     exact, plain = _places(heads), _places(map(_plain, heads))
-    return tuple(_place(heads, one, exact, plain) for one in columns)
+    found: list[int] = []
+    for one in columns:
+        known = isinstance(one, int) or one in exact or _plain(one) in plain
+        group = [] if known else [k for k, head in enumerate(heads) if head.startswith(f"{one}.")]
+        found += group or [_place(heads, one, exact, plain)]
+    return tuple(found)
 
 
 def _places(heads: Iterable[str]) -> dict[str, list[int]]:
@@ -160,7 +170,7 @@ def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
 
 def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | None) -> tuple[int, ...]:
     if layout.keys is not None:
-        return _numbers(heads, layout.keys)
+        return column_numbers(heads, layout.keys)
     if not named:
         return ()
     kind = MOVEMENT_WORDS
@@ -171,8 +181,14 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
     """Whether a column is redundant: a counter of samples, or the velocity or acceleration of another column."""
-    words = words_of(head)
-    if not head.strip() or (words and words[0] in _COUNTERS and all(word.isdecimal() for word in words[1:])):
+    words = {word for word in words_of(head) if not word.isdecimal()}
+    if not head.strip() or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
-    return derived is not None and (derived[1] or derived[2]) in plain
+    if derived is None:
+        return False
+    quantity = derived[1] or derived[2]
+    turned = _TURNED.fullmatch(quantity)  # of a quaternion
+    return quantity in plain or (
+        turned is not None and any(turned[1] + dot + "w" in plain for dot in ("", ".", "_", " "))
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -34,6 +34,13 @@ class Layout:
         unit. As a number, it is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
+    kinds : mapping, optional
+        Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
+        order of a quaternion.
+    topic : str or sequence of str, optional
+        Topics of a bag; of several, the others are interpolated to the stamps of the first.
+    frame : str or sequence of str, optional
+        Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
 
     Raises
     ------
@@ -47,6 +54,9 @@ class Layout:
     label: Column | None = None
     units: str | float | None = None
     skip: str = "movement"
+    kinds: Mapping[str, str] | None = None
+    topic: str | Sequence[str] | None = None
+    frame: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
@@ -67,9 +77,23 @@ class Layout:
         """The columns that tell movements apart."""
         return _several(self.movement)
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics of a bag."""
+        return _texts(self.topic)
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The pairs of frames of a bag."""
+        return _texts(self.frame)
+
 
 def _several(columns: Column | Sequence[Column] | None) -> tuple[Column, ...] | None:
     """One column or many, as a tuple."""
     if columns is None:
         return None
     return (columns,) if isinstance(columns, (str, int)) else tuple(columns) or None  # an empty one names none
+
+
+def _texts(names: str | Sequence[str] | None) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names or ())

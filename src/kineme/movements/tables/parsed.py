@@ -34,6 +34,8 @@ class Detected(NamedTuple):
         `kineme.movements.tables.time_stamps.unit_by_size`, or ``"assumed"``.
     movement, label, ignored : tuple of str
         Columns that tell movements apart, that name the action, and that are ignored.
+    measured_in : tuple of str
+        The unit of each coordinate where the file says it, else empty; nothing at all if it says none.
     """
 
     format: str
@@ -45,6 +47,7 @@ class Detected(NamedTuple):
     movement: tuple[str, ...] = ()
     label: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
+    measured_in: tuple[str, ...] = ()
 
 
 def no_lines(row: int) -> None:

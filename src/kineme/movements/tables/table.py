@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,23 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct
 from kineme.movements.tables.time_stamps import in_seconds, unit_by_size, unit_in_head
 from kineme.validation import Array
+
+
+class Segments(NamedTuple):
+    """Movements that a file itself tells apart, one after the other: groups, episodes, keys.
+
+    Attributes
+    ----------
+    offsets : ndarray of shape (n + 1,)
+        Rows of the table at which the movements begin and end.
+    places : list of n str
+        Which movement of the file.
+    labels : list of n str or None
+    """
+
+    offsets: NDArray[np.intp]
+    places: list[str]
+    labels: list[str | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +50,11 @@ class Table:
         Row -> what is wrong there.
     dates_in : str, optional
         Unit of the time stamps where they are dates or durations, whatever the head says.
+    measured_in : sequence of str
+        Unit of each column where the file says it, else empty; or nothing at all.
+    segments : Segments, optional
+    maker : str
+        Whose layout the file has, such as ``"Vicon"``; empty for a plain table.
     """
 
     heads: tuple[str, ...]
@@ -41,14 +63,17 @@ class Table:
     line_of: Callable[[int], int | None]
     faults: dict[int, str] = field(default_factory=dict)
     dates_in: str | None = None
+    measured_in: Sequence[str] = ()
+    segments: Segments | None = None
+    maker: str = ""
 
 
 def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Parsed:
     """The movements of a table.
 
-    With columns that tell movements apart, all rows with equal texts in them, and with equal labels, are one movement,
-    in any order. With a column of labels alone, a new movement begins where the label changes or the time decreases.
-    Otherwise the table is one movement.
+    Movements that the file itself tells apart stay apart. With columns that tell movements apart, all rows with equal
+    texts in them, and with equal labels, are one movement, in any order. With a column of labels alone, a new movement
+    begins where the label changes or the time decreases. Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
@@ -62,8 +87,8 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         times = (np.arange(len(times)) - np.repeat(offsets[:-1], np.diff(offsets))) * float(units)
     heads = table.heads
     detected = Detected(
-        kind,
-        "long" if roles.movement or roles.label is not None else "wide",
+        f"{table.maker} {kind}".strip(),
+        "long" if roles.movement or roles.label is not None or table.segments is not None else "wide",
         distinct([heads[k] for k in roles.positions]),
         None if roles.time is None else heads[roles.time],
         units,
@@ -71,8 +96,9 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         tuple(heads[k] for k in roles.movement),
         () if roles.label is None else (heads[roles.label],),
         tuple(heads[k] for k in roles.ignored),
+        tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
     )
-    places = [""] * n if n == 1 and not roles.movement else keys
+    places = [""] * n if n == 1 and not roles.movement and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
 
 
@@ -85,7 +111,7 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
         return in_seconds(stamps, table.dates_in), table.dates_in, "dates"
     if layout.units is not None:
         return in_seconds(stamps, layout.units), layout.units, "given"
-    named = unit_in_head(head)
+    named = unit_in_head(head) or (unit_in_head(table.measured_in[roles.time]) if table.measured_in else None)
     units, known = (named, "head") if named else unit_by_size(stamps)
     return in_seconds(stamps, units), units, known
 
@@ -93,6 +119,8 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
 def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
     """Per row the number of its movement; per movement its place and its label."""
     n_rows, label = table.n_rows, roles.label
+    if table.segments is not None:
+        return _split_segments(table, table.segments, roles)
     if label is None and not roles.movement:
         return np.zeros(n_rows, np.intp), [""], [None]
     labels = [None] * n_rows if label is None else table.columns[label].tolist()
@@ -107,6 +135,23 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
     codes = np.fromiter((number_of.setdefault(key, len(number_of)) for key in keys), np.intp, n_rows)
     names: list[str | None] = [key[0] or None if label is not None else None for key in number_of]
     return codes, _places(list(number_of), label is not None), names
+
+
+def _split_segments(
+    table: Table, segments: Segments, roles: Roles
+) -> tuple[NDArray[np.intp], list[str], list[str | None]]:
+    """The movements of the file, each divided where columns tell movements or labels apart."""
+    codes = np.repeat(np.arange(len(segments.places)), np.diff(segments.offsets))
+    chosen = [*roles.movement, *(() if roles.label is None else (roles.label,))]
+    if not chosen:
+        return codes, segments.places, segments.labels
+    number_of: dict[Any, int] = {}
+    keys = zip(codes.tolist(), *(table.columns[k].tolist() for k in chosen), strict=True)
+    codes = np.fromiter((number_of.setdefault(key, len(number_of)) for key in keys), np.intp, table.n_rows)
+    labels = [segments.labels[key[0]] if roles.label is None else key[-1] or None for key in number_of]
+    divided = len(number_of) > len({key[0] for key in number_of})
+    named = [(segments.places[key[0]], *(key[1:] if divided else ())) for key in number_of]
+    return codes, _places(named, False), labels
 
 
 def _places(keys: list[tuple[Any, ...]], labeled: bool) -> list[str]:

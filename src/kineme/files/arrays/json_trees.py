@@ -1,0 +1,126 @@
+"""JSON and JSON lines as trees of arrays: samples with names become columns, lists of numbers become arrays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.arrays.arrays import arrays_movements, has_known_names
+from kineme.files.arrays.tree_movements import tree_movements
+from kineme.files.limits import check_expanded
+from kineme.movements.tables.columns import is_time
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+
+_NUMBER, _LIST = 32, 88  # bytes of a Python object
+
+
+def json_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements in JSON: named arrays, samples ``[{"t": 0, "x": 1}, ...]``, lists of either, or these by name."""
+    check_objects(data)
+    try:
+        entries = json.loads(data, object_pairs_hook=_each_once)
+    except json.JSONDecodeError as error:
+        raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
+    if isinstance(entries, Mapping):
+        if has_known_names(entries):
+            return arrays_movements(entries, layout, "JSON")
+    elif not isinstance(entries, list) or not any(isinstance(one, (Mapping, list)) for one in entries[:1]):
+        raise DataError(f"expected an object with times and positions, got a {type(entries).__name__}")
+    return tree_movements(as_tree(entries), layout, "JSON", many="take")
+
+
+def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements in JSON lines: a sample in each line, or a movement in each line."""
+    check_objects(data)
+    entries = []
+    for k, line in enumerate(data.decode("utf-8-sig").splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            entries.append(json.loads(line, object_pairs_hook=_each_once))
+        except json.JSONDecodeError as error:
+            raise DataError(f"expected JSON in line {k}, got {line.strip()[:40]!r} ({error.msg}); repair it") from error
+    if not entries:
+        raise DataError("expected samples, got an empty file")
+    return tree_movements(as_tree(entries), layout, "JSON lines", many="take")
+
+
+def check_objects(data: bytes) -> None:
+    """Refuse JSON that would take more memory than the limit once it is Python objects."""
+    lists = data.count(b"[") + data.count(b"{")
+    check_expanded(len(data) + _NUMBER * data.count(b",") + _LIST * lists)
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        twice = next(name for name in entries if sum(one == name for one, _ in pairs) > 1)
+        raise DataError(f"expected each entry once, got {twice!r} several times")
+    return entries
+
+
+def as_tree(value: Any) -> Any:
+    """Parsed JSON as a tree of arrays."""
+    if isinstance(value, Mapping):
+        return {name: as_tree(one) for name, one in value.items()}
+    if not isinstance(value, list) or not value:
+        return value
+    if all(isinstance(one, Mapping) for one in value):
+        return _columns(value) if all(map(_is_sample, value[:2])) else [as_tree(one) for one in value]
+    if any(isinstance(one, Mapping) for one in value):
+        raise DataError("expected a list of samples or of movements, got objects beside other values")
+    if all(isinstance(one, list) for one in value) and not _is_matrix(value):
+        return [as_tree(one) for one in value]
+    return _array(value)
+
+
+def _is_sample(entry: Mapping[str, Any]) -> bool:
+    """Whether an object is one sample, not a movement whose entries are lists over time."""
+    for name, value in entry.items():
+        if is_time(name):
+            return not isinstance(value, list)
+    lists = [one for one in entry.values() if isinstance(one, list)]
+    return len(lists) < len(entry) and not any(isinstance(one, (list, Mapping)) for value in lists for one in value[:1])
+
+
+def _is_matrix(rows: Sequence[list[Any]]) -> bool:
+    return all(not isinstance(cell, (list, Mapping)) for row in rows for cell in row[:1])
+
+
+def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Samples with names as one array for each name, NaN where it is missing."""
+    flat = [_flat(one) for one in samples]
+    names = dict.fromkeys(name for one in flat for name in one)
+    return {name: _array([one.get(name) for one in flat]) for name in names}
+
+
+def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
+    plain: dict[str, Any] = {}
+    for name, value in sample.items():
+        if isinstance(value, Mapping):
+            plain |= {f"{name}.{inner}": one for inner, one in _flat(value).items()}
+        else:
+            plain[name] = value
+    return plain
+
+
+def _array(values: list[Any]) -> Any:
+    """Numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length."""
+    if any(isinstance(one, str) for one in values):
+        texts = np.empty(len(values), dtype=object)
+        texts[:] = ["" if one is None else str(one) for one in values]
+        return texts
+    width = max((len(one) for one in values if isinstance(one, list)), default=0)
+    if width:
+        values = [[np.nan] * width if one is None else one for one in values]
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            "expected samples of one length, each a list of numbers, got rows that differ in length or hold texts"
+        ) from error

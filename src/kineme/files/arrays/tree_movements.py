@@ -1,0 +1,165 @@
+"""The movements of a tree of arrays, with the roles that their columns have."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
+from kineme.files.arrays.trees import Found, listed_shapes, movements_in
+from kineme.files.limits import check_expanded
+from kineme.movements.tables.columns import choose_roles, is_time
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.movements.trajectories.movements import axis_names
+
+_STAMP = "time [s]"
+_POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
+
+
+def tree_movements(tree: Any, layout: Layout, kind: str, separator: str = ".", many: str = "refuse") -> Parsed:
+    """The movements of a tree, see `kineme.files.arrays.trees`.
+
+    Parameters
+    ----------
+    many : {"refuse", "take"}
+        What is done with several arrays of more than one column in a movement if `layout` chooses none: they may mean
+        different things, such as states and commands, or be parts of one state.
+
+    Raises
+    ------
+    DataError
+        No movements; several arrays, none of them chosen; or no times where they are needed.
+    """
+    found = [one for one in movements_in(tree, separator) if one.entries]
+    if not found:
+        got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
+        raise DataError(f"expected arrays times and positions, got {got}")
+    stamped = any(len(one.entries) > 1 or one.rate is not None for one in found)
+    if not stamped:
+        return _bare(found, layout, kind)
+    found = [_plainly_named(one) for one in found]
+    reference = Counter(tuple(one.entries) for one in found).most_common(1)[0][0]
+    first = next(one for one in found if tuple(one.entries) == reference)
+    names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
+    heads, owners = _heads(first, names)
+    if first.rate is not None and not any(map(is_time, names)):
+        heads, owners = (*heads, _STAMP), (*owners, _STAMP)
+    kinds = ["text" if owner != _STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
+    wide = [name for name in names if owners.count(name) > 1]
+    if many == "refuse" and layout.coordinates is None and len(wide) > 1:
+        raise DataError(
+            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns="
+        )
+    roles = choose_roles(heads, kinds, layout)
+    needed = {owners[k] for k in chain(roles.positions, roles.movement, [roles.time, roles.label]) if k is not None}
+    table = _table(found, (heads, owners), needed)
+    return table_movements(table, roles, layout, kind)
+
+
+def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
+    """Movements that are arrays alone, without times."""
+    if len(found) == 1 and not found[0].place and not isinstance(layout.units, float | int):
+        raise DataError("expected times beside the positions, got one array alone; say their step with units=")
+    check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
+    xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
+    xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    labels = [one.label for one in found]
+    return parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
+
+
+def _plainly_named(one: Found) -> Found:
+    """The only array of several columns that means positions loses its name: its coordinates are x, y, z."""
+    wide = [name for name, entry in one.entries.items() if len(entry.shape) > 1]
+    if len(wide) == 1 and wide[0] in POSITIONS:
+        return one._replace(entries={"" if name == wide[0] else name: entry for name, entry in one.entries.items()})
+    return one
+
+
+def _heads(one: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """A head for each column, and the array that it is of."""
+    heads, owners = [], []
+    for name in names:
+        shape = one.entries[name].shape
+        width = int(np.prod(shape[1:]))
+        ends: Sequence[Any] = range(width)
+        if not name:
+            heads += axis_names(width)
+        elif len(shape) == 1:
+            heads.append(name)
+        else:
+            last = name.replace("/", ".").split(".")[-1].lower()
+            if last in _POINTS and width in (2, 3):
+                ends = "xyz"[:width]
+            heads += [f"{name}.{end}" for end in ends]
+        owners += [name] * width
+    return tuple(heads), tuple(owners)
+
+
+def _is_text(entry: Any) -> bool:
+    return entry.dtype.kind in "OU"
+
+
+def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]], needed: set[str]) -> Table:
+    """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row."""
+    heads, owners = columns
+    lengths = [one.length for one in found]
+    widths = Counter(owners)
+    check_expanded(8 * sum(lengths) * sum(widths[name] for name in needed))
+    offsets = np.concatenate(([0], np.cumsum(lengths))).astype(np.intp)
+    faults: dict[int, str] = {}
+    arrays: dict[str, Any] = {}
+    for name in needed:
+        parts = []
+        for one, length, start in zip(found, lengths, offsets, strict=False):
+            part, fault = _part(one, name, length, widths[name])
+            parts.append(part)
+            if fault:
+                faults[int(start)] = fault
+        arrays[name] = np.concatenate(parts)
+    numbers = dict.fromkeys(widths, 0)
+    filled: list[Any] = []
+    for owner in owners:
+        filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
+        numbers[owner] += 1
+    segments = Segments(offsets, [one.place for one in found], [one.label for one in found])
+    whole = None if len(found) == 1 and not found[0].place and found[0].label is None else segments
+    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, segments=whole)
+
+
+def _part(one: Found, name: str, length: int, width: int) -> tuple[Any, str]:
+    """An array of a movement as columns (T, d), and what is wrong with it."""
+    if name == _STAMP:
+        return (np.arange(length) / (one.rate or 1.0))[:, None], "" if one.rate else "expected a rate, got none"
+    entry = one.entries.get(name)
+    if entry is None:
+        return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"
+    if _is_text(entry):
+        return np.asarray(entry, dtype=object).reshape(-1, 1), ""
+    if entry.shape[0] != length or int(np.prod(entry.shape[1:])) != width:
+        got = f"expected {name!r} of shape {(length, width)}, got {tuple(entry.shape)}"
+        return np.full((length, width), np.nan), got
+    return numbers_of(np.asarray(entry)).reshape(length, width), ""
+
+
+def nested(arrays: Mapping[str, Any]) -> Any:
+    """Arrays whose names hold slashes as groups within groups."""
+    if not any("/" in name for name in arrays):
+        return arrays
+    tree: dict[str, Any] = {}
+    for name in arrays:
+        *groups, last = name.split("/")
+        here = tree
+        for group in groups:
+            below = here.setdefault(group, {})
+            if not isinstance(below, dict):
+                raise DataError(f"expected {group!r} to be an array or a group, got both")
+            here = below
+        here[last] = arrays[name]
+    return tree

@@ -1,0 +1,1 @@
+"""Recordings of motion capture systems: the heads of their text exports, BVH and C3D."""

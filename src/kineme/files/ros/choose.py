@@ -1,0 +1,113 @@
+"""Which topics and frames of a bag are read: those that are asked for, or the only one that can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.files.ros.bags import Bag, Topic
+from kineme.files.ros.frames import Edge, connected_graph, transform_topics
+from kineme.files.ros.message_types import TRANSFORMS, TYPES
+from kineme.movements.tables.layout import Layout
+from kineme.output.text import counted
+from kineme.validation import MIN_SAMPLES
+
+_SHOWN = 20  # topics in a message
+FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
+
+
+class Choice(NamedTuple):
+    """Topics in the order that was asked for, and pairs of frames, which come first."""
+
+    topics: tuple[Topic, ...]
+    frames: tuple[Edge, ...]
+
+
+def choose(bag: Bag, layout: Layout) -> Choice:
+    """What to read.
+
+    Raises
+    ------
+    DataError
+        A topic that is not there or cannot be read; nothing that can be read; or several topics where none is named.
+        The message lists the topics.
+    """
+    frames = tuple(pair_of(one) for one in layout.frames)
+    topics: list[Topic] = []
+    for name in layout.topics:
+        topic = _named(bag, name)
+        if topic.type in TRANSFORMS:
+            frames = frames or (_only_frames(bag),)
+        else:
+            topics.append(topic)
+    if topics or frames:
+        return Choice(tuple(topics), frames)
+    candidates = [one for one in bag.topics if can_be_read(one)]
+    transforms = transform_topics(bag)
+    if len(candidates) == 1 and not transforms:
+        return Choice((candidates[0],), ())
+    if transforms and not candidates:
+        return Choice((), (_only_frames(bag),))
+    if candidates:
+        frame = "; the pose of one frame in another with --frame parent:child" if transforms else ""
+        raise DataError(
+            f"expected one topic that can be read, got {listed_topics([*candidates, *transforms])}; say which with "
+            f"topic=, in the shell --topic {candidates[0].name}{frame}"
+        )
+    raise DataError(f"expected a topic of movements, got {listed_topics(bag.topics)}")
+
+
+def can_be_read(topic: Topic) -> bool:
+    """Whether a topic by itself holds a movement."""
+    kind = TYPES.get(topic.type)
+    return kind is not None and topic.n_messages >= (1 if kind.path else MIN_SAMPLES)
+
+
+def listed_topics(topics: Sequence[Topic]) -> str:
+    """Topics with their types and numbers of messages, for a message."""
+    if not topics:
+        return "none"
+    shown = [f"{one.name} ({one.type}, {counted(one.n_messages, 'message')})" for one in topics[:_SHOWN]]
+    more = f" and {len(topics) - _SHOWN} more" if len(topics) > _SHOWN else ""
+    return f"{', '.join(shown)}{more}"
+
+
+def pair_of(text: str) -> Edge:
+    """Two frames written as ``parent:child``."""
+    parent, colon, child = text.partition(":")
+    if not colon or not parent or not child or ":" in child:
+        raise DataError(f"expected two frames as parent:child, got {text!r}")
+    if parent.removeprefix("/") == child.removeprefix("/"):
+        raise DataError(f"expected two frames, got {parent!r} twice")
+    return parent.removeprefix("/"), child.removeprefix("/")
+
+
+def _named(bag: Bag, name: str) -> Topic:
+    same = [one for one in bag.topics if one.name == name] or [one for one in bag.topics if one.name == f"/{name}"]
+    if not same:
+        alike = get_close_matches(name, [one.name for one in bag.topics], 3)
+        meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
+        raise DataError(f"expected a topic {name!r}{meant}, got {listed_topics(bag.topics)}")
+    known = [one for one in same if one.type in TYPES or one.type in TRANSFORMS]
+    if not known:
+        raise DataError(
+            f"topic {same[0].name}: expected a type of movements, got {' and '.join(one.type for one in same)}; known "
+            f"are {', '.join(sorted(TYPES))}; convert the topic to CSV"
+        )
+    if not (full := [one for one in known if one.n_messages]):
+        raise DataError(f"topic {same[0].name}: expected samples of {known[0].type}, got no messages")
+    return max(full, key=lambda one: one.n_messages)
+
+
+def _only_frames(bag: Bag) -> Edge:
+    edges = connected_graph(bag, (), FRAMES_LOOKED_AT).edges
+    if len(edges) == 1:
+        return edges[0]
+    pairs = ", ".join(f"{parent}:{child}" for parent, child in edges[:_SHOWN])
+    more = f" and {len(edges) - _SHOWN} more" if len(edges) > _SHOWN else ""
+    raise DataError(
+        f"expected two frames, got the transforms {pairs or 'of none'}{more}; say which with frame=, in the shell "
+        "--frame parent:child, for any two frames that are connected"
+    )

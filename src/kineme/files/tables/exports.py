@@ -1,0 +1,119 @@
+"""Text exports of motion capture systems as tables: their heads, and the gaps of markers that were not found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import chain, islice
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.limits import check_expanded
+from kineme.files.motion_capture.export_heads import ExportHead
+from kineme.files.motion_capture.optitrack import optitrack_head
+from kineme.files.motion_capture.qualisys import qualisys_head
+from kineme.files.motion_capture.vicon import vicon_head
+from kineme.files.tables.dialect import COMMA_NUMBER, Dialect, split
+from kineme.movements.tables.columns import Roles
+from kineme.movements.tables.table import Table
+
+_HEAD_LINES = 400  # of an export with a head of its own, at most
+_FIRST = 3  # lines among which the first line of an export is
+_LINE = 100  # bytes of a line in Python, beside its characters
+_SAMPLES = 5  # in which decimal commas are looked for
+_STAMP = "time [s]"
+
+
+def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect] | None:
+    """The head of an export of OptiTrack, Vicon or Qualisys and how its samples are written; None for other tables."""
+    lines = iter(lines)
+    some = list(islice(lines, _FIRST))
+    if (known := _head(some, probe=True)) is None:
+        return None
+    if known == "Vicon":  # the section that is read may stand anywhere
+        check_expanded(2 * n_bytes + _LINE)
+        some += list(lines)
+    else:
+        some += list(islice(lines, _HEAD_LINES))
+    head = _head(some)
+    assert isinstance(head, ExportHead)
+    rows = [split(line, head.separator) for line in some[head.first : head.end][:_SAMPLES] if line.strip()]
+    if not rows:
+        raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
+    wide = max(0, len(rows[0]) - len(head.heads))
+    heads, units = ((*given, *[""] * wide) for given in (head.heads, head.measured_in))
+    comma = head.separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in rows for cell in row)
+    kinds = ("number",) * len(heads)
+    return head, Dialect(head.separator, comma, heads, True, head.first, kinds, units, head.end)
+
+
+def _head(lines: Sequence[str], probe: bool = False) -> Any:
+    """The head of an export, or None; with `probe` the name of its maker from the first lines alone."""
+    for maker, find in (("OptiTrack", optitrack_head), ("Vicon", vicon_head), ("Qualisys", qualisys_head)):
+        try:
+            found = find(lines, split)
+        except DataError:
+            if not probe:
+                raise
+            return maker  # the head is longer than the first lines
+        if found is not None:
+            return maker if probe else found
+    return None
+
+
+def with_times(head: ExportHead, dialect: Dialect) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Heads, kinds and units of the columns, and of one more for the times that follow from the rate."""
+    more = head.rate is not None
+    return (
+        (*dialect.heads, *[_STAMP] * more),
+        (*dialect.kinds, *["number"] * more),
+        (*dialect.measured_in, *["s"] * more),
+    )
+
+
+def export_table(head: ExportHead, table: Table, roles: Roles, chosen: bool) -> tuple[Table, Roles]:
+    """A table with times, gaps as faults, and without the columns that hold nothing, unless they were `chosen`."""
+    columns = list(table.columns)
+    if head.rate is not None:
+        columns.append(_stamps(table, columns, head.rate))
+    if head.zeros_are_gaps:
+        _mark_zeros(table.heads, columns)
+    missing = {k: np.isnan(columns[k]) for k in roles.positions}
+    empty = () if chosen else tuple(k for k, rows in missing.items() if rows.all())
+    positions = tuple(k for k in roles.positions if k not in empty)
+    if not positions:
+        raise DataError(f"expected coordinates in a {head.maker} export, got columns without any number")
+    faults = {row: text for row, text in table.faults.items() if "columns" in text}
+    for k in reversed(positions):  # the first gap of a row is named
+        faults |= dict.fromkeys(
+            np.flatnonzero(missing[k]).tolist(),
+            f"expected a number in {table.heads[k]!r}, got nothing; choose other columns, or drop such samples alone",
+        )
+    roles = roles._replace(positions=positions, ignored=tuple(sorted({*roles.ignored, *empty})))
+    return Table(
+        table.heads, columns, table.n_rows, table.line_of, faults, None, table.measured_in, None, head.maker
+    ), roles
+
+
+def _stamps(table: Table, columns: Sequence[Any], rate: float) -> Any:
+    """Times [s] from the numbers of the frames, or of the rows where frames are divided or not counted."""
+    counted = {name: columns[k] for k, name in enumerate(table.heads[: len(columns)]) if name in ("frame", "sub frame")}
+    frames, parts = counted.get("frame"), counted.get("sub frame")
+    if frames is None or (parts is not None and parts.any()):
+        return np.arange(table.n_rows) / rate
+    return (frames - frames[0]) / rate
+
+
+def _mark_zeros(heads: Sequence[str], columns: list[Any]) -> None:
+    """NaN in place of the zeros that stand for a marker or a body that was not found."""
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(heads[: len(columns)]):
+        if name[-2:] in (".x", ".y", ".z"):
+            groups.setdefault(name[:-2].removesuffix(".position"), []).append(k)
+    for name, members in groups.items():
+        lost = np.all([columns[k] == 0 for k in members], axis=0)
+        if lost.any():
+            angles = [k for k, head in enumerate(heads[: len(columns)]) if head.startswith(f"{name}.")]
+            for k in chain(members, angles):
+                columns[k] = np.where(lost, np.nan, columns[k])

@@ -1,0 +1,153 @@
+"""Movements by name, by line and by sample in JSON, NPZ and NPY."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from kineme.errors import DataError
+from kineme.files.recordings import read_recordings_from_bytes
+from kineme.movements.tables.layout import Layout
+
+T = np.arange(10) / 10
+X = np.column_stack((np.sin(T), T**2))
+SAMPLES = [{"t": t, "x": x, "y": y} for t, (x, y) in zip(T.tolist(), X.tolist(), strict=True)]
+
+
+def read(data, name, **options):
+    data = data if isinstance(data, bytes) else data.encode()
+    return read_recordings_from_bytes(data, name, Layout(**options))
+
+
+def read_json(value, **options):
+    return read(json.dumps(value), "a.json", **options)
+
+
+def npz(**arrays):
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def npy(array):
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+def where(found):
+    return [(source.place, source.label) for source in found.sources]
+
+
+def test_samples_with_names_are_a_table():
+    found = read_json(SAMPLES)
+    np.testing.assert_array_equal(found.demonstrations.times, T)
+    np.testing.assert_array_equal(found.demonstrations.positions, X)
+    assert found.demonstrations.dimensions == ("x", "y")
+    assert read_json(SAMPLES, columns="y").demonstrations.dimensions == ("y",)
+    lines = "\n".join(map(json.dumps, SAMPLES))
+    np.testing.assert_array_equal(read(lines, "a.jsonl").demonstrations.positions, X)
+
+
+def test_samples_may_carry_labels_movements_vectors_and_objects():
+    long = [one | {"demo": k // 5, "label": "wave"} for k, one in enumerate(SAMPLES)]
+    found = read_json(long)
+    assert where(found) == [("0.0", "wave"), ("1.0", "wave")]
+    nested = [{"t": one["t"], "q": [1, one["x"]], "pose": {"position": {"x": one["y"]}}} for one in SAMPLES]
+    assert read_json(nested).demonstrations.dimensions == ("q.0", "q.1", "pose.position.x")
+    assert read_json(nested, columns="q").demonstrations.dimensions == ("q.0", "q.1")
+
+
+def test_lists_and_names_of_movements():
+    assert where(read_json([SAMPLES, SAMPLES[:7]])) == [("0", None), ("1", None)]
+    assert where(read_json({"wave": SAMPLES, "nod": SAMPLES})) == [("wave", "wave"), ("nod", "nod")]
+    several = {"wave": [SAMPLES, SAMPLES], "nod": [SAMPLES]}
+    assert where(read_json(several)) == [("wave/0", "wave"), ("wave/1", "wave"), ("nod/0", "nod")]
+    counted = {"demo_0": X.tolist(), "demo_1": X[:7].tolist()}  # numbers of movements are no labels
+    assert where(read_json(counted)) == [("demo_0", None), ("demo_1", None)]
+
+
+def test_a_movement_in_each_line():
+    lines = [{"label": "wave", "times": T[:n].tolist(), "positions": X[:n].tolist()} for n in (5, 6)]
+    found = read("\n".join(map(json.dumps, lines)), "a.jsonl")
+    assert where(found) == [("0", "wave"), ("1", "wave")]
+    assert found.demonstrations.lengths.tolist() == [5, 6]
+    assert found.demonstrations.dimensions == ("x", "y")
+
+
+def test_a_missing_number_costs_its_movement_or_its_sample():
+    broken = [dict(one) for one in SAMPLES]
+    broken[3]["x"] = None
+    del broken[4]["y"]
+    with pytest.raises(DataError, match="expected finite positions"):
+        read_json(broken)
+    assert read_json(broken, skip="sample").demonstrations.lengths.tolist() == [8]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[]", "got a list"),
+        ("[1, 2, 3]", "got a list"),
+        ('"x"', "got a str"),
+        ("[[1, 2], [3]]", "differ in length"),
+        ('[{"t": 1, "x": 2}, 3]', "objects beside other values"),
+        ('{"a": {"b": 1}}', "got no entry 'positions' but"),
+        ("[[0, 1], [1, 2], [2, 3], [3, 4]]", "their step with units="),
+    ],
+)
+def test_other_json_is_refused(text, words):
+    with pytest.raises(DataError, match=words):
+        read(text, "a.json")
+
+
+def test_a_damaged_line_is_named():
+    with pytest.raises(DataError, match=r"expected JSON in line 2, got '{.t.:'"):
+        read('{"t": 1, "x": 2}\n{"t": \n', "a.jsonl")
+
+
+def test_an_npy_file_is_one_movement_or_many():
+    np.testing.assert_allclose(read(npy(X), "a.npy", units=0.1).demonstrations.times, T)
+    assert len(read(npy(np.stack((X, X))), "a.npy").demonstrations) == 2
+    assert read(npy(X), "a.npy", units=0.1, columns="y").demonstrations.dimensions == ("y",)
+    with pytest.raises(DataError, match="say their step with units="):
+        read(npy(X), "a.npy")
+    with pytest.raises(DataError, match="foreign, truncated or damaged"):
+        read(npy(X)[:-3], "a.npy")
+
+
+def test_arrays_by_name_are_movements_and_their_times_stand_beside():
+    found = read(npz(wave=X, nod=X[:7]), "a.npz")
+    assert where(found) == [("wave", "wave"), ("nod", "nod")]
+    assert found.detected[0][0].units_from == "no times: one second each"
+    found = read(npz(wave_1=X, wave_1_t=T, wave_2=X[:5], times_wave_2=2 * T[:5]), "a.npz")
+    assert where(found) == [("wave_1", None), ("wave_2", None)]
+    np.testing.assert_allclose(found.demonstrations.durations, [0.9, 0.8])
+    found = read(npz(**{"demo_0/q": X, "demo_0/t": T, "demo_1/q": X, "demo_1/t": T}), "a.npz")
+    assert where(found) == [("demo_0", None), ("demo_1", None)]
+    rated = read(npz(wave=X, fps=np.array(50)), "a.npz")
+    np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
+
+
+def test_arrays_beside_times_are_columns_and_several_vectors_must_be_chosen():
+    found = read(npz(t=T, q=X, gripper=X[:, 0]), "a.npz")
+    assert found.demonstrations.dimensions == ("q.0", "q.1", "gripper")
+    both = npz(t=T, q=X, action=X)
+    with pytest.raises(DataError, match=r"got q \(2\), action \(2\); say which with columns="):
+        read(both, "a.npz")
+    assert read(both, "a.npz", columns="action").demonstrations.dimensions == ("action.0", "action.1")
+
+
+def test_objects_are_refused_with_the_reason_and_what_to_do():
+    objects = np.empty(2, dtype=object)
+    objects[:] = [X, X[:5]]
+    for data, name in ((npz(a=objects), "a.npz"), (npy(objects), "a.npy")):
+        with pytest.raises(DataError, match=r"cannot be loaded without executing what they say; save .* under its own"):
+            read(data, name)
+
+
+def test_a_movement_that_lacks_an_array_costs_itself_alone():
+    found = read(npz(**{"a/q": X, "a/t": T, "b/q": X, "b/t": T, "c/t": T, "c/p": X}), "a.npz")
+    assert [source.place for source in found.sources] == ["a", "b"]
+    assert "c: expected an array 'q' as others have, got none" in str(found.problems[0])
