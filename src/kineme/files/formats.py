@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, Named, arrays_movements, has_known_names, parsed_arrays
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
+from kineme.files.lerobot.info import MARKER
+from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.ros.read_bag import read_bag
@@ -88,7 +90,7 @@ def _read_npy(data: bytes, layout: Layout) -> Parsed:
 def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
     return parsed_arrays(
-        demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
+        demos.positions, demos.times, Named([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
     )
 
 
@@ -120,6 +122,12 @@ FORMATS: dict[str, Format] = {
 
 #: Folders that are one source.
 DATA_SETS: tuple[DataSet, ...] = (
+    DataSet(
+        MARKER,
+        ("data",),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        Format(read_path=lerobot_movements),
+    ),
     DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
 )
 
