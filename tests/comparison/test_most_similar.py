@@ -72,3 +72,10 @@ def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):
     monkeypatch.setattr(module, "listed_distances", counted)
     np.testing.assert_array_equal(recognizer.predict(others), recognizer.classes_[expected])
     assert len(others) <= sum(pairs) <= 0.2 * len(others) * len(recognizer.classes_)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 4])
+def test_no_other_pair_may_be_in_doubt(d):
+    stored = draw_shapes([1] * 40, d=d, spread=0.0)
+    recognizer = kineme.Recognizer(classifier="nearest").fit(stored)
+    np.testing.assert_array_equal(recognizer.predict(stored), stored.labels)
