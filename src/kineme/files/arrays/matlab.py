@@ -9,7 +9,7 @@ from collections.abc import Container, Iterator
 from typing import NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import parsed_arrays
+from kineme.files.arrays.arrays import Named, parsed_arrays
 from kineme.files.arrays.mat_elements import (
     CELL,
     STRUCT,
@@ -119,8 +119,8 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
     variables = _variables(data)
     if "demos" in variables or not variables:
         demos = read_demos(data)
-        labels = [demos.name] * len(demos.times)
-        return parsed_arrays(demos.positions, demos.times, (labels, "t"), layout, ("MATLAB", "demos"))
+        named = Named([demos.name] * len(demos.times), "t")
+        return parsed_arrays(demos.positions, demos.times, named, layout, ("MATLAB", "demos"))
     try:
         tree = as_tree(variables, byte_order(data))
     except (ValueError, struct.error) as error:

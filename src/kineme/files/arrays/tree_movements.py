@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, TIMES, numbers_of, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
 from kineme.files.arrays.trees import NAMES, Found, Style, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -71,8 +71,18 @@ def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
     xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
+    odd = tuple(
+        f"movement {one.place}: {x.shape[1]} dimensions where most have {width}"
+        for one, x in zip(found, xs, strict=True)
+        if x.shape[1] != width
+    )
+    found = [one for one, x in zip(found, xs, strict=True) if x.shape[1] == width]
+    xs = [x for x in xs if x.shape[1] == width]
     labels = [one.label for one in found]
-    return parsed_arrays(xs, None, (labels, TIMES[0]), layout, (kind, "keyed"), [one.place for one in found])
+    return parsed_arrays(
+        xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed")
+    )._replace(left_out=odd)
 
 
 def _plainly_named(one: Found) -> Found:
