@@ -10,7 +10,6 @@ import pytest
 import kineme
 from kineme.files.recordings import read_recording
 from kineme.files.write_movement import write_movement
-from kineme.primitives.generation.figure import draw_movement
 
 
 def run(*arguments, by=commands.run, **options):
@@ -81,16 +80,6 @@ def test_any_number_of_dimensions(tmp_path, d):
     assert done.returncode == 0, done.stderr
     made = np.array(json.loads((tmp_path / "b.json").read_text())["positions"])
     np.testing.assert_allclose(made[-1], np.arange(1, d + 1), rtol=0.01)
-
-
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_the_picture_says_which_line_is_generated(d):
-    made = kineme.DMP().learn([np.linspace(0, 1, 50)[:, None] ** np.arange(1, d + 1)])
-    replay = made.rollout()
-    figure = draw_movement(made, {"times": replay.times[0], "positions": replay.positions[0]}, None)
-    legends = [legend for part in (figure, *figure.subfigs) for legend in part.legends]
-    assert [text.get_text() for text in legends[0].get_texts()][:2] == ["as demonstrated", "generated"]
-    assert len(legends) == 1
 
 
 @pytest.mark.parametrize(
