@@ -23,9 +23,11 @@ SUBJECTS = (
     "open_set",
     "defaults",
     "library",
+    "lerobot",
     "binning",
     "anchoring",
     "by_person",
+    "nested",
 )
 
 

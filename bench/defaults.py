@@ -33,9 +33,10 @@ BENT = Perturbation(rotation=math.radians(40), warp=0.8, noise=0.1)
 
 #: Name -> width of an SVM's kernels in widths of the nearest's, parameters of `Recognizer`.
 MANY: dict[str, tuple[float, dict[str, Any]]] = {
-    "1-NN, default weights": (2.0, {}),
-    "1-NN, equal weights": (2.0, {"weights": "equal"}),
-    "1-NN, fitted weights": (2.0, {"weights": "fitted"}),
+    "nearest of each representation": (2.0, {}),
+    "the same, equal weights": (2.0, {"weights": "equal"}),
+    "the same, fitted weights": (2.0, {"weights": "fitted"}),
+    "1-NN": (2.0, {"classifier": "nearest"}),
     "SVM, kernels of 1-NN": (1.0, {"classifier": "svm"}),
     "SVM, kernels twice as wide": (2.0, {"classifier": "svm"}),
 }

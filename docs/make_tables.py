@@ -58,7 +58,14 @@ DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
 
 def tables() -> dict[str, str]:
     """Name of each table -> its lines."""
-    return {"defaults": _defaults(), "many": _many(), "people": _people(), "lasa": _lasa(), "open-set": _open_set()}
+    return {
+        "defaults": _defaults(),
+        "many": _many(),
+        "nested": _nested(),
+        "people": _people(),
+        "lasa": _lasa(),
+        "open-set": _open_set(),
+    }
 
 
 def filled(page: str) -> str:
@@ -92,6 +99,24 @@ def _many() -> str:
     names = [name.removeprefix("many shown: ") for name in measured if name.startswith("many shown")]
     lines = ["| twelve demonstrations of each shape, bent copies of four recordings | accuracy |", "|---|---|"]
     return "\n".join([*lines, *(f"| {name} | {measured[f'many shown: {name}']:.3f} |" for name in names)])
+
+
+def _nested() -> str:
+    rows = json.loads((RESULTS / "nested.json").read_text(encoding="utf-8"))["rows"]
+    lines = [
+        "| set left out | weights | width | k, plane / space | band | accuracy | the defaults | best in hindsight |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        (chosen, count), *others = row["details"]["chosen"]
+        weights, k = ", ".join(map("{:g}".format, chosen["weights"])), " / ".join(map(str, chosen["concentrations"]))
+        often = f" ({count} of {count + sum(one[1] for one in others)} people)" if others else ""
+        best = row["details"]["best in hindsight"]["accuracy"]
+        lines.append(
+            f"| {row['what']} | {weights}{often} | {chosen['share']:g} | {k} | {chosen['band']} | {row['ours']:.3f} "
+            f"| {row['peer']:.3f} | {best:.3f} |"
+        )
+    return "\n".join(lines)
 
 
 def _evaluated(name: str) -> dict[str, Any]:

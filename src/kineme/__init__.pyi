@@ -3,6 +3,7 @@
 # Movements
 from kineme.movements.trajectories.trajectory import Trajectory as Trajectory
 from kineme.movements.trajectories.demonstrations import Demonstrations as Demonstrations
+from kineme.movements.channels.channel import Channel as Channel
 from kineme.movements.trajectories.movements_like import MovementLike as MovementLike
 from kineme.movements.trajectories.movements_like import MovementsLike as MovementsLike
 from kineme.movements.preparation.preprocess import preprocess as preprocess

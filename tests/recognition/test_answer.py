@@ -59,7 +59,7 @@ def test_what_is_not_taken_out_is_not_in_the_transform():
     np.testing.assert_array_equal(transform.shift, 0)
 
 
-@pytest.mark.parametrize("classifier", ["nearest", "prototype", "svm"])
+@pytest.mark.parametrize("classifier", ["nearest", "nearest-each", "prototype", "svm"])
 def test_many_at_once_are_each_alone(classifier):
     shapes = draw_shapes([4] * 5, seed=4)
     lasting = [np.linspace(0.0, 1.0 + 0.1 * i, len(one)) for i, one in enumerate(shapes)]

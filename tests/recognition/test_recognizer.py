@@ -97,6 +97,25 @@ def test_nearest_is_one_nearest_neighbor_on_the_similarity():
     np.testing.assert_array_equal(recognizer.predict(fresh), neighbor.predict(-recognizer.log_similarity(fresh)))
 
 
+@pytest.mark.parametrize("mean", ["arithmetic", "geometric"])
+def test_nearest_of_each_representation_may_be_another_demonstration(mean):
+    demos, fresh = draw_shapes([3] * 6, seed=2, spread=0.6), draw_shapes([9] * 6, seed=2, spread=0.9)
+    recognizer = Recognizer(classifier="nearest-each", mean=mean).fit(demos)
+    logs = recognizer.comparison_.similarity.logs(recognizer.describe(fresh), recognizer.references_.described)
+    nearest = logs.reshape(5, -1, 6, 3).max(axis=3)
+    expected = np.log(np.exp(nearest).mean(axis=0)) if mean == "arithmetic" else nearest.mean(axis=0)
+    np.testing.assert_allclose(recognizer.decision_function(fresh), expected, rtol=1e-6)
+    alone = Recognizer(classifier="nearest", mean=mean).fit(demos).decision_function(fresh)
+    assert (expected >= alone - 1e-5).all()
+    assert (expected > alone + 1e-3).any()
+
+
+def test_nearest_of_each_representation_is_the_nearest_of_one_demonstration():
+    demos, fresh = draw_shapes([1] * 6, seed=2, spread=0.6), draw_shapes([9] * 6, seed=2, spread=0.9)
+    each, one = (Recognizer(classifier=name).fit(demos) for name in ("nearest-each", "nearest"))
+    np.testing.assert_allclose(each.decision_function(fresh), one.decision_function(fresh), rtol=1e-12)
+
+
 def test_svm_is_scikit_learns_on_the_precomputed_similarity():
     demos, fresh = draw_shapes([8] * 4, seed=2, spread=0.6), draw_shapes([9] * 4, seed=2, spread=0.9)
     recognizer = Recognizer(classifier="svm").fit(demos)
@@ -118,11 +137,11 @@ def test_prototype_is_the_demonstration_most_like_its_class():
 
 
 @pytest.mark.parametrize("counts", [[1, 1], [8, 9], [30, 30]])
-def test_auto_takes_the_nearest(counts):
-    assert type(Recognizer().fit(draw_shapes(counts)).classifier_).__name__ == "Nearest"
+def test_auto_takes_the_nearest_of_each_representation(counts):
+    assert type(Recognizer().fit(draw_shapes(counts)).classifier_).__name__ == "NearestEach"
 
 
-@pytest.mark.parametrize("classifier", ["nearest", "prototype", "svm"])
+@pytest.mark.parametrize("classifier", ["nearest", "nearest-each", "prototype", "svm"])
 def test_tiles_give_what_one_block_gives(classifier, monkeypatch):
     demos = draw_shapes([3] * 3)
     recognizer = Recognizer(classifier=classifier).fit(demos)
@@ -134,7 +153,7 @@ def test_tiles_give_what_one_block_gives(classifier, monkeypatch):
     assert [one.label for one in recognizer.recognize(demos)] == labels
 
 
-@pytest.mark.parametrize("classifier", ["nearest", "prototype", "svm"])
+@pytest.mark.parametrize("classifier", ["nearest", "nearest-each", "prototype", "svm"])
 @pytest.mark.parametrize("n_classes", [2, 4])
 def test_probabilities_sum_to_one_and_agree_with_the_label(classifier, n_classes):
     demos = draw_shapes([3] * n_classes)
@@ -220,6 +239,8 @@ def test_labels_that_are_missing_or_too_few():
     ("wrong", "words"),
     [
         ({"mean": "median"}, "mean to be one of .*'arithmetic'.*got 'median'"),
+        ({"max_angle": 0.5, "rotation_prior": RotationPrior(vertical=(0, 0, 1))}, "max_angle or rotation_prior, got"),
+        ({"max_angle": 0.0, "rotation_prior": RotationPrior(0.3)}, "max_angle=0.0 and RotationPrior.*leave one out"),
         ({"classifier": "forest"}, "classifier to be one of .*'auto'.*got 'forest'"),
         ({"scale": "area"}, "scale to be one of .*'path'.*got 'area'"),
         ({"cutoff": 0.0}, "cutoff to be a number above 0, got 0.0"),

@@ -36,7 +36,7 @@ def test_of_two_classes_the_decision_is_one_number_positive_for_the_second(class
 
 
 @pytest.mark.parametrize("n_classes", [1, 3, 4])
-@pytest.mark.parametrize("classifier", ["nearest", "prototype"])
+@pytest.mark.parametrize("classifier", ["nearest", "nearest-each", "prototype"])
 def test_of_one_class_and_of_three_the_decision_has_a_column_for_each(n_classes, classifier):
     demos = draw_shapes([3] * n_classes)
     recognizer = Recognizer(classifier=classifier).fit(demos)

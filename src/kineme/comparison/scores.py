@@ -65,6 +65,12 @@ class Compared:
         """Log similarity to the nearest reference of each class, (n, C)."""
         return np.asarray(np.maximum.reduceat(self.log_average, self.references.first, axis=1))
 
+    @cached_property
+    def nearest_each(self) -> Array:
+        """Log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
+        each = np.maximum.reduceat(self.logs, self.references.first, axis=2)
+        return LOG_MEANS[self.comparison.mean](each)
+
     def shares(self, chosen: NDArray[np.intp]) -> Array:
         """Share of each representation in the similarity to one chosen (n,) reference each, (R, n)."""
         return SHARES[self.comparison.mean](self.logs[:, np.arange(len(self)), chosen])
@@ -84,22 +90,35 @@ def score(
     """Scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
     found = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
 
-    def fill(start: int, stop: int, described: Described) -> None:
-        compared = Compared(comparison, references, described)
+    def fill(start: int, compared: Compared) -> None:
         for array, by in zip(found, scores, strict=True):
-            array[start:stop] = by(compared)
+            array[start : start + len(compared)] = by(compared)
 
     if isinstance(movements, Described):
         whole = movements
-        for_tiles(lambda a, b: fill(a, b, whole.take(slice(a, b))), len(whole), tile_rows(references))
-    else:
-        for_described(
-            movements,
-            comparison,
-            comparison.procrustes,
-            lambda tile: fill(tile.start, tile.stop, tile.described),
+        for_tiles(
+            lambda a, b: fill(a, Compared(comparison, references, whole.take(slice(a, b)))),
+            len(whole),
             tile_rows(references),
         )
+    else:
+        for_compared(comparison, references, movements, lambda tile, compared: fill(tile.start, compared))
+    return found
+
+
+def best_classes(
+    comparison: Comparison,
+    references: References,
+    movements: Demonstrations,
+    best: Callable[[Compared], NDArray[np.intp]],
+) -> NDArray[np.intp]:
+    """Index (n,) of the class of each movement, as the function finds them tile by tile."""
+    found = np.empty(len(movements), np.intp)
+
+    def fill(tile: Tile, compared: Compared) -> None:
+        found[tile.start : tile.stop] = best(compared)
+
+    for_compared(comparison, references, movements, fill)
     return found
 
 

@@ -12,6 +12,8 @@ from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
 from kineme.files.contents import Contents
+from kineme.files.lerobot.info import MARKER
+from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.ros.bag_contents import bag_contents
@@ -126,7 +128,15 @@ FORMATS: dict[str, Format] = {
 }
 
 #: Folders that are one source.
-DATA_SETS: tuple[DataSet, ...] = (DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG),)
+DATA_SETS: tuple[DataSet, ...] = (
+    DataSet(
+        MARKER,
+        ("data",),
+        ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
+        Format(read_path=lerobot_movements),
+    ),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG),
+)
 
 
 def data_set_of(folder: Path) -> DataSet | None:

@@ -23,7 +23,7 @@ LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activ
 _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
-_BESIDE_COUNTERS = frozenset({"sub", "task", "number", "nr", "no", "id"})
+_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
