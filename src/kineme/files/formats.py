@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, Named, arrays_movements, has_known_names, parsed_arrays
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import read_demos
 from kineme.files.arrays.npz import Npz, array_of_npy
@@ -95,7 +95,7 @@ def _read_npy(data: bytes, layout: Layout) -> Parsed:
 def _read_matlab(data: bytes, layout: Layout) -> Parsed:
     demos = read_demos(data)
     return parsed_arrays(
-        demos.positions, demos.times, ([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
+        demos.positions, demos.times, Named([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import POSITIONS, TIMES, numbers_of, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
 from kineme.files.arrays.trees import Found, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
@@ -71,7 +71,7 @@ def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
     labels = [one.label for one in found]
-    return parsed_arrays(xs, None, (labels, TIMES[0]), layout, (kind, "keyed"), [one.place for one in found])
+    return parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
 
 
 def _plainly_named(one: Found) -> Found:
