@@ -63,7 +63,7 @@ def test_a_topic_of_ros_1(bag):
     read = read_recordings(bag, topic="/joint_states")
     (movement,) = read.demonstrations
     k = np.arange(200)
-    np.testing.assert_allclose(movement.positions, np.column_stack((np.sin(k / 20), k / 100)), atol=1e-15)
+    np.testing.assert_allclose(movement.recorded, np.column_stack((np.sin(k / 20), k / 100)), atol=1e-15)
     np.testing.assert_allclose(movement.times, 1.7e9 + 250e-9 + k / 100, rtol=0, atol=5e-7)
     assert read.detected[0][0].time == "header.stamp"
     assert read.problems == ()
@@ -74,12 +74,12 @@ def test_frames_of_ros_1(bag):
     k = np.arange(200)
     x = k / 100 + 0.1 * np.cos(k / 200)
     expected = np.column_stack((x, 0.1 * np.sin(k / 200), 0 * k, 0 * k, 0 * k, np.sin(k / 400), np.cos(k / 400)))
-    np.testing.assert_allclose(movement.positions, expected, atol=1e-12)
+    np.testing.assert_allclose(movement.recorded, expected, atol=1e-12)
 
 
 def test_a_plan_of_ros_1(bag):
     (movement,) = read_recordings(bag, topic="/plan").demonstrations
-    np.testing.assert_array_equal(movement.positions, np.arange(200)[:, None] * [1, -1])
+    np.testing.assert_array_equal(movement.recorded, np.arange(200)[:, None] * [1, -1])
     np.testing.assert_allclose(movement.times, np.arange(200) / 50, atol=1e-8)
 
 
@@ -131,7 +131,7 @@ def test_an_mcap_by_the_package_mcap(tmp_path, compression, name):
     pytest.importorskip("mcap")
     path = write_mcap(tmp_path / "a.mcap", poses(name), compression=compressions()[compression], chunk_size=500)
     read = read_recordings(path)
-    np.testing.assert_array_equal(read.demonstrations[0].positions, pose_rows())
+    np.testing.assert_array_equal(read.demonstrations[0].recorded, pose_rows())
     assert read.detected[0][0].format == "MCAP"
 
 
@@ -142,7 +142,7 @@ def test_an_mcap_without_an_index(tmp_path):
     unindexed = {"use_chunking": False, "use_statistics": False, "use_summary_offsets": False}
     unindexed |= {"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False}
     path = write_mcap(tmp_path / "a.mcap", poses(), **unindexed)
-    np.testing.assert_array_equal(read_recordings(path).demonstrations[0].positions, pose_rows())
+    np.testing.assert_array_equal(read_recordings(path).demonstrations[0].recorded, pose_rows())
     messages = poses()
     messages[20], messages[30] = messages[30], messages[20]
     path = write_mcap(tmp_path / "b.mcap", messages, **unindexed)
@@ -154,7 +154,7 @@ def test_an_mcap_whose_messages_are_not_in_order(tmp_path):
     messages = poses()
     messages[20], messages[30] = messages[30], messages[20]
     read = read_recordings(write_mcap(tmp_path / "a.mcap", messages, chunk_size=500))
-    np.testing.assert_array_equal(read.demonstrations[0].positions, pose_rows())
+    np.testing.assert_array_equal(read.demonstrations[0].recorded, pose_rows())
 
 
 def test_an_mcap_of_another_robot_system_is_named(tmp_path):

@@ -65,7 +65,7 @@ def test_damage_on_the_way_costs_the_movement_or_what_comes_after(tmp_path, kind
     read = read_recordings(path, skip="sample")
     (movement,) = read.demonstrations
     assert 1000 < len(movement) < 5000
-    np.testing.assert_array_equal(movement.positions[:1000, 0], range(1000))
+    np.testing.assert_array_equal(movement.recorded[:1000, 0], range(1000))
     assert read.problems
 
 
@@ -97,7 +97,7 @@ def test_padding_behind_a_message_is_no_damage(tmp_path):
         raw = bytes(store("mcap").serialize_cdr(message, message.__msgtype__)) + b"\xde\xad\xbe\xef" * 3
         messages.append(("/tool", ns, (message.__msgtype__, raw)))
     read = read_recordings(write_bag(tmp_path, "mcap", messages))
-    np.testing.assert_array_equal(read.demonstrations[0].positions, pose_rows())
+    np.testing.assert_array_equal(read.demonstrations[0].recorded, pose_rows())
 
 
 @pytest.mark.parametrize("ending", [".bag", ".mcap", ".db3"])

@@ -78,7 +78,7 @@ class Inspection(NamedTuple):
 
 def nothing_read(file: str, reason: str) -> Inspection:
     """The inspection of a file of which no movement is read."""
-    return Inspection(0, 0, 0, (), (), (), (Problem(file, None, reason),), ())
+    return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
 
 
 def inspect(recordings: Recordings) -> Inspection:
