@@ -12,10 +12,12 @@ from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import mat_movements
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
+from kineme.files.contents import Contents
 from kineme.files.lerobot.info import MARKER
 from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
+from kineme.files.ros.bag_contents import bag_contents
 from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
@@ -35,11 +37,14 @@ class Format(NamedTuple):
     read_bytes, read_path : callable or None
     label_is_stem : bool
         Whether the name of the file is the label of its movements.
+    contents : callable, optional
+        What a file holds besides what is read of it, for formats that hold more than one recording.
     """
 
     read_bytes: Callable[[bytes, Layout], Parsed] | None = None
     read_path: Callable[[Path, Layout], Parsed] | None = None
     label_is_stem: bool = False
+    contents: Callable[[Path], list[Contents]] | None = None
 
 
 class DataSet(NamedTuple):
@@ -96,6 +101,8 @@ def _read_c3d(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_c3d_table(data, layout), layout, "C3D")
 
 
+_BAG = Format(read_path=read_bag, contents=bag_contents)
+
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
 FORMATS: dict[str, Format] = {
     ".csv": Format(_read_text),
@@ -111,9 +118,9 @@ FORMATS: dict[str, Format] = {
     ".hdf5": Format(read_path=hdf5_movements),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
-    ".bag": Format(read_path=read_bag),
-    ".db3": Format(read_path=read_bag),
-    ".mcap": Format(read_path=read_bag),
+    ".bag": _BAG,
+    ".db3": _BAG,
+    ".mcap": _BAG,
 }
 
 #: Folders that are one source.
@@ -124,7 +131,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
         Format(read_path=lerobot_movements),
     ),
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG),
 )
 
 
