@@ -44,6 +44,7 @@ from kineme.comparison.representation import Representation as Representation
 from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early
+from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring

@@ -78,6 +78,12 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
 )  # fmt: skip
 
 
+#: Names of the parameters that `layout_options` adds.
+LAYOUT_OPTIONS = (
+    "time", "columns", "movement", "label_column", "units", "skip", "kinds", "topic", "frame", "follow_links",
+)  # fmt: skip
+
+
 def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options for the roles of a table's columns; by default the roles are detected."""
     for option in reversed(_OPTIONS):

@@ -30,7 +30,7 @@ _SLOW = 0.2  # share of the mean speed of a window below which it rests
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
 
 
-class Known(NamedTuple):
+class Templates(NamedTuple):
     """What windows are compared with."""
 
     comparison: Comparison
@@ -118,7 +118,7 @@ def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
     return np.log(np.maximum(size, np.finfo(float).tiny)), slow
 
 
-def compare_windows(known: Known, motion: Motion, rows: Rows) -> ComparedWindows:
+def compare_windows(known: Templates, motion: Motion, rows: Rows) -> ComparedWindows:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
     start, end = motion.times[rows].T
     scores = np.empty((len(rows), len(known.references.classes)))

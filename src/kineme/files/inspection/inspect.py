@@ -12,6 +12,7 @@ from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
 from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -73,6 +74,11 @@ class Inspection(NamedTuple):
     duplicates: tuple[tuple[str, ...], ...]
     problems: tuple[Problem, ...]
     notes: tuple[str, ...]
+
+
+def nothing_read(file: str, reason: str) -> Inspection:
+    """The inspection of a file of which no movement is read."""
+    return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
 
 
 def inspect(recordings: Recordings) -> Inspection:
@@ -154,8 +160,8 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
     """Columns whose values do not fit their kind."""
     notes = []
-    for k, one in enumerate(() if demos.channels is None or demos.recorded is not None else demos.channels):
-        values = demos.positions[:, k]
+    for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
+        values = demos.recorded[:, columns.start]
         if one.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
             notes.append(f"{one.name} is 0 or 1 throughout; if it is a switch, say --kind {one.name}=discrete")
     return notes

@@ -11,6 +11,8 @@ from kineme.movements.rotations.quaternions import conjugate, product
 from kineme.movements.rotations.rotation_vectors import log
 from kineme.validation import Array
 
+_ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
+
 
 def columns_of(channels: Channels) -> list[slice]:
     """The columns of each channel."""
@@ -70,7 +72,9 @@ def _continuous(q: Array, offsets: NDArray[np.intp]) -> Array:
     flips = np.concatenate(([False], (q[1:] * q[:-1]).sum(axis=1) < 0))
     odd = np.logical_xor.accumulate(flips)
     odd ^= np.repeat(odd[offsets[:-1]], np.diff(offsets))
-    return np.asarray(np.where(odd[:, None], -q, q) / np.linalg.norm(q, axis=1, keepdims=True))
+    norms = np.linalg.norm(q, axis=1, keepdims=True)
+    norms[np.abs(norms - 1.0) < _ROUNDING] = 1.0  # every bit as recorded
+    return np.asarray(np.where(odd[:, None], -q, q) / norms)
 
 
 def _integrated(q: Array, offsets: NDArray[np.intp]) -> Array:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kineme.movements.channels.channel import learned_names
+from kineme.movements.channels.channel import is_plain, learned_names
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.table import Segmenter
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -69,7 +69,7 @@ def pieces_of(recording: Trajectory, rows: Rows) -> Demonstrations:
     )
     if (channels := recording.channels) is None:
         return pieces
-    recorded = None if (columns := recording.recorded) is None else np.concatenate([columns[one] for one in whole])
+    recorded = None if is_plain(channels) else np.concatenate([recording.recorded[one] for one in whole])
     known = replace(pieces.movements, dimensions=learned_names(channels), channels=channels, recorded=recorded)
     return Demonstrations.of_movements(known)
 

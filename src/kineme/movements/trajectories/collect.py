@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels, learned_names
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
@@ -60,8 +60,7 @@ def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, A
     channels = trajectories[0].channels if trajectories else None
     if channels is None or any(one.channels != channels for one in trajectories):
         return None, None
-    blocks = [one.recorded for one in trajectories if one.recorded is not None]
-    return channels, np.concatenate(blocks) if len(blocks) == len(trajectories) else None
+    return channels, None if is_plain(channels) else np.concatenate([one.recorded for one in trajectories])
 
 
 def collect_arrays(

@@ -202,12 +202,12 @@ class Demonstrations(Sequence[Trajectory]):
         return self.movements.channels
 
     @property
-    def recorded(self) -> Array | None:
-        """The columns of the `channels`, shape (total, columns), where the positions do not say all; else None.
+    def recorded(self) -> Array:
+        """The columns of the `channels` as recorded, shape (total, columns); without channels the `positions`.
 
         Orientations are quaternions of norm 1 in the order of the file, whose signs do not jump.
         """
-        return self.movements.recorded
+        return self.positions if self.movements.recorded is None else self.movements.recorded
 
     @property
     def times(self) -> Array:
@@ -262,7 +262,7 @@ class Demonstrations(Sequence[Trajectory]):
         object.__setattr__(one, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
         object.__setattr__(one, "name", None if self.names is None else self.names[i])
         object.__setattr__(one, "channels", self.channels)
-        object.__setattr__(one, "recorded", None if self.recorded is None else self.recorded[rows])
+        object.__setattr__(one, "recorded", self.recorded[rows])
         return one
 
     def __repr__(self) -> str:

@@ -31,9 +31,9 @@ class Trajectory:
     ----------
     channels : tuple of Channel or None
         What the columns of its recording are, where that is known; see `kineme.read_recordings`.
-    recorded : ndarray of shape (T, columns) or None
-        The columns of the channels, where the positions do not say all: orientations are quaternions, and discrete
-        channels are there.
+    recorded : ndarray of shape (T, columns)
+        The columns of the channels as recorded, where orientations are quaternions and discrete channels are there;
+        without channels the positions.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Trajectory:
     label: Any = None
     name: str | None = None
     channels: Channels | None = field(default=None, init=False)
-    recorded: Array | None = field(default=None, init=False)
+    recorded: Array = field(init=False)
 
     def __post_init__(self) -> None:
         if getattr(self.name, "__hash__", None) is None:
@@ -68,6 +68,7 @@ class Trajectory:
             own = values.copy()
             own.setflags(write=False)
             object.__setattr__(self, name, own)
+        object.__setattr__(self, "recorded", self.positions)
 
     @property
     def duration(self) -> float:
