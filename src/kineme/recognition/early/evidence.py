@@ -131,7 +131,8 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     similar = _POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
     log_counts = np.log(counts)
     over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
-    best = np.array([at + int(part.argmax()) for at, part in zip(stored.first, np.split(similar, stored.first[1:]))])
+    parts = np.split(similar, stored.first[1:])
+    best = stored.first + np.array([part.argmax() for part in parts])
     shares = similar[best] - np.logaddexp.reduce(similar[best])
     at = best * G + G - 1
     evidence[at] = np.logaddexp(evidence[at], over + shares + log_counts + math.log(G / EXPLAINING))
