@@ -321,8 +321,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         -------
         list of Spotted
             ``(start, end, label, confidence, p_known)`` in order of time; label None is motion of no known class.
-            `confidence` and `p_known` are those of an `Answer`. Rests are left out. Without time stamps in fit, movements are looked for between a quarter of the typical stretch between
-            rests and four times it.
+            `confidence` and `p_known` are those of an `Answer`. Rests are left out. Without time stamps in fit,
+            movements are looked for between a quarter of the typical stretch between rests and four times it.
         """
         from kineme.recognition.spotting import spot
 
