@@ -23,6 +23,7 @@ SUBJECTS = (
     "open_set",
     "defaults",
     "library",
+    "lerobot",
     "binning",
     "anchoring",
     "by_person",

@@ -11,7 +11,7 @@ from importlib import import_module, invalidate_caches
 import numpy as np
 import pytest
 
-from kineme.runtime.compiled import jit
+from kineme.runtime.compiled import jit, tell_when_compiling
 
 THREADS = """
 import sys, threading, time, traceback
@@ -219,3 +219,40 @@ def test_machine_code_that_cannot_be_kept_works(doubled, tmp_path, monkeypatch):
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
     assert doubles(doubled("one"), np.float64)
     assert not files(tmp_path, "nbc")
+
+
+def test_compiling_is_told_once_and_only_where_nothing_is_on_disk(doubled):
+    told = []
+    tell_when_compiling(lambda: told.append("compiling"))
+    assert doubles(doubled("one"), np.float64)
+    assert told == ["compiling"]
+    assert doubles(doubled("one"), np.float32)  # other arguments, the same process
+    assert told == ["compiling"]
+    tell_when_compiling(lambda: told.append("again"))
+    assert doubles(doubled("one"), np.float64).cache_hits
+    assert told == ["compiling"]
+    tell_when_compiling(lambda: None)
+
+
+def test_what_was_warmed_up_compiles_nothing_more():
+    code = """
+import numpy as np
+import kineme
+from kineme.runtime import compiled
+from kineme.recognition.warm_up import warm_up
+
+def versions():
+    functions = [one for module in compiled._modules.values() for one in vars(module).values()]
+    return sum(len(one.signatures) for one in functions if hasattr(one, "signatures"))
+
+warm_up([2])
+before = versions()
+movements = kineme.load_lasa(["CShape", "GShape", "Line", "Spoon"])
+recognizer = kineme.Recognizer().fit(movements)
+recognizer.recognize(movements), recognizer.recognize(movements[0])
+recognizer.predict_partial(movements[:3]), recognizer.spot(movements[0])
+print(before > 10, versions() - before)
+"""
+    environment = {**os.environ, "KINEME_COMPILED": "auto"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert done.stdout.split() == ["True", "0"]

@@ -3,6 +3,7 @@
 # Movements
 from kineme.movements.trajectories.trajectory import Trajectory as Trajectory
 from kineme.movements.trajectories.demonstrations import Demonstrations as Demonstrations
+from kineme.movements.channels.channel import Channel as Channel
 from kineme.movements.trajectories.movements_like import MovementLike as MovementLike
 from kineme.movements.trajectories.movements_like import MovementsLike as MovementsLike
 from kineme.movements.preparation.preprocess import preprocess as preprocess
@@ -43,6 +44,7 @@ from kineme.comparison.representation import Representation as Representation
 from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early
+from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring

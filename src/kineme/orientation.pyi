@@ -9,14 +9,14 @@ from kineme.primitives.pose.tangent import to_tangent as to_tangent
 from kineme.primitives.pose.tangent import from_tangent as from_tangent
 
 # Quaternions (w, x, y, z)
-from kineme.primitives.pose.quaternions import normalized as normalized
-from kineme.primitives.pose.quaternions import continuous as continuous
-from kineme.primitives.pose.quaternions import product as product
-from kineme.primitives.pose.quaternions import conjugate as conjugate
-from kineme.primitives.pose.quaternions import angle_between as angle_between
-from kineme.primitives.pose.rotation_vectors import exp as exp
-from kineme.primitives.pose.rotation_vectors import log as log
-from kineme.primitives.pose.rotation_vectors import slerp as slerp
+from kineme.movements.rotations.quaternions import normalized as normalized
+from kineme.movements.rotations.quaternions import continuous as continuous
+from kineme.movements.rotations.quaternions import product as product
+from kineme.movements.rotations.quaternions import conjugate as conjugate
+from kineme.movements.rotations.quaternions import angle_between as angle_between
+from kineme.movements.rotations.rotation_vectors import exp as exp
+from kineme.movements.rotations.rotation_vectors import log as log
+from kineme.movements.rotations.rotation_vectors import slerp as slerp
 from kineme.primitives.pose.rates import angular_velocity as angular_velocity
 from kineme.primitives.pose.rates import angular_acceleration as angular_acceleration
 from kineme.primitives.pose.rates import rotation_vector_rate as rotation_vector_rate

@@ -1,5 +1,6 @@
 """The command line as a user meets it."""
 
+import io
 import json
 import os
 import subprocess
@@ -8,6 +9,8 @@ import sys
 import pytest
 
 import kineme
+from kineme.cli.main import main
+from kineme.runtime import compiled
 
 
 def run(*arguments):
@@ -28,6 +31,22 @@ def test_an_unknown_command_is_refused():
     done = run("dance")
     assert done.returncode == 2
     assert "dance" in done.stderr
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_is_told_that_functions_are_compiled(monkeypatch, terminal):
+    class Stream(io.StringIO):
+        def isatty(self):
+            return terminal
+
+    told = Stream()
+    monkeypatch.setattr(sys, "stderr", told)
+    monkeypatch.setattr(compiled, "_tell", [])
+    with pytest.raises(SystemExit):
+        main(["inspect", "--help"])
+    compiled._compiling()
+    compiled._compiling()
+    assert told.getvalue() == ("compiling for this machine, once: about 20 s\n" if terminal else "")
 
 
 def test_an_error_is_one_line_and_says_nothing_to_the_terminal(tmp_path):

@@ -55,9 +55,9 @@ def test_transforms_are_composed_along_the_tree(tmp_path, kind):
     }
     for frame, poses in expected.items():
         movement, how, problems = only(path, frame)
-        np.testing.assert_allclose(matrices(movement.positions), poses, atol=1e-12)
-        np.testing.assert_allclose(np.linalg.norm(movement.positions[:, 3:], axis=1), 1.0, atol=1e-12)
-        assert (np.sum(movement.positions[1:, 3:] * movement.positions[:-1, 3:], axis=1) > 0).all()
+        np.testing.assert_allclose(matrices(movement.recorded), poses, atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(movement.recorded[:, 3:], axis=1), 1.0, atol=1e-12)
+        assert (np.sum(movement.recorded[1:, 3:] * movement.recorded[:-1, 3:], axis=1) > 0).all()
         assert how.layout == f"frames {frame.removeprefix('/')}"
         assert (how.time, how.units_from) == ("header.stamp", "stamps of headers")
         assert problems == []
@@ -79,7 +79,7 @@ def test_transforms_at_other_rates_are_interpolated_on_the_sphere(tmp_path, kind
             messages.append(tf(m, ns, ("arm", "hand", slow[k]), late=1))  # repeated, as some nodes do
     movement, _, problems = only(write_bag(tmp_path, kind, messages), "base:hand")
     assert problems == []
-    np.testing.assert_allclose(matrices(movement.positions), (matrices(arm) @ matrices(slow))[1:], atol=1e-9)
+    np.testing.assert_allclose(matrices(movement.recorded), (matrices(arm) @ matrices(slow))[1:], atol=1e-9)
 
 
 def test_interpolation_is_that_of_scipy():
@@ -101,7 +101,7 @@ def test_a_bag_with_one_transform_needs_no_frames(tmp_path):
     path = write_bag(tmp_path, "mcap", messages)
     for options in ({}, {"topic": "/tf"}):
         movement, how, _ = only(path, **options)
-        np.testing.assert_allclose(movement.positions, rows, atol=1e-12)
+        np.testing.assert_allclose(movement.recorded, rows, atol=1e-12)
         assert how.layout == "frames world:hand"
 
 
@@ -114,8 +114,8 @@ def test_frames_and_topics_are_put_side_by_side(tmp_path):
     assert how.columns[0] == "world:base.position.x"
     assert how.columns[7] == "base:hand.position.x"
     assert how.columns[14] == "grip"
-    np.testing.assert_allclose(movement.positions[:, :7], base, atol=1e-12)
-    np.testing.assert_allclose(movement.positions[:, 14], range(60), atol=1e-6)
+    np.testing.assert_allclose(movement.recorded[:, :7], base, atol=1e-12)
+    np.testing.assert_allclose(movement.recorded[:, 14], range(60), atol=1e-6)
     with pytest.raises(
         kineme.DataError, match=r"got /joints .*, /tf .*; the pose of one frame .* --frame parent:child"
     ):
@@ -152,7 +152,7 @@ def test_two_clocks_in_transforms(tmp_path):
         stamped = m.transform_stamped(ns - (3600 * SECOND if k > 20 else 0), "world", "hand", row)
         messages.append(("/tf", ns, m.tf(stamped)))
     movement, how, problems = only(write_bag(tmp_path, "mcap", messages), "world:hand")
-    np.testing.assert_allclose(movement.positions, rows, atol=1e-12)
+    np.testing.assert_allclose(movement.recorded, rows, atol=1e-12)
     np.testing.assert_allclose(movement.times, np.array(stamps()) / SECOND, rtol=0, atol=3e-7)
     assert how.time == "recorded"
     assert "the stamp in the header of message 21 of transform world:hand is earlier" in how.units_from
@@ -165,7 +165,7 @@ def test_rotations_that_are_none_and_other_parents_are_named(tmp_path):
     messages = [tf(m, ns, ("world", "hand", row)) for ns, row in zip(stamps(), rows, strict=True)]
     messages.append(tf(m, START + 1, ("cup", "hand", rows[0]), late=SECOND))
     movement, _, problems = only(write_bag(tmp_path, "mcap", messages), "world:hand")
-    np.testing.assert_allclose(movement.positions, np.delete(rows, 5, axis=0), atol=1e-12)
+    np.testing.assert_allclose(movement.recorded, np.delete(rows, 5, axis=0), atol=1e-12)
     assert problems == [
         "transform world:hand: expected rotations of norm 1, got 0 in 1 transform",
         "frame 'hand': 1 transform from another parent, 'cup'",

@@ -31,7 +31,7 @@ def test_the_only_topic_that_can_be_read_is_read(tmp_path, kind, compress):
     messages += [("/chat", START, m.string("hello")), ("/empty", "sensor_msgs/msg/JointState", None)]
     path = write_bag(tmp_path, kind, messages, compress=compress)
     movement, how, problems = only(path)
-    np.testing.assert_array_equal(movement.positions, rows)
+    np.testing.assert_array_equal(movement.recorded, rows)
     np.testing.assert_allclose(movement.times, seconds(stamps()), rtol=0, atol=3e-7)
     assert how.columns == POSE
     assert how.layout == "topic /tool of geometry_msgs/msg/PoseStamped"
@@ -39,7 +39,7 @@ def test_the_only_topic_that_can_be_read_is_read(tmp_path, kind, compress):
         "header.stamp",
         "s",
         "stamps of headers",
-        ("recorded",),
+        (),
     )
     assert problems == []
     assert read_recordings(path).sources[0].path == path.name
@@ -51,7 +51,7 @@ def test_a_database_or_an_mcap_alone_is_read_too(tmp_path, ending):
     m = Maker(kind)
     messages = [("/joints", ns, m.joint_state(ns, ["a", "b"], [k, k * k])) for k, ns in enumerate(stamps(9))]
     (path,) = write_bag(tmp_path, kind, messages).glob(f"*.{ending}")
-    assert read_recording(path).positions.tolist() == [[k, k * k] for k in range(9)]
+    assert read_recording(path).recorded.tolist() == [[k, k * k] for k in range(9)]
     assert only(path)[1].columns == ("a", "b")
 
 
@@ -110,7 +110,7 @@ def test_messages_of_every_type_become_rows(tmp_path, kind, name):
     path = write_bag(tmp_path, kind, [("/it", ns + 5, message(ns, k)) for k, ns in enumerate(at)])
     movement, how, _ = only(path)
     assert how.columns == tuple(columns)
-    np.testing.assert_array_equal(movement.positions[3], numbers)
+    np.testing.assert_array_equal(movement.recorded[3], numbers)
     has_header = name.endswith(("Stamped", "PoseArray", "Odometry"))
     assert (how.time == "header.stamp") == has_header
     if not has_header:
@@ -126,8 +126,8 @@ def test_several_topics_are_put_side_by_side_at_the_stamps_of_the_first(tmp_path
     path = write_bag(tmp_path, kind, sorted(messages, key=lambda one: one[1]))
     movement, how, problems = only(path, topic=["/arm", "grip"])
     assert how.columns == ("a", "g")
-    np.testing.assert_allclose(movement.positions[:, 0], range(40))
-    np.testing.assert_allclose(movement.positions[:, 1], np.arange(40) / 100, atol=1e-9)
+    np.testing.assert_allclose(movement.recorded[:, 0], range(40))
+    np.testing.assert_allclose(movement.recorded[:, 1], np.arange(40) / 100, atol=1e-9)
     assert problems == []
     movement, how, problems = only(path, topic=["/grip", "/arm"])
     assert how.columns == ("g", "a")
@@ -147,7 +147,7 @@ def test_equal_columns_of_two_topics_carry_the_names_of_their_topics(tmp_path):
         messages += [("/left", ns, m.pose_stamped(ns, a)), ("/right", ns, m.pose_stamped(ns, b))]
     movement, how, _ = only(write_bag(tmp_path, "mcap", messages), topic=("/left", "/right"))
     assert how.columns == (*(f"/left.{head}" for head in POSE), *(f"/right.{head}" for head in POSE))
-    np.testing.assert_allclose(movement.positions, np.hstack((rows, other)), atol=1e-12)
+    np.testing.assert_allclose(movement.recorded, np.hstack((rows, other)), atol=1e-12)
 
 
 def test_joints_in_another_order_and_of_other_nodes(tmp_path):
@@ -163,7 +163,7 @@ def test_joints_in_another_order_and_of_other_nodes(tmp_path):
             messages.append(("/joints", ns + 3, m.joint_state(ns + 3, [], [])))
     movement, how, problems = only(write_bag(tmp_path, "mcap", messages))
     assert how.columns == ("b", "a", "finger_index_0")
-    inside = movement.positions
+    inside = movement.recorded
     np.testing.assert_array_equal(inside[:, 0], 2 * inside[:, 1])
     assert problems == [
         "topic /joints: 1 message without positions",
@@ -180,7 +180,7 @@ def test_columns_of_stamps_and_joints_are_chosen_by_name(tmp_path):
     assert only(path)[1].columns == tuple(names)
     _, how, _ = only(path, columns=["id", "time"], time="recorded")
     assert (how.columns, how.time, how.units_from) == (("id", "time"), "recorded", "as asked for")
-    assert how.ignored == ("header.stamp", "label", "index_0")
+    assert how.ignored == ("label", "index_0")
     with pytest.raises(kineme.DataError, match="expected a column 'x', got the columns"):
         read_recordings(path, columns="x")
     with pytest.raises(kineme.DataError, match="expected movements that are told apart by messages"):
@@ -224,7 +224,7 @@ def test_each_planned_trajectory_is_a_movement(tmp_path, kind):
     np.testing.assert_allclose(read.demonstrations[1].times, np.arange(12) / 10)
     assert [one.reason for one in read.problems] == [
         "movement 2: expected at least 4 samples, got 2",
-        "topic /plan: message 4: 1 positions for 2 joints",
+        "topic /plan: message 4: expected a position for each of 2 joints, got 1",
         "topic /plan: 1 message with other columns ['c']",
     ]
 
@@ -235,7 +235,7 @@ def test_each_path_is_a_movement(tmp_path, stamped):
     messages = [("/path", START + k, m.path(stamps(12) if stamped else [0] * 12, rows)) for k in range(2)]
     read = read_recordings(write_bag(tmp_path, "mcap", messages))
     assert len(read) == 2
-    np.testing.assert_array_equal(read.demonstrations[1].positions, rows)
+    np.testing.assert_array_equal(read.demonstrations[1].recorded, rows)
     how = read.detected[0][0]
     assert how.time == ("header.stamp" if stamped else None)
     duration = 11 / 100 if stamped else 1.0
@@ -250,7 +250,7 @@ def test_orientations_that_were_never_set_are_left_out(tmp_path):
     )
     movement, how, problems = only(path)
     assert how.columns == POSE[:3]
-    np.testing.assert_array_equal(movement.positions, rows[:, :3])
+    np.testing.assert_array_equal(movement.recorded, rows[:, :3])
     assert problems == [f"topic /p: {', '.join(POSE[3:])}, which are 0 in every message"]
 
 
@@ -264,7 +264,7 @@ def test_a_quaternion_that_is_none_costs_the_movement_or_its_sample(tmp_path):
     with pytest.raises(kineme.DataError, match=rf"{said}; to keep the others, say skip='sample'"):
         read_recordings(path)
     movement, _, problems = only(path, skip="sample")
-    np.testing.assert_array_equal(movement.positions, np.delete(rows, [7, 9], axis=0))
+    np.testing.assert_array_equal(movement.recorded, np.delete(rows, [7, 9], axis=0))
     assert problems == [said]
 
 

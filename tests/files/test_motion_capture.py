@@ -7,6 +7,7 @@ from kineme.errors import DataError
 from kineme.files.inspection.inspect import inspect
 from kineme.files.inspection.report import as_words
 from kineme.files.recordings import read_recordings_from_bytes
+from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Layout
 
 N = 12
@@ -127,7 +128,7 @@ def test_vicon_poses_are_named_as_poses():
     rows += [",,,,,,mm,mm,mm", *(f"{k},0,0,0,0,1,{k},2,{k * k}" for k in range(N))]
     found = read("\n".join(rows))
     names = [f"Cup.orientation.{axis}" for axis in "xyzw"] + [f"Cup.position.{axis}" for axis in "xyz"]
-    assert list(found.demonstrations.dimensions) == names
+    assert list(recorded_names(found.demonstrations.channels)) == names
     assert found.detected[0][0].measured_in == ("", "", "", "", "mm", "mm", "mm")
 
 
@@ -139,7 +140,10 @@ def test_devices_count_sub_frames_by_their_own_rate():
 def test_motive_rigid_bodies_are_poses_and_what_follows_from_them_is_left_aside():
     found = read(motive())
     names = [f"Cup.orientation.{axis}" for axis in "xyzw"] + [f"Cup.position.{axis}" for axis in "xyz"]
-    assert list(found.demonstrations.dimensions) == [*names, *(f"Marker1.position.{axis}" for axis in "xyz")]
+    assert list(recorded_names(found.demonstrations.channels)) == [
+        *names,
+        *(f"Marker1.position.{axis}" for axis in "xyz"),
+    ]
     assert found.detected[0][0].format == "OptiTrack CSV"
     assert found.detected[0][0].measured_in == ("", "", "", "", *["m"] * 6)
     np.testing.assert_allclose(found.demonstrations.times, np.arange(N) / 120, atol=1e-6)
@@ -166,7 +170,7 @@ def test_zeros_in_place_of_a_lost_marker_are_a_gap():
 def test_qualisys_bodies_are_positions_and_angles():
     found = read(qualisys_bodies(), "a.tsv")
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]
-    assert list(found.demonstrations.dimensions) == names
+    assert list(recorded_names(found.demonstrations.channels)) == names
     assert found.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
 
 

@@ -70,7 +70,7 @@ def test_missing_values_cost_their_movement_or_themselves():
 
 def test_columns_of_something_else_are_refused_by_name():
     with pytest.raises(kineme.DataError, match=r"expected numbers in the column 'x', got .*list"):
-        read({"time": T, "x": [[1.0]] * 6}, columns="x")
+        read({"time": T, "x": [["one"]] * 6}, columns="x")
 
 
 def test_without_the_package_the_extra_is_named(monkeypatch):
@@ -150,3 +150,30 @@ def test_numbers_of_names_that_are_not_there_are_damage(which):
         kineme.DataError, match=r"expected names in 'label', got numbers of names that are not there: damaged"
     ):
         _texts(pa.chunked_array([names]), "label")
+
+
+def test_lists_are_one_column_for_each_number_where_they_are_meant():
+    state = pa.array(np.column_stack((X, T)).tolist(), pa.list_(pa.float32(), 2))
+    found = read({"time": T, "q": state})
+    assert found.demonstrations.dimensions == ("q.0", "q.1")
+    np.testing.assert_array_equal(found.demonstrations.positions[:, 0], X.astype(np.float32))
+    both = {"time": T, "q": state, "dq": state, "x": X}
+    assert read(both).demonstrations.dimensions == ("x",)
+    assert read(both, columns="dq").demonstrations.dimensions == ("dq.0", "dq.1")
+    assert read(both, columns=["x", "q.1"]).demonstrations.dimensions == ("x", "q.1")
+    del both["x"]
+    with pytest.raises(kineme.DataError, match=r"one column of lists, or plain columns, got dq, q; say which"):
+        read(both)
+    lerobot = {"observation.state": state, "action": state, "timestamp": T, "frame_index": range(6)}
+    assert read(lerobot).demonstrations.dimensions == ("observation.state.0", "observation.state.1")
+
+
+def test_lists_of_other_lengths_and_missing_ones_cost_their_samples():
+    rows = [[1.0, 2.0], [1.0], None, [2.0, None], [3.0, 5.0], [4.0, 4.0], [5.0, 1.0], [6.0, 9.0]]
+    table = {"time": np.arange(8) / 10, "q": pa.array(rows, pa.list_(pa.float64()))}
+    found = read(table, skip="sample")
+    assert found.demonstrations.lengths.tolist() == [5]
+    with pytest.raises(kineme.DataError, match="expected 2 numbers in 'q', got 1"):
+        read(table)
+    nested = pa.array([[[1.0, 2.0], [3.0, k]] for k in range(6)], pa.list_(pa.list_(pa.float64())))
+    assert read({"time": T, "pose": nested}).demonstrations.n_dims == 4

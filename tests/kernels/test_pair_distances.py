@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import special_ortho_group
 
 from kineme.errors import SpecificationError
-from kineme.kernels.pair_distances import pair_distances
+from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
 from kineme.kernels.shapes import CloudSpec, ElasticSpec, shapes_of
 
 CHOICES = ("never", "always")
@@ -136,10 +136,36 @@ def test_compiled_equals_plain(d, n, m, monkeypatch):
     found = {}
     for choice in CHOICES:
         monkeypatch.setenv("KINEME_COMPILED", choice)
-        found[choice] = pair_distances(A, B, R), pair_distances(A, B)
+        found[choice] = pair_distances(A, B, R), pair_distances(A, B), pair_bounds(A, B, R), pair_bounds(A, B)
     for one, other in zip(*found.values(), strict=True):
         assert one.dtype == other.dtype == np.float32
         np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+@pytest.mark.parametrize(("n", "m"), [(1, 40), (40, 3), (35, 37)])
+def test_bounds_are_below_the_distances_and_not_idle(d, n, m, choice):
+    x = np.concatenate((paths(n, d), degenerate(d)))
+    A, B, R = shapes_of(x), shapes_of(paths(m, d, seed=1)), rotations(n + 6, m, d)
+    for turned in (None, R, *([R[..., 0]] if d == 2 else [])):
+        squares, bounds = pair_distances(A, B, turned), pair_bounds(A, B, turned)
+        assert (bounds <= squares * (1 + 1e-5) + 1e-7).all()
+        assert d == 1 or np.median(bounds[0, :n] / squares[0, :n]) > 0.05  # on a line, all directions are alike
+        assert (bounds[1] <= bounds[0] * (1 + 1e-5)).all()
+        assert not bounds[2].any()
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 6])
+def test_listed_pairs_have_the_distances_of_all_pairs(d, choice):
+    A, B, R = shapes_of(paths(20, d)), shapes_of(paths(9, d, seed=1)), rotations(20, 9, d)
+    i, j = np.random.default_rng(0).integers(0, (20, 9), (50, 2)).T
+    exact = {"rtol": 0, "atol": 0 if choice == "always" else 1e-6}
+    np.testing.assert_allclose(listed_distances(A, B, i, j, R[i, j]), pair_distances(A, B, R)[:, i, j], **exact)
+    np.testing.assert_allclose(listed_distances(A, B, i, j), pair_distances(A, B)[:, i, j], **exact)
+    for none in (None, R[i[:0], j[:0]]):
+        assert listed_distances(A, B, i[:0], j[:0], none).shape == (3, 0)
+    with pytest.raises(SpecificationError, match="expected rotations of shape"):
+        listed_distances(A, B, i, j, R[i[:3], j[:3]])
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kineme import SpecificationError
+from kineme.kernels import procrustes as module
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.soft_rotation import RotationPrior, limited, soft_products, soft_rotations
 
@@ -142,6 +143,31 @@ def test_rotations_beyond_a_limit_are_turned_back_about_their_axes(seed):
     np.testing.assert_allclose(alignment, procrustes.alignment(A, B))
     angles = np.linalg.norm(Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec(), axis=1)
     assert (angles < 0.8 + 1e-3).all()
+
+
+@pytest.mark.parametrize("compiled", ["always", "never"])
+def test_under_a_limit_the_products_are_computed_once(compiled, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", compiled)
+    rng, procrustes = np.random.default_rng(0), Procrustes(3, 0.8)
+    A, B = (procrustes.prepare(rng.normal(size=(n, 60))) for n in (4, 25))
+    alone, calls, original = procrustes.alignment(A, B), [], module._in_space
+    monkeypatch.setattr(module, "_in_space", lambda *given, **more: calls.append(1) or original(*given, **more))
+    np.testing.assert_array_equal(procrustes.align(A, B)[0], alone)
+    assert len(calls) == 1
+
+
+@pytest.mark.parametrize("prior", [None, RotationPrior(0.2)])
+@pytest.mark.parametrize("compiled", ["always", "never"])
+@pytest.mark.parametrize("shape", [(23, 5), (5, 23)])
+def test_tiles_take_the_norms_of_their_own_movements(shape, compiled, prior, monkeypatch):
+    monkeypatch.setenv("KINEME_COMPILED", compiled)
+    rng = np.random.default_rng(0)
+    procrustes = Procrustes(3, 0.8 if prior is None else math.pi, prior)
+    A, B = (procrustes.prepare(rng.uniform(0.1, 10, (n, 1)) * rng.normal(size=(n, 60))) for n in shape)
+    whole = (procrustes.alignment(A, B), *procrustes.align(A, B))
+    monkeypatch.setattr(module, "_PAIRS", 40)
+    for one, other in zip((procrustes.alignment(A, B), *procrustes.align(A, B)), whole, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5)
 
 
 def test_what_a_right_angle_costs_by_default():

@@ -47,7 +47,7 @@ from kineme.features.movement_features import FEATURES
 from kineme.features.pose_features import PoseFeatures
 from kineme.features.random_binning import RandomBinning
 from kineme.kernels import KERNELS, MEANS, averaged
-from kineme.kernels.pair_distances import pair_distances
+from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.preparation.arc_length import resample_by_arc_length
@@ -342,10 +342,13 @@ def pairs_row(n_dims: int) -> Batched:
             room.arrays()[name][:] = array
         R = np.broadcast_to(turns, (len(X), *turns.shape))
         few = pair_distances(shapes, reference.take(slice(2, 5)), R[:, 2:5])
+        every, first = np.arange(len(X)), np.zeros(len(X), np.intp)
         return each(
             len(X),
             squares=pair_distances(room, reference, R).transpose(1, 0, 2),
             few=few.transpose(1, 0, 2),
+            bounds=pair_bounds(shapes, reference, R).transpose(1, 0, 2),
+            listed=listed_distances(shapes, reference, every, first, R[:, 0]).T,
         )
 
     return Batched(f"pair_distances {n_dims}", call, 2e-5, draw=rows)

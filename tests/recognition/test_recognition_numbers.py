@@ -23,7 +23,7 @@ from kineme.recognition.early.evidence import _log_priors, describe_begun
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 from kineme.recognition.left_out import typical_scale
-from kineme.recognition.window_scores import Known, Manner, compare_windows, expected, score_windows
+from kineme.recognition.window_scores import Manner, Templates, compare_windows, expected, score_windows
 from movement_samples import draw_shapes
 
 
@@ -134,7 +134,7 @@ def _scored(factor, manner=Manner(), around=(0.0, 0.0, 0.0)):  # noqa: B008 - a 
     demos = draw_shapes([1, 1, 1])
     demos = Demonstrations([Trajectory(np.linspace(0, 2, 80), x.positions, x.label) for x in demos])
     recognizer = Recognizer().fit(demos)
-    known = Known(recognizer.comparison_, recognizer.references_, recognizer.calibration())
+    known = Templates(recognizer.comparison_, recognizer.references_, recognizer.calibration())
     whole = Trajectory(np.linspace(0.0, 2.0 * factor, 80), demos[0].positions)
     compared = compare_windows(known, observe(whole, 0.04), np.array([[0, 79]]))
     edges, far, inside = (np.array([value]) for value in around)

@@ -239,6 +239,8 @@ def test_labels_that_are_missing_or_too_few():
     ("wrong", "words"),
     [
         ({"mean": "median"}, "mean to be one of .*'arithmetic'.*got 'median'"),
+        ({"max_angle": 0.5, "rotation_prior": RotationPrior(vertical=(0, 0, 1))}, "max_angle or rotation_prior, got"),
+        ({"max_angle": 0.0, "rotation_prior": RotationPrior(0.3)}, "max_angle=0.0 and RotationPrior.*leave one out"),
         ({"classifier": "forest"}, "classifier to be one of .*'auto'.*got 'forest'"),
         ({"scale": "area"}, "scale to be one of .*'path'.*got 'area'"),
         ({"cutoff": 0.0}, "cutoff to be a number above 0, got 0.0"),

@@ -13,13 +13,17 @@ from kineme.cli.options import (
     Finite,
     Numbers,
     SymbolName,
+    force_option,
     json_option,
     library_option_of,
     specification_options,
     whole,
 )
-from kineme.cli.output import write_bytes
+from kineme.cli.output import check_new, write, write_bytes
+from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
 from kineme.output.text import printable
+
+_BAD_FIT = 0.05  # of the extent of the recording
 
 
 @click.command(short_help="Generate a movement from a symbol or a recording.")
@@ -31,14 +35,9 @@ from kineme.output.text import printable
 @click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
 @click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
 @click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="Point to avoid; may be repeated.")
-@click.option(
-    "--index",
-    type=whole(0),
-    default=0,
-    show_default=True,
-    help="Number of the primitive in a file with several, from 0.",
-)
+@click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
 @specification_options
+@layout_options
 @click.option(
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
 )
@@ -46,8 +45,12 @@ from kineme.output.text import printable
               help="A .csv, .npz or .json file; - for the screen, as CSV or --json.")  # fmt: skip
 @json_option
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: a .png, .svg or .pdf file.")
+@force_option
 def generate(**options: Any) -> None:
     """Generate a movement from SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
+
+    The new movement has the columns of the recording, under their names: quaternions are of norm 1, a gripper steps
+    when it did. Where the fit is far off the recording, a warning says so.
 
     As in:
 
@@ -57,39 +60,63 @@ def generate(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.primitives.generation.generate import generate as make
 
-    output = options["output"]
-    primitive = _primitive(options)
+    for name in ("output", "save", "plot"):
+        check_new(options[name], options["force"], options["source"])
+    learned = _learned(options)
     wanted = _movement_options(options)
-    made = make(primitive, wanted)
+    made = make(learned, wanted)
+    _warn_of_bad_fit(learned)
     if options["save"]:
-        primitive.save(options["save"])
+        learned.primitive.save(options["save"])
     if options["plot"]:
-        _plot(options["plot"], primitive, made, wanted.obstacles)
-    _write(output, made, ".json" if options["as_json"] else ".csv")
+        _plot(options["plot"], learned, made, wanted.obstacles)
+    _write(options["output"], made, ".json" if options["as_json"] else ".csv")
 
 
-def _primitive(options: dict[str, Any]) -> Any:
-    """The primitive of a symbol, a recording or a file, as a batch of one."""
+def _learned(options: dict[str, Any]) -> Any:
+    """The primitive of a symbol, a recording or a file, with the recording that it is of."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
         from kineme.library.library import ActionLibrary
-        from kineme.library.symbols.grounding import primitive_of
+        from kineme.library.symbols.grounding import learned_of
 
         with ActionLibrary(options["folder"], read_only=True) as library:
-            return primitive_of(library.store, source)
+            return learned_of(library.store, source)
     from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.generation.generate import primitives_from
+    from kineme.primitives.generation.learned import SAVED, Learned, learn_one, load_saved
 
-    if not Path(source).exists():
+    if source != "-" and not Path(source).exists():
         raise FileNotFoundError(
             f"expected a recording or a saved primitive, found no file {printable(source)}; "
             "for a symbol, name its --library"
         )
+    if Path(source).suffix.lower() == SAVED:
+        return Learned(_chosen(load_saved(Path(source)), options))
     dmp = DMP(**{name: options[name] for name in SPECIFICATION})
-    primitives = primitives_from(Path(source), dmp)
-    if options["index"] >= len(primitives):
-        raise click.BadParameter(f"{source} holds {len(primitives)} primitives, counted from 0", param_hint="--index")
-    return primitives[options["index"]]
+    recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
+    return learn_one(_chosen(recordings, options), dmp)
+
+
+def _chosen(several: Any, options: dict[str, Any]) -> Any:
+    """The one that is asked for by --index, or the only one."""
+    n, index = len(several), options["index"]
+    if index is None and n > 1:
+        raise click.UsageError(f"expected one movement, {printable(options['source'])} holds {n}; choose with --index")
+    if index is not None and index >= n:
+        raise click.BadParameter(f"{printable(options['source'])} holds {n}, counted from 0", param_hint="--index")
+    return several[index or 0]
+
+
+def _warn_of_bad_fit(learned: Any) -> None:
+    from kineme.primitives.generation.learned import largest_deviation
+
+    off = largest_deviation(learned)
+    if off is not None and off[1] > _BAD_FIT:
+        write(
+            f"warning: the fit is off the recording by up to {off[0]:.3g}, {100 * off[1]:.2g} % of its extent; "
+            "see it with --plot, and try more basis functions with --n-basis",
+            err=True,
+        )
 
 
 def _is_symbol(source: str, folder: Path | None) -> bool:
@@ -116,17 +143,17 @@ def _movement_options(options: dict[str, Any]) -> Any:
     )
 
 
-def _plot(path: Path, primitive: Any, made: Any, obstacles: Any) -> None:
+def _plot(path: Path, learned: Any, made: Any, obstacles: Any) -> None:
     from kineme.output.figures import save_figure
     from kineme.primitives.generation.figure import draw_movement
 
-    save_figure(draw_movement(primitive, made, obstacles), path)
+    save_figure(draw_movement(learned, made.columns, obstacles), path)
 
 
 def _write(output: Path, made: Any, ending: str) -> None:
     from kineme.files.write_movement import encode_movement, write_movement
 
     if str(output) == "-":
-        write_bytes(encode_movement(made, ending))
+        write_bytes(encode_movement(made.columns, ending, made.names))
     else:
-        write_movement(output, made)
+        write_movement(output, made.columns, made.names)

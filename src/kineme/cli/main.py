@@ -21,6 +21,7 @@ from kineme.cli.reproduce import reproduce
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
+from kineme.runtime.compiled import tell_when_compiling
 
 
 class _OneLineErrors(click.Group):
@@ -29,6 +30,8 @@ class _OneLineErrors(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):
             sys.stdout.reconfigure(errors="backslashreplace")  # characters that the encoding lacks are escaped
+        if sys.stderr.isatty():
+            tell_when_compiling(_say_compiling)
         try:
             return super().invoke(ctx)
         except click.ClickException as error:
@@ -37,6 +40,12 @@ class _OneLineErrors(click.Group):
         except (KinemeError, OSError) as error:
             write(f"kineme: {printable(error)}", err=True)
             sys.exit(1)
+
+
+def _say_compiling() -> None:
+    from tqdm import tqdm
+
+    tqdm.write("compiling for this machine, once: about 20 s", file=sys.stderr)  # above a progress bar, if there is one
 
 
 @click.group(cls=_OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})

@@ -93,6 +93,7 @@ def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
 
 
 library_option = library_option_of(required=True, words="Folder of the action library.")
+force_option = click.option("--force", is_flag=True, help="Write over files that are there; never over the input.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")
 
 

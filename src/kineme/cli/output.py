@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import click
 
-from kineme.output.text import printable_lines
+from kineme.output.text import printable, printable_lines
 
 _LISTED = 12  # items of a list that are printed; more are counted
 
@@ -22,6 +23,22 @@ def say(as_json: bool, data: Any, text: Callable[[], str]) -> None:
 def write(text: Any = "", *, err: bool = False) -> None:
     """Print lines with control characters escaped: texts from files may contain them."""
     click.echo(printable_lines(text), err=err)
+
+
+def check_new(path: Path | None, force: bool, *inputs: str | Path) -> None:
+    """Refuse to write over an input, and without --force over any file.
+
+    Raises
+    ------
+    click.UsageError
+        The message names the file.
+    """
+    if path is None or str(path) == "-" or not path.exists():
+        return
+    if any(Path(one).exists() and path.samefile(one) for one in inputs):
+        raise click.UsageError(f"expected another file to write than the input {printable(path)}")
+    if not force and path.is_file():
+        raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with --force")
 
 
 def write_bytes(data: bytes) -> None:

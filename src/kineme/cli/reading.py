@@ -35,7 +35,22 @@ class Heads(click.ParamType):  # type: ignore[type-arg]
         return value if isinstance(value, tuple) else tuple(part.strip() for part in value.split(","))
 
 
-def _or_none(ctx: Any, param: Any, value: tuple[str, ...]) -> tuple[str, ...] | None:
+class Kind(click.ParamType):  # type: ignore[type-arg]
+    """Columns and their kind, as ``gripper=discrete`` or ``a,b,c,d=xyzw``."""
+
+    name = "COLUMNS=KIND"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, str]:
+        """The columns and the kind."""
+        if isinstance(value, tuple):
+            return value
+        columns, mark, kind = value.rpartition("=")
+        if not mark or not columns:
+            self.fail(f"expected columns and their kind, as gripper=discrete, got {value!r}", param, ctx)
+        return columns.strip(), kind.strip()
+
+
+def _or_none(ctx: Any, param: Any, value: tuple[Any, ...]) -> tuple[Any, ...] | None:
     """None where an option is not given: libraries store those that are."""
     return value or None
 
@@ -50,12 +65,22 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
         help="What is dropped for a missing or repeated sample.",
     ),
+    click.option(
+        "--kind", "kinds", type=Kind(), multiple=True, callback=_or_none,
+        help="What columns are: position, angle, discrete; of four, wxyz or xyzw, a quaternion. May be repeated.",
+    ),
     click.option("--topic", multiple=True, callback=_or_none, help="Topic of a ROS bag; several are put side by side."),
     click.option(
         "--frame", multiple=True, callback=_or_none, metavar="PARENT:CHILD",
         help="Pose of one frame of a ROS bag in another.",
     ),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
+)  # fmt: skip
+
+
+#: Names of the parameters that `layout_options` adds.
+LAYOUT_OPTIONS = (
+    "time", "columns", "movement", "label_column", "units", "skip", "kinds", "topic", "frame", "follow_links",
 )  # fmt: skip
 
 
@@ -74,6 +99,7 @@ def read(path: Path, options: dict[str, Any]) -> Any:
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
     follow_links = known.pop("follow_links", False)
+    known["kinds"] = dict(known.get("kinds") or ()) or None
     if str(path) == "-":
         return read_recordings_from_bytes(read_limited(sys.stdin.buffer), STANDARD_INPUT, Layout(**known))
     return read_recordings(path, **known, follow_links=follow_links, progress=_watched)

@@ -53,8 +53,14 @@ def fit_bases(rows: tuple[NDArray[Any], ...], n_dims: int, n_reduced: int = N_RE
     rows : tuple of R ndarrays of shape (n, d * S)
         As from `describe.feature_rows`.
     n_dims : int
+        Dimensions d of the movements.
     n_reduced : int, default 12
         k, or S where that is smaller.
+
+    Returns
+    -------
+    tuple of R ndarrays of shape (S, k)
+        With orthonormal columns, those of most energy first.
     """
     bases = []
     for block in rows:
@@ -89,7 +95,22 @@ def log_bounds(
     Under a prior, what R costs is subtracted from both products. In space the maximum is taken over all rotations even
     where there is a limit, see `_over_rotations`.
 
-    Of an average with representations that are compared pair by pair, these are bounds of the average over the others.
+    Of an average with representations that are compared pair by pair, these are bounds of the average over the others
+    alone, not of the whole: a pair can be more alike than its bound.
+
+    Parameters
+    ----------
+    similarity : AveragedSimilarity
+        Of all R representations, those that are compared sample by sample first.
+    asked : tuple of ReducedFeatures
+        Of n movements, in each of the representations that are compared sample by sample; of the bases of `stored`.
+    stored : tuple of ReducedFeatures
+        Of m movements.
+
+    Returns
+    -------
+    ndarray of shape (n, m)
+        In single precision, and lower by no rounding error.
     """
     n, m = len(asked[0].values), len(stored[0].values)
     similarity = similarity.by_rows(len(stored))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.comparison.described import Described
 from kineme.kernels.pair_distances import pair_distances
@@ -27,14 +28,24 @@ def squared_distances(A: Described, B: Described) -> Array:
 
 def _fill(A: Described, B: Described, found: Array) -> None:
     n_blocks = len(A.blocks)
+    rotations = fill_by_rows(A, B, found[:n_blocks])
+    if A.pairs is not None and B.pairs is not None:
+        measured = pair_distances(A.pairs.shapes, B.pairs.shapes, rotations)
+        found[n_blocks:] = measured[list(A.pairs.measures)]
+
+
+def fill_by_rows(A: Described, B: Described, found: Array) -> NDArray[np.float32] | None:
+    """Write the squared distances (R', n, m) of what is compared sample by sample; the rotations of pairs, if needed.
+
+    See `Procrustes.align` for these.
+    """
     rotations = aligned = None
     if A.pairs is not None and B.pairs is not None:
         alignment, rotations = A.procrustes.align(A.pairs.positions, B.pairs.positions)
         aligned = A.pairs.positions
-        measured = pair_distances(A.pairs.shapes, B.pairs.shapes, rotations)
-        found[n_blocks:] = measured[list(A.pairs.measures)]
     for r, (a, b) in enumerate(zip(A.blocks, B.blocks, strict=True)):
         if aligned is not None and a is aligned:
             found[r] = np.maximum(a.squares[:, None] + b.squares - 2.0 * alignment, 0.0)
         else:
             found[r] = A.procrustes.squared_distances(a, b)
+    return rotations

@@ -90,22 +90,35 @@ def score(
     """Scores (n, C), one array for each of the functions, of movements that are described once, tile by tile."""
     found = tuple(np.empty((len(movements), len(references.classes))) for _ in scores)
 
-    def fill(start: int, stop: int, described: Described) -> None:
-        compared = Compared(comparison, references, described)
+    def fill(start: int, compared: Compared) -> None:
         for array, by in zip(found, scores, strict=True):
-            array[start:stop] = by(compared)
+            array[start : start + len(compared)] = by(compared)
 
     if isinstance(movements, Described):
         whole = movements
-        for_tiles(lambda a, b: fill(a, b, whole.take(slice(a, b))), len(whole), tile_rows(references))
-    else:
-        for_described(
-            movements,
-            comparison,
-            comparison.procrustes,
-            lambda tile: fill(tile.start, tile.stop, tile.described),
+        for_tiles(
+            lambda a, b: fill(a, Compared(comparison, references, whole.take(slice(a, b)))),
+            len(whole),
             tile_rows(references),
         )
+    else:
+        for_compared(comparison, references, movements, lambda tile, compared: fill(tile.start, compared))
+    return found
+
+
+def best_classes(
+    comparison: Comparison,
+    references: References,
+    movements: Demonstrations,
+    best: Callable[[Compared], NDArray[np.intp]],
+) -> NDArray[np.intp]:
+    """Index (n,) of the class of each movement, as the function finds them tile by tile."""
+    found = np.empty(len(movements), np.intp)
+
+    def fill(tile: Tile, compared: Compared) -> None:
+        found[tile.start : tile.stop] = best(compared)
+
+    for_compared(comparison, references, movements, fill)
     return found
 
 

@@ -42,7 +42,7 @@ class ComparisonSpecification:
     Raises
     ------
     SpecificationError
-        A parameter out of its range.
+        A parameter out of its range, or `max_angle` and a prior that is not the default.
     """
 
     representations: tuple[Representation, ...] = DEFAULT_REPRESENTATIONS
@@ -63,6 +63,11 @@ class ComparisonSpecification:
             raise SpecificationError(
                 f"expected rotation_prior to be a kineme.RotationPrior or None, got {self.prior!r}; write "
                 "kineme.RotationPrior(concentration=0.03)"
+            )
+        if self.max_angle is not None and self.prior not in (None, RotationPrior()):
+            raise SpecificationError(
+                f"expected max_angle or rotation_prior, got max_angle={self.max_angle!r} and {self.prior}; leave one "
+                "out: under a prior, a large rotation costs similarity and none is forbidden"
             )
 
     @property

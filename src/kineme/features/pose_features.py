@@ -14,7 +14,7 @@ from kineme.errors import TrajectoryError
 from kineme.features.dmp_features import DMPFeatures
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.pose.tangent import to_tangent
+from kineme.primitives.pose.tangent import as_poses, to_tangent
 from kineme.validation import check_number
 
 
@@ -56,7 +56,7 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
         """Check the parameters and the movements; y is ignored."""
         check_number("orientation_weight", self.orientation_weight, above=0.0)
         self.features_ = DMPFeatures() if self.features is None else clone(self.features)
-        demonstrations = Demonstrations.of(X)
+        demonstrations = as_poses(X)
         self.n_columns_ = demonstrations.n_dims
         self.steps_ = tuple(self.features_.get_params()["dmp__preprocessing"])
         self.features_.set_params(dmp__preprocessing=())  # applied in to_tangent, before the goal is read
@@ -72,7 +72,7 @@ class PoseFeatures(TransformerMixin, BaseEstimator):
             Movements that cannot be used, or orientations where `fit` saw poses.
         """
         check_is_fitted(self)
-        demonstrations = Demonstrations.of(X)
+        demonstrations = as_poses(X)
         if demonstrations.n_dims != self.n_columns_:
             raise TrajectoryError(
                 f"expected movements of {self.n_columns_} columns as in fit, got {demonstrations.n_dims}; fit again"

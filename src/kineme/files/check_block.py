@@ -44,19 +44,19 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
         for i in np.flatnonzero(n_odd).tolist():
             first = int(starts[i] + np.argmax(odd[starts[i] : block.offsets[i + 1]]))
             problems.append(_problem(block, file, i, first, (int(n_odd[i]), skip)))
-        block = _keep(block, ~odd) if skip == "sample" else _take(block, n_odd == 0)
+        block = _keep(block, ~odd) if skip == "sample" else take_movements(block, n_odd == 0)
     lengths = np.diff(block.offsets)
     for i in np.flatnonzero(lengths < MIN_SAMPLES).tolist():
         reason = f"expected at least {MIN_SAMPLES} samples, got {lengths[i]}"
         line = block.line_of(block.row(int(block.offsets[i]))) if lengths[i] and len(lengths) > 1 else None
-        problems.append(Problem(file, line, _who(block, i) + reason, TrajectoryError))
-    block = _take(block, lengths >= MIN_SAMPLES)
+        problems.append(Problem(file, line, movement_of(block, i) + reason, TrajectoryError))
+    block = take_movements(block, lengths >= MIN_SAMPLES)
     good = np.ones(len(block.labels), dtype=bool)
     for i, extent in too_small(block.positions, block.offsets):
         reason = f"expected an extent of at least {SMALLEST_EXTENT:g}, got {extent:g}; choose another unit"
-        problems.append(Problem(file, None, _who(block, i) + reason, TrajectoryError))
+        problems.append(Problem(file, None, movement_of(block, i) + reason, TrajectoryError))
         good[i] = False
-    return _take(block, good), sorted(problems, key=lambda problem: problem.line or 0)
+    return take_movements(block, good), sorted(problems, key=lambda problem: problem.line or 0)
 
 
 def _unusable(block: Block, skip: str) -> Flags:
@@ -94,11 +94,12 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
     samples = f"{n_odd} samples like this" if n_odd > 1 else "this sample"
     effect = f"; {samples} left out" if skip == "sample" else f"; {n_odd - 1} more like this" if n_odd > 1 else ""
     known = (block.faults or {}).get(row)
-    reason = _who(block, i) + (known or _reason(block, i, k)) + effect
+    reason = movement_of(block, i) + (known or _reason(block, i, k)) + effect
     return Problem(file, block.line_of(row), reason, DataError if known else TrajectoryError)
 
 
-def _who(block: Block, i: int) -> str:
+def movement_of(block: Block, i: int) -> str:
+    """Movement i at the beginning of a message; empty if the file holds but one."""
     return f"movement {' '.join(block.places[i].splitlines())}: " if block.places[i] else ""
 
 
@@ -131,8 +132,8 @@ def _keep(block: Block, kept: Flags) -> Block:
     return replace(block, positions=block.positions[kept], times=times, offsets=offsets, rows=rows)
 
 
-def _take(block: Block, chosen: Flags) -> Block:
-    """The chosen movements."""
+def take_movements(block: Block, chosen: Flags) -> Block:
+    """The chosen movements of a block."""
     if chosen.all():
         return block
     kept = _keep(block, np.repeat(chosen, np.diff(block.offsets)))

@@ -44,6 +44,11 @@ def write_container(path: Path, kind: str, header: dict[str, Any], arrays: dict[
     return write_atomically(path, buffer.getvalue())
 
 
+def kind_of(path: Path) -> str:
+    """What a file of `write_container` holds; raises as `read_container`."""
+    return str(_read(path)[0].get("kind"))
+
+
 def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
     """Read a file of `write_container`; each array is read on first use.
 
@@ -55,17 +60,24 @@ def read_container(path: Path, kind: str) -> tuple[dict[str, Any], Mapping[str, 
         The file is foreign, truncated or damaged, of another kind, of a later version, or larger than
         `kineme.files.limits` allows; the message says which.
     """
+    header, arrays = _read(path)
+    if header.get("kind") != kind:
+        raise DataError(f"expected {path} to hold {kind}, got {header.get('kind')!r}")
+    return header, arrays
+
+
+def _read(path: Path) -> tuple[dict[str, Any], Mapping[str, NDArray[Any]]]:
     check_expanded(path.stat().st_size)
     arrays = Npz(path.read_bytes(), path)
     try:
         header = json.loads(arrays[_HEADER].tobytes())
     except (ValueError, KeyError, RecursionError) as error:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive") from error
-    _check_header(path, header, kind)
+    _check_header(path, header)
     return header, arrays
 
 
-def _check_header(path: Path, header: Any, kind: str) -> None:
+def _check_header(path: Path, header: Any) -> None:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise DataError(f"expected {path} to be a file saved by kineme, got another program's archive")
     if not isinstance(header.get("version"), int) or header["version"] > VERSION:
@@ -73,5 +85,3 @@ def _check_header(path: Path, header: Any, kind: str) -> None:
             f"expected {path} to have format version {VERSION} or earlier, got {header.get('version')!r}; "
             "upgrade kineme"
         )
-    if header.get("kind") != kind:
-        raise DataError(f"expected {path} to hold {kind}, got {header.get('kind')!r}")

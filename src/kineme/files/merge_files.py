@@ -12,9 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.files.file_channels import with_channels
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.detect import Given
 from kineme.movements.tables.parsed import Block, Detected
+from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movement_sequence import MovementSequence
@@ -94,8 +98,20 @@ class Recordings(MovementSequence):
         return replace(self, demonstrations=plain, sources=sources)
 
 
-def merge_files(files: Sequence[FileRead], where: str, problems: Sequence[Problem] = ()) -> Recordings:
+def merge_files(
+    files: Sequence[FileRead], where: str, problems: Sequence[Problem] = (), kinds: Given | None = None
+) -> Recordings:
     """One `Recordings` of all files that hold movements.
+
+    Parameters
+    ----------
+    files : sequence of FileRead
+    where : str
+        What is read, for the message.
+    problems : sequence of Problem
+        Those known before.
+    kinds : mapping, optional
+        Kinds of channels that are given, see `kineme.movements.channels.detect.find_channels`.
 
     Raises
     ------
@@ -116,13 +132,17 @@ def merge_files(files: Sequence[FileRead], where: str, problems: Sequence[Proble
         Problem(one.path, None, f"{_block(one).positions.shape[1]} dimensions where most have {n_dims}") for one in odd
     ]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
+    full, channels, odd_channels = with_channels(full, kinds or {})
+    listed += odd_channels
+    if not any(len(_block(one).labels) for one in full):
+        raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
     sources = tuple(
         Source(one.path, one.sha256, one.size, one.mtime, place, label)
         for one in full
         for place, label in zip(_block(one).places, _block(one).labels, strict=True)
     )
     detected = Counter(one.detected for one in full if one.detected)
-    return Recordings(_demonstrations(full, sources), sources, tuple(listed), tuple(detected.most_common()))
+    return Recordings(_demonstrations(full, sources, channels), sources, tuple(listed), tuple(detected.most_common()))
 
 
 def _block(one: FileRead) -> Block:
@@ -130,7 +150,7 @@ def _block(one: FileRead) -> Block:
     return one.block
 
 
-def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Demonstrations:
+def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source], channels: Channels | None) -> Demonstrations:
     blocks = [_block(one) for one in files]
     lengths = np.concatenate([np.diff(block.offsets) for block in blocks])
     offsets = np.concatenate(([0], np.cumsum(lengths)))
@@ -140,9 +160,8 @@ def _demonstrations(files: Sequence[FileRead], sources: Sequence[Source]) -> Dem
     names = tuple(f"{source.path}#{source.place}" if source.place else source.path for source in sources)
     durations = times[offsets[1:] - 1] - times[offsets[:-1]]
     labeled = None if None in labels else label_array(labels, len(labels), names)
-    columns = {one.detected.columns for one in files if one.detected}
-    dimensions = columns.pop() if len(columns) == 1 else None
-    return Demonstrations.of_movements(Movements(positions, offsets, durations, times, labeled, names, dimensions))
+    merged = Movements(positions, offsets, durations, times, labeled, names)
+    return Demonstrations.of_movements(merged if channels is None else of_channels(merged, channels))
 
 
 def _concatenated(arrays: Sequence[Any]) -> Any:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from kineme.errors import DataError
@@ -12,6 +13,7 @@ from kineme.files.limits import max_file_bytes
 from kineme.files.merge_files import Recordings, merge_files
 from kineme.files.read_file import format_of, read_bytes, read_file
 from kineme.movements.tables.layout import Column, Layout
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 
 Progress = Callable[[Sequence[Path]], Iterable[Path]]
@@ -26,6 +28,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     label: Column | None = None,
     units: str | float | None = None,
     skip: str = "movement",
+    kinds: Mapping[str, str] | None = None,
     topic: str | Sequence[str] | None = None,
     frame: str | Sequence[str] | None = None,
     follow_links: bool = False,
@@ -50,6 +53,10 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         number it is also the step between samples of files without time stamps.
     skip : {"movement", "sample"}, default "movement"
         Whether a missing or repeated sample costs its whole movement or is left out alone. Both are reported.
+    kinds : mapping, optional
+        What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
+        "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
+        `Demonstrations.channels`.
     topic : str or sequence of str, optional
         Topics of ROS bags; of several, the others are interpolated to the stamps of the first. By default the only
         one that can be read.
@@ -68,16 +75,16 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         An unknown unit or choice, or a limit of memory that is no number.
     """
     max_file_bytes()
-    layout = Layout(time, columns, movement, label, units, skip, topic, frame)
+    layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame)
     path = Path(path)
     if path.is_dir() and data_set_of(path) is None:
         files, problems = files_under(path, follow_links)
         watched = files if progress is None else progress(files)
         read = [read_file(one, one.relative_to(path), layout, follow_links) for one in watched]
-        return merge_files(read, str(path), problems)
+        return merge_files(read, str(path), problems, kinds)
     if not path.exists():
         raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
-    return merge_files([read_file(path, name_of(path), layout, follow_links)], str(path))
+    return merge_files([read_file(path, name_of(path), layout, follow_links)], str(path), kinds=kinds)
 
 
 def root_of(path: Path) -> Path:
@@ -92,7 +99,7 @@ def name_of(path: Path) -> Path:
 
 def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
     """Read what a file of that name would hold, for data that come from elsewhere."""
-    return merge_files([read_bytes(data, Path(name), layout)], name)
+    return merge_files([read_bytes(data, Path(name), layout)], name, kinds=layout.kinds)
 
 
 def read_recording(path: str | Path) -> Trajectory:
@@ -114,7 +121,10 @@ def read_recording(path: str | Path) -> Trajectory:
     read = read_file(path, name_of(path), Layout())
     for problem in read.problems:
         raise problem.error(str(problem._replace(file=str(path))))
-    one = merge_files([read], str(path)).demonstrations
+    one = merge_files([read], str(path))
+    for problem in one.problems:
+        raise problem.error(str(problem._replace(file=str(path))))
     if len(one) > 1:
         raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
-    return Trajectory(one[0].times, one[0].positions, name=str(name_of(path)))
+    named = replace(one.demonstrations.movements, names=(str(name_of(path)),), labels=None)
+    return Demonstrations.of_movements(named)[0]

@@ -6,11 +6,14 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, TrajectoryError
+from kineme.files.arrays.arrays import COLUMNS, RATES
+from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -20,11 +23,18 @@ from kineme.validation import Array, as_numbers, as_path
 _DERIVATIVES = ("velocities", "accelerations")
 _NAMES = ("times", "positions", *_DERIVATIVES)
 
-Columns = dict[str, Array]  # times (T,), positions, velocities and accelerations (T, d)
+Columns = dict[str, Array]  # times (T,), positions (T, d), velocities and accelerations (T, e)
 
 
-def encode_movement(columns: Columns, ending: str) -> bytes:
-    """The bytes of a file with that ending; see `WRITERS`.
+class ColumnNames(NamedTuple):
+    """What the columns of positions are called, and those of velocities and accelerations."""
+
+    positions: tuple[str, ...]
+    rates: tuple[str, ...]
+
+
+def encode_movement(columns: Columns, ending: str, names: ColumnNames | None = None) -> bytes:
+    """The bytes of a file with that ending; see `WRITERS`. Without names the columns are x, y, z or q1, q2, ...
 
     Raises
     ------
@@ -33,10 +43,10 @@ def encode_movement(columns: Columns, ending: str) -> bytes:
     """
     if ending not in WRITERS:
         raise DataError(f"expected a file ending in one of {', '.join(WRITERS)}, got {ending or 'none'!r}")
-    return WRITERS[ending](columns)
+    return WRITERS[ending](columns, names)
 
 
-def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
+def write_movement(path: str | Path, movement: MovementsLike | Columns, names: ColumnNames | None = None) -> Path:
     """Write one movement to a CSV, NPZ or JSON file, whole or not at all.
 
     Parameters
@@ -47,6 +57,8 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
         One movement, in any way that `Demonstrations.of` takes it; of a rollout velocities and accelerations are
         written too. Or a dict of ``times`` (T,), ``positions`` and, if you like, ``velocities`` and ``accelerations``
         (T, d).
+    names : ColumnNames, optional
+        Of the columns of a dict. Movements with `channels` are written under their names, as they were recorded.
 
     Returns
     -------
@@ -63,11 +75,11 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns) -> Path:
         A path that is none, as where the arguments are in the other order.
     """
     path = as_path(path, "the path of a file to write", "write write_movement(path, movement)")
-    columns = _checked(movement) if isinstance(movement, dict) else _columns_of(movement)
-    return write_atomically(path, encode_movement(columns, path.suffix.lower()))
+    columns, names = (_checked(movement, names), names) if isinstance(movement, dict) else _columns_of(movement)
+    return write_atomically(path, encode_movement(columns, path.suffix.lower(), names))
 
 
-def _checked(columns: Mapping[str, ArrayLike]) -> Columns:
+def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Columns:
     """A dict of columns as arrays, refused unless all belong to one movement."""
     if not set(_NAMES[:2]) <= set(columns) <= set(_NAMES):
         raise TrajectoryError(
@@ -78,38 +90,56 @@ def _checked(columns: Mapping[str, ArrayLike]) -> Columns:
     shape = arrays["positions"].shape
     for name, array in arrays.items():
         expected = shape[:1] if name == "times" else shape
-        if len(shape) != 2 or array.shape != expected:
+        if name in _DERIVATIVES and names is not None:
+            expected = (*shape[:1], len(names.rates))
+        if len(shape) != 2 or array.shape != expected or (names is not None and len(names.positions) != shape[1]):
             raise TrajectoryError(
                 f"expected times of shape (T,) and the others of shape (T, d), got {name} of shape {array.shape} with "
-                f"positions of shape {shape}"
+                f"positions of shape {shape}" + ("" if names is None else f" and {names}")
             )
     return arrays
 
 
-def _columns_of(movement: MovementsLike) -> Columns:
+def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     one = as_recording(movement)
+    if one.channels is not None:
+        named = ColumnNames(recorded_names(one.channels), learned_names(one.channels))
+        return {"times": one.times, "positions": one.recorded}, named
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
-    return {"times": one.times, "positions": one.positions, **derivatives}
+    return {"times": one.times, "positions": one.positions, **derivatives}, None
 
 
-def _csv(columns: Columns) -> bytes:
-    axes = axis_names(columns["positions"].shape[1])
+def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
+    axes = {name: axis_names(array.shape[-1]) for name, array in columns.items()}
+    if names is not None:
+        axes |= {
+            "positions": list(names.positions),
+            "velocities": list(names.rates),
+            "accelerations": list(names.rates),
+        }
     prefixes = {"positions": "", "velocities": "v_", "accelerations": "a_"}
-    heads = ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes)]
+    heads = ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes[name])]
     table = np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
-    lines = [",".join(heads), *(",".join(map(repr, row)) for row in table.tolist())]
+    lines = [",".join(map(_cell, heads)), *(",".join(map(repr, row)) for row in table.tolist())]
     return ("\n".join(lines) + "\n").encode()
 
 
-def _npz(columns: Columns) -> bytes:
+def _cell(text: str) -> str:
+    """A head of CSV, quoted where it must be."""
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
+
+
+def _npz(columns: Columns, names: ColumnNames | None) -> bytes:
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **columns)
+    named = {} if names is None else {COLUMNS: np.array(names.positions), RATES: np.array(names.rates)}
+    np.savez(buffer, allow_pickle=False, **columns, **named)
     return buffer.getvalue()
 
 
-def _json(columns: Columns) -> bytes:
-    return (json.dumps({name: values.tolist() for name, values in columns.items()}) + "\n").encode()
+def _json(columns: Columns, names: ColumnNames | None) -> bytes:
+    named = {} if names is None else {COLUMNS: [*names.positions], RATES: [*names.rates]}
+    return (json.dumps({**{name: values.tolist() for name, values in columns.items()}, **named}) + "\n").encode()
 
 
 #: File extension -> encoder. All of them keep every bit of the numbers.
-WRITERS: dict[str, Callable[[Columns], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}
+WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}

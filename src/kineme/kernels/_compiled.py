@@ -167,3 +167,24 @@ def fill_pairs(rows: Rows, pairs: Rows) -> None:
         for k in range(half):
             pair[2 * k] = row[k]
             pair[2 * k + 1] = row[half + k]
+
+
+@jit
+def fill_soft_in_plane(parts: Rows, a: Any, b: Any, best: Any, rotations: Any) -> None:
+    """Best products (n, m) under a prior, and cosines and sines (n, m, 2) if there is room for them.
+
+    `parts` is what `procrustes._split` splits, in single precision, whose squares do not overflow; a and b are norms
+    times the root of tr F. The twin is `soft_rotation.soft_products_in_plane`.
+    """
+    n, m = best.shape
+    below, beside = (n, 0) if len(parts) > n else (0, m)
+    for i in range(n):
+        for j in range(m):
+            weight = a[i] * b[j]
+            re, im = parts[i, j] + weight, np.float64(parts[i + below, j + beside])
+            size = np.sqrt(re * re + im * im)
+            best[i, j] = size - weight
+            if rotations.size > 0:
+                per = 1.0 / size if size > 0.0 else 0.0
+                rotations[i, j, 0] = re * per if size > 0.0 else 1.0
+                rotations[i, j, 1] = -im * per

@@ -15,12 +15,14 @@ from kineme.kernels._lanes import (
     largest,
     least,
     load,
+    load_matrix,
     load_vector,
     minus,
     plus,
     plus_squares,
     product,
     root,
+    rotated,
     store,
     times,
     union,
@@ -99,6 +101,53 @@ def fill_listed(dims, sides, pairs, numbers, rotations, squares):  # type: ignor
         for k in range(3):
             for lane in range(width):
                 squares[k, start + lane] = work.squares[k, lane]
+
+
+@_jit
+def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # type: ignore[no-untyped-def]
+    """``squares[:2, i, j]``, the bounds of `elastic.elastic_bounds`, for 16 movements of A at once."""
+    (A, B), (_, sizes) = sides, numbers
+    n, m = squares.shape[1], squares.shape[2]
+    work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
+    for start in range(0, n, LANES):
+        width = min(LANES, n - start)
+        for lane in range(LANES):
+            first[lane] = start + min(lane, width - 1)
+        pack(dims, A, first, numbers, work.a)
+        for j in range(m):
+            for lane in range(LANES):
+                take_rotation(dims, rotations, first[lane], j, work.rotation, lane)
+            _bound(dims, B, j, numbers, every_segment, work)
+            for k in range(2):
+                for lane in range(width):
+                    squares[k, start + lane, j] = work.squares[k, lane]
+
+
+@_jit
+def _bound(dims, shapes, j, numbers, every_segment, work):  # type: ignore[no-untyped-def]
+    """Sums of the least costs of some segments of movement j."""
+    weights, sizes = numbers
+    (n_segments, band, _), d, a, one = sizes, len(dims), work.a, work.b
+    _, midpoints, angles = begins_of(dims, sizes)[:3]
+    matrix = load_matrix(work.rotation, 0, dims)
+    elastic, turning = every(np.float32(0)), every(np.float32(0))
+    for q in range(every_segment // 2, n_segments, every_segment):
+        for k in range(d):
+            store(one, k, every(shapes[0][j, q * d + k] * weights[0]))
+            store(one, d + k, every(shapes[1][j, q * d + k] * weights[1]))
+        tangent, midpoint = rotated(matrix, load_vector(one, 0, dims)), rotated(matrix, load_vector(one, d, dims))
+        turn = every(shapes[2][j, q] * weights[2])
+        smallest, smallest_turning = every(_FAR), every(_FAR)
+        for p in range(max(0, q - band), min(n_segments, q + band + 1)):
+            difference = minus(turn, load(a, angles + p))
+            cost = times(difference, difference)
+            smallest_turning = least(cost, smallest_turning)
+            cost = plus_squares(plus_squares(cost, tangent, a, p * d), midpoint, a, midpoints + p * d)
+            smallest = least(cost, smallest)
+        elastic, turning = plus(elastic, smallest), plus(turning, smallest_turning)
+    share = every(np.float32(1) / np.float32(n_segments))
+    store(work.squares, 0, times(share, elastic))
+    store(work.squares, 1, times(share, turning))
 
 
 @_jit

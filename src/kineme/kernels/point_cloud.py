@@ -40,9 +40,12 @@ def cloud_squares(A: Shapes, B: Shapes, first: Indices, second: Indices, rotatio
     squares += A.cloud.line_weight * (halves - (t @ u.transpose(0, 2, 1)) ** 2)
     for k in range(A.n_dims):
         squares += (x[:, :, None, k] - y[:, None, :, k]) ** 2
-    D = np.sqrt(np.maximum(squares, 0))
-    smaller = np.minimum(_directed(D), _directed(D.transpose(0, 2, 1)))
-    return np.asarray((smaller / A.cloud.n_points) ** 2)
+    return np.asarray((matched_sums(np.sqrt(np.maximum(squares, 0))) / A.cloud.n_points) ** 2)
+
+
+def matched_sums(D: Array) -> Array:
+    """Sums (k,) of the distances of matched points, of distances (k, n, n): those of the better direction."""
+    return np.minimum(_directed(D), _directed(D.transpose(0, 2, 1)))
 
 
 def _directed(D: Array) -> Array:

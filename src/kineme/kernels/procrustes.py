@@ -108,11 +108,9 @@ class Procrustes:
         if self.max_angle == 0 or self.n_dims == 1:
             return np.asarray(A.rows @ B.rows.T)
         if self.n_dims == 2:
-            parts = _products(A.rows, B.rows)
-            if self.prior is None:
-                return _within(parts, self.max_angle)  # the angle's sign does not matter here
-            weights = self._weights(A, B)
-            return _sizes(_double(parts[0]) + weights, _double(parts[1]), parts[0].dtype) - weights
+            if self.prior is None:  # the angle's sign does not matter here
+                return _within(_split(_products(A.rows, B.rows), len(B.rows)), self.max_angle)
+            return self._soft_in_plane(A, B, rotations=False)[0]
         if self.prior is None:
             return _in_space(A, B, self._hard_filler(len(A.rows) * len(B.rows)))[0]
         return _in_space(A, B, self._soft_filler(len(A.rows) * len(B.rows)))[0]
@@ -130,18 +128,24 @@ class Procrustes:
         if self.max_angle == 0 or self.n_dims not in (2, 3):
             return self.alignment(A, B), None
         if self.n_dims == 2:
-            re, im = map(_double, _products(A.rows, B.rows))
-            if self.prior is None:
-                angle = np.clip(np.arctan2(-im, re), -self.max_angle, self.max_angle)
-                c, s = np.cos(angle), np.sin(angle)
-                return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
-            best, c, s = soft_products_in_plane(re, im, self._weights(A, B))
-            return best, np.stack((c, -s), -1).astype(np.float32)
+            if self.prior is not None:
+                return self._soft_in_plane(A, B, rotations=True)
+            re, im = (part.astype(np.float64) for part in _split(_products(A.rows, B.rows), len(B.rows)))
+            angle = np.clip(np.arctan2(-im, re), -self.max_angle, self.max_angle)
+            c, s = np.cos(angle), np.sin(angle)
+            return c * re - s * im, np.stack((c, s), -1).astype(np.float32)
         n_pairs = len(A.rows) * len(B.rows)
-        best, rotations = _in_space(A, B, self._soft_filler(n_pairs, rotations=True), rotations=True)
-        if self.prior is None and rotations is not None:
-            return self.alignment(A, B), limited(rotations, self.max_angle)
-        return best, rotations
+        free = self._soft_filler(n_pairs, rotations=True)
+        if self.prior is not None:
+            return _in_space(A, B, free, rotations=True)
+        hard = self._hard_filler(n_pairs)
+
+        def fill(products: NDArray[Any], a: Array, b: Array, best: Array, R: NDArray[Any]) -> None:
+            free(products, a, b, best, R)
+            R[:] = limited(R, self.max_angle)
+            hard(products, a, b, best, R)
+
+        return _in_space(A, B, fill, rotations=True)
 
     def rotations(self, A: Array, B: Array) -> Array:
         """Rotation matrices (m, d, d) that bring each row of B closest to the same row of A, or to A's only row.
@@ -160,10 +164,18 @@ class Procrustes:
         C = A.reshape(len(A), d, -1) @ B.reshape(len(B), d, -1).transpose(0, 2, 1)
         return best_rotations(C, self.max_angle)
 
-    def _weights(self, A: Prepared, B: Prepared) -> Array:
-        """``|A| |B| tr F``, (n, m)."""
+    def _soft_in_plane(self, A: Prepared, B: Prepared, rotations: bool) -> tuple[Array, NDArray[np.float32] | None]:
+        """Best products (n, m) under the prior, and cosines and sines (n, m, 2)."""
         assert self.prior is not None
-        return np.asarray(np.trace(self.prior.matrix(2)) * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
+        n, m, parts, trace = len(A.rows), len(B.rows), _products(A.rows, B.rows), self.prior.matrix(2).trace()
+        if parts.dtype == np.float32 and use_compiled(n * m * _PLANE_OPERATIONS):
+            best, R = np.empty((n, m)), np.empty((n, m, 2) if rotations else (0, 0, 2), np.float32)
+            norms = np.sqrt(trace * A.squares), np.sqrt(trace * B.squares)
+            compiled_module("kineme.kernels._compiled").fill_soft_in_plane(parts, *norms, best, R)
+            return best, R if rotations else None
+        re, im = (part.astype(np.float64) for part in _split(parts, m))
+        best, c, s = soft_products_in_plane(re, im, trace * np.sqrt(A.squares)[:, None] * np.sqrt(B.squares))
+        return best, np.stack((c, -s), -1).astype(np.float32) if rotations else None
 
     def _hard_filler(self, n_pairs: int) -> Filler:
         """What writes the best products (n, m) of a block of products (3 n, 3 m): compiled or plain."""
@@ -195,6 +207,7 @@ class Procrustes:
         return fill
 
 
+_PLANE_OPERATIONS = 20  # elementary operations of a pair in the plane
 _ROWS_AT_ONCE = 256
 _MANY = 16  # rows from which on a product by BLAS is faster
 
@@ -219,17 +232,22 @@ def as_complex(rows: NDArray[Any]) -> NDArray[Any]:
     return pairs
 
 
-def _products(A: NDArray[Any], B: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Real and imaginary part of ``conj(A) @ B.T``, (n, m), as one real product: faster than a complex one.
+def _products(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
+    """Real and imaginary part of ``conj(A) @ B.T`` by one real product, faster than a complex one; see `_split`.
 
     The fewer rows are taken twice, the second time turned by a right angle.
     """
     if len(A) > len(B):
-        parts = _as_real(A) @ _as_real(np.concatenate((B, -1j * B)).astype(B.dtype)).T
-        return parts[:, : len(B)], parts[:, len(B) :]
+        return np.asarray(_as_real(A) @ _as_real(np.concatenate((B, -1j * B)).astype(B.dtype)).T)
     twice, many = _as_real(np.concatenate((A, 1j * A)).astype(A.dtype)), _as_real(B)
-    parts = _few_products(twice, many) if len(A) < _MANY else twice @ many.T
-    return parts[: len(A)], parts[len(A) :]
+    return _few_products(twice, many) if len(A) < _MANY else np.asarray(twice @ many.T)
+
+
+def _split(parts: NDArray[Any], m: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Real and imaginary parts (n, m) of such products, which are (n, 2 m) or (2 n, m)."""
+    if parts.shape[1] == 2 * m:
+        return parts[:, :m], parts[:, m:]
+    return parts[: len(parts) // 2], parts[len(parts) // 2 :]
 
 
 def _as_real(rows: NDArray[Any]) -> NDArray[Any]:
@@ -252,7 +270,8 @@ def _few_products(few: NDArray[Any], many: NDArray[Any]) -> NDArray[Any]:
 def _within(parts: tuple[NDArray[Any], NDArray[Any]], max_angle: float) -> Array:
     """Largest real part of ``(re + i im) exp(-i angle)`` within the angle."""
     re, im = (part.astype(np.float64) for part in parts)
-    size = _sizes(re, im, parts[0].dtype)
+    # In double precision the squares of single precision neither overflow nor vanish; others need more care.
+    size = np.sqrt(re * re + im * im) if parts[0].dtype == np.float32 else np.hypot(re, im)
     if max_angle >= math.pi:
         return np.asarray(size)
     # It is largest at the angle of the product, or at the end of the range next to it.
@@ -263,19 +282,9 @@ def _within(parts: tuple[NDArray[Any], NDArray[Any]], max_angle: float) -> Array
     return np.where(re >= c * size, size, at_end)
 
 
-def _sizes(re: Array, im: Array, precision: np.dtype[Any]) -> Array:
-    """``|re + i im|`` of numbers that were computed in a precision."""
-    # In double precision the squares of single precision neither overflow nor vanish; others need more care.
-    return np.sqrt(re * re + im * im) if precision == np.float32 else np.hypot(re, im)
-
-
 _PAIRS = 20_000  # covariances at a time: their intermediate results fit the cache of one core
 _PAIR_OPERATIONS = 1000  # elementary operations of the plain twin per pair
 _CALL_OPERATIONS = 10_000  # the time of a call of it for a few pairs, in such operations
-
-
-def _double(part: NDArray[Any]) -> Array:
-    return part.astype(np.float64)
 
 
 def _in_space(

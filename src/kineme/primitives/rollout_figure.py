@@ -60,7 +60,7 @@ def draw_rollout(times: Array, positions: Array, axis_names: Sequence[str], labe
             left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
             path_axes: Any = left.subplots(subplot_kw=None if d == 2 else {"projection": "3d"})
             _draw_paths(path_axes, drawn)
-            _fit_path(path_axes, drawn.positions)
+            set_equal_scales(path_axes, drawn.positions.reshape(-1, d))
         _draw_over_time(over_time, drawn, n_rows)
         figure.suptitle(drawn.title, fontsize=9)
         if key:
@@ -151,13 +151,13 @@ def _draw_paths(axes: Any, drawn: _Drawn) -> None:
     axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), drawn.axis_names, strict=False)))
 
 
-def _fit_path(axes: Any, paths: Array) -> None:
-    """Equal scales of all dimensions."""
-    if paths.shape[2] == 2:
+def set_equal_scales(axes: Any, points: Array) -> None:
+    """Equal scales of all dimensions, for axes in which points (k, 2) or (k, 3) are drawn."""
+    if points.shape[1] == 2:
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
         return
-    extents = np.ptp(paths, axis=(0, 1))
+    extents = np.ptp(points, axis=0)
     axes.set_box_aspect(np.maximum(extents, 0.2 * extents.max() or 1.0), zoom=0.8)  # also where nothing moves
     axes.locator_params(nbins=4)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
+from kineme.comparison.most_similar import most_similar
 from kineme.comparison.references import References
 from kineme.comparison.scores import Compared
 from kineme.comparison.similarity import AveragedSimilarity
@@ -29,6 +30,10 @@ class Classifier(Protocol):
         """A score per class, shape (n, C): larger is more like it."""
         ...
 
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Index (n,) of the class with the largest score."""
+        ...
+
 
 @dataclass(frozen=True)
 class Nearest:
@@ -37,6 +42,12 @@ class Nearest:
     def scores(self, compared: Compared) -> Array:
         """Logarithm of the largest similarity to a reference of each class."""
         return compared.nearest
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """The class of the most similar reference, without the distances that cannot change it."""
+        references = compared.references
+        chosen = most_similar(compared.comparison.similarity, compared.described, references.described)
+        return np.searchsorted(references.first, chosen, side="right") - 1
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,12 @@ class NearestEach:
     def scores(self, compared: Compared) -> Array:
         """Logarithm of the average of the largest similarities to a reference of each class."""
         return compared.nearest_each
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Index (n,) of the class with the largest score."""
+        if len(compared.references) == len(compared.references.classes):
+            return Nearest().best(compared)
+        return self.scores(compared).argmax(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +87,10 @@ class Prototype:
     def scores(self, compared: Compared) -> Array:
         """Logarithm of the similarity to each class's medoid."""
         return compared.comparison.similarity.log_average(compared.described, self.described)
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """The class of the most similar medoid."""
+        return most_similar(compared.comparison.similarity, compared.described, self.described)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +115,10 @@ class SupportVectors:
         gram = np.exp(LOG_MEANS[self.similarity.mean](self.similarity.logs_at(compared.squares)))
         values = np.asarray(self.model.decision_function(gram))
         return np.column_stack((-values, values)) if values.ndim == 1 else values
+
+    def best(self, compared: Compared) -> NDArray[np.intp]:
+        """Index (n,) of the class with the largest decision value."""
+        return self.scores(compared).argmax(axis=1)
 
 
 def fit_nearest(comparison: Comparison, references: References) -> Nearest:

@@ -19,7 +19,7 @@ from kineme.comparison.fit import fit_comparison
 from kineme.comparison.normalization import Normalization
 from kineme.comparison.references import References
 from kineme.comparison.representation import Representation, default_representations
-from kineme.comparison.scores import Compared, Score, nearest, score
+from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -67,9 +67,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         "nearest" stored movement, "nearest-each", where each representation has its own nearest stored movement of a
         class, nearest class "prototype" (its medoid), or an "svm" on the averaged kernel. "auto" is "nearest-each".
     rotation_prior : RotationPrior or None
-        How rare rotations between movements of one class are, in two and three dimensions; by default a rotation by a
-        right angle costs 0.06 of the inner product of two equal paths in the plane and 0.2 in space, and none is
-        forbidden. Pass
+        How rare rotations between movements of one class are, in two and three dimensions, where there is no
+        `max_angle`: one or the other can be given. By default a rotation by a right angle costs 0.06 of the inner
+        product of two equal paths in the plane and 0.2 in space, and none is forbidden. Pass
         ``RotationPrior(vertical=(0, 0, 1))`` for movements that are turned about the vertical, and rarely tilted. None
         is the default of earlier versions, ``max_angle=pi/3``.
 
@@ -223,7 +223,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
 
     def predict(self, X: MovementsLike) -> NDArray[Any]:
         """The class with the largest score of each movement, shape (n,)."""
-        return np.asarray(self.classes_[self._scores(X).argmax(axis=1)])
+        comparison, references = self._fitted
+        best = best_classes(comparison, references, comparison.checked(X), self.classifier_.best)
+        return np.asarray(references.classes[best])
 
     def predict_proba(self, X: MovementsLike) -> Array:
         """Each class's share of the similarity, shape (n, C); rows sum to 1.

@@ -23,9 +23,9 @@ from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
-    Known,
     Manner,
     ScoredWindows,
+    Templates,
     closest_classes,
     compare_windows,
     durations_of,
@@ -87,7 +87,7 @@ def spot(
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
         return []
-    known, best = _chosen(Known(comparison, references, calibration), windows, error_rate)
+    known, best = _chosen(Templates(comparison, references, calibration), windows, error_rate)
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(known, windows.bouts, whole.times, least)
     rows = np.concatenate((known, unknown))
@@ -118,7 +118,7 @@ def _as_timed(recording: MovementsLike) -> Trajectory:
     return as_recording(recording)
 
 
-def _chosen(known: Known, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:
+def _chosen(known: Templates, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)

@@ -35,7 +35,7 @@ _ALIKE = 0.9  # intersection over union from which two windows are about one mov
 _MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
 
 
-class Known(NamedTuple):
+class Templates(NamedTuple):
     """What windows are compared with."""
 
     comparison: Comparison
@@ -123,7 +123,7 @@ def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
     return np.log(np.maximum(size, np.finfo(float).tiny)), slow
 
 
-def compare_windows(known: Known, motion: Motion, rows: Rows) -> ComparedWindows:
+def compare_windows(known: Templates, motion: Motion, rows: Rows) -> ComparedWindows:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
     start, end = motion.times[rows].T
     scores = np.empty((len(rows), len(known.references.classes)))

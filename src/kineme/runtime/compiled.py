@@ -18,7 +18,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from threading import RLock
 from typing import Any
@@ -40,6 +40,7 @@ _spent = 0  # elementary operations of jobs that ran plain so far
 _loading = RLock()
 _modules: dict[str, Any] = {}  # Numba and the modules with compiled functions that are completely imported
 _failure = ""  # why Numba cannot be imported; "" if it can, or has not been tried
+_tell: list[Callable[[], object]] = []  # what is called before the first function is compiled that is not on disk
 
 
 def use_compiled(n_operations: int, now: int | None = None) -> bool:
@@ -71,6 +72,16 @@ def load_compiled() -> None:
         _load(required=choice == "always")
 
 
+def tell_when_compiling(tell: Callable[[], object]) -> None:
+    """Let `tell` be called once, when this process begins to compile what no earlier one has left on disk."""
+    _tell[:] = [tell]
+
+
+def _compiling() -> None:
+    with suppress(IndexError):  # told already; no lock, since this thread holds the compiler's
+        _tell.pop()()
+
+
 def compiled_module(name: str) -> Any:
     """A module with compiled functions, such as ``kineme.kernels._compiled``; ask `use_compiled` first."""
     if name not in _modules:
@@ -93,7 +104,7 @@ def jit(function: Callable[..., Any], *, cache: bool = True, reorder: bool = Tru
         options: dict[str, Any] = {"nogil": True, "fastmath": allowed, "error_model": "numpy"}
         dispatcher: Callable[..., Any] = _modules["numba"].njit(**options)(function)
         if cache:
-            compiled_module("kineme.runtime.machine_code").keep(dispatcher)
+            compiled_module("kineme.runtime.machine_code").keep(dispatcher, _compiling)
     return dispatcher
 
 

@@ -9,23 +9,33 @@ from typing import Any
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
-def keep(dispatcher: Callable[..., Any]) -> None:
-    """Cache a function's machine code on disk, if there is a writable folder for it."""
+def keep(dispatcher: Callable[..., Any], compiling: Callable[[], object]) -> None:
+    """Cache a function's machine code on disk, if there is a writable folder for it.
+
+    `compiling` is called whenever the machine code for some types of arguments is not there.
+    """
     function = getattr(dispatcher, "py_func", None)  # missing with NUMBA_DISABLE_JIT, which returns plain functions
     if function is not None:
         with suppress(RuntimeError):  # no writable folder, as in a read-only installation
-            dispatcher._cache = _Cache(function)  # type: ignore[attr-defined]
+            dispatcher._cache = _Cache(function, compiling)  # type: ignore[attr-defined]
 
 
 class _Cache(FunctionCache):
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], compiling: Callable[[], object]) -> None:
         super().__init__(function)
+        self._compiling = compiling
         implementation = self._impl
         self._cache_file = _Files(
             cache_path=self._cache_path,
             filename_base=implementation.filename_base,
             source_stamp=implementation.locator.get_source_stamp(),
         )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = super().load_overload(sig, target_context)
+        if found is None:
+            self._compiling()
+        return found
 
 
 class _Files(IndexDataCacheFile):

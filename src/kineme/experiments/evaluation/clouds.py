@@ -10,6 +10,7 @@ from scipy.spatial.distance import cdist
 
 from kineme.experiments.evaluation.neighbors import average_linkage
 from kineme.experiments.evaluation.paths import smooth_paths
+from kineme.kernels.point_cloud import matched_sums
 from kineme.movements.trajectories.demonstrations import Demonstrations, require_labels
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
@@ -43,14 +44,7 @@ def plus_distances(A: Array, B: Array) -> Array:
         distances = np.empty((len(A), len(B)))
         compiled_module("kineme.experiments.evaluation._clouds").fill_plus(A, B, distances)
         return distances
-    between = [[cdist(one, other) for other in B] for one in A]
-    return np.array([[min(_one_way(each), _one_way(each.T)) for each in row] for row in between])
-
-
-def _one_way(distances: Array) -> float:
-    """Every point of the first cloud to its nearest; then the points of the second that nothing was matched to."""
-    unmatched = np.setdiff1d(np.arange(len(distances)), distances.argmin(axis=1))
-    return float(distances.min(axis=1).sum() + distances[:, unmatched].min(axis=0).sum())
+    return np.stack([matched_sums(np.stack([cdist(one, other) for other in B])) for one in A])
 
 
 def nearest_by_matching(A: Array, B: Array, squared: bool) -> tuple[NDArray[np.intp], Array]:

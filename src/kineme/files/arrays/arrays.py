@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.movements.tables.columns import column_numbers
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Block, Detected, Parsed, listed
+from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array
 
+#: Entries that name the columns of positions, and those of velocities and accelerations.
+COLUMNS, RATES = "columns", "rates"
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
 
 _RAGGED = (
@@ -34,8 +36,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
     - ``positions_0``, ``positions_1``, ... (T_i, d), ``times_0``, ...: many of unequal length.
 
     ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
-    and ``z`` that are all (T,) are the coordinates of one movement. Where there are no times, movements of
-    ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one second.
+    and ``z`` that are all (T,) are the coordinates of one movement; ``columns`` (d,) names the coordinates.
+    Where there are no times, movements of ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one
+    second.
 
     Raises
     ------
@@ -48,19 +51,24 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
-    return parsed_arrays(xs, ts, (_labels(arrays, len(xs)), _named(arrays, TIMES) or "times"), layout, (kind, how))
+    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or "times", None, _column_names(arrays))
+    return parsed_arrays(xs, ts, named, layout, (kind, how))
+
+
+class Named(NamedTuple):
+    """What movements of arrays are called: labels, the array of time stamps, which movement each is, coordinates."""
+
+    labels: Sequence[str | None]
+    time: str
+    places: list[str] | None = None
+    columns: Sequence[str] | None = None
 
 
 def parsed_arrays(
-    xs: Sequence[Array],
-    ts: Sequence[Array] | None,
-    named: tuple[Sequence[str | None], str],
-    layout: Layout,
-    detected: tuple[str, str],
-    places: list[str] | None = None,
+    xs: Sequence[Array], ts: Sequence[Array] | None, named: Named, layout: Layout, detected: tuple[str, str]
 ) -> Parsed:
-    """Movements xs (T_i, d) with stamps ts (T_i,), labels and the name of the stamps, as `Parsed`."""
-    labels, time = named
+    """Movements xs (T_i, d) with stamps ts (T_i,) as `Parsed`."""
+    labels, time, places, columns = named
     dims = sorted({x.shape[1] for x in xs})
     if len(dims) != 1 or dims == [0]:
         raise DataError(f"expected movements of the same dimensions, at least one, got {dims}")
@@ -79,7 +87,10 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
-    columns, positions = tuple(axis_names(xs[0].shape[1])), np.concatenate(xs)
+    positions = np.concatenate(xs)
+    columns = distinct(columns or axis_names(positions.shape[1]))
+    if len(columns) != positions.shape[1]:
+        raise DataError(f"expected a name for each of the {positions.shape[1]} coordinates, got {listed(columns)}")
     if layout.coordinates is not None:
         chosen = column_numbers(columns, layout.coordinates)
         columns, positions = tuple(columns[k] for k in chosen), positions[:, chosen]
@@ -87,6 +98,14 @@ def parsed_arrays(
         places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
     block = Block(positions, stamps, offsets, list(labels), places)
     return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+
+
+def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
+    """The names of the coordinates, if there are such."""
+    names = np.asarray(arrays[COLUMNS]) if COLUMNS in arrays else None
+    if names is None or names.ndim != 1 or names.dtype.kind != "U":
+        return None
+    return [str(name) for name in names.tolist()]
 
 
 def has_known_names(names: Collection[str]) -> bool:

@@ -11,6 +11,8 @@ from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -54,6 +56,8 @@ class Inspection(NamedTuple):
     labels : tuple of LabelSummary
         In alphabetic order, those without a label last.
     detected : tuple of (Detected, int)
+    channels : tuple of Channel or None
+        What the columns are, where all files have the same.
     duplicates : tuple of tuple of str
         Names of movements that are the same, sample for sample.
     problems : tuple of Problem
@@ -66,9 +70,15 @@ class Inspection(NamedTuple):
     dimensions: int
     labels: tuple[LabelSummary, ...]
     detected: tuple[tuple[Detected, int], ...]
+    channels: Channels | None
     duplicates: tuple[tuple[str, ...], ...]
     problems: tuple[Problem, ...]
     notes: tuple[str, ...]
+
+
+def nothing_read(file: str, reason: str) -> Inspection:
+    """The inspection of a file of which no movement is read."""
+    return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
 
 
 def inspect(recordings: Recordings) -> Inspection:
@@ -84,6 +94,7 @@ def inspect(recordings: Recordings) -> Inspection:
         demos.n_dims,
         labels,
         recordings.detected,
+        demos.channels,
         duplicates,
         recordings.problems,
         tuple(_notes(recordings, labels, sampling)),
@@ -128,7 +139,7 @@ def _range(values: Array) -> Range:
 
 
 def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: Sampling) -> list[str]:
-    notes = []
+    notes, demos = [], recordings.demonstrations
     rate = float(np.median(sampling.rates))
     if not _RATES[0] <= rate <= _RATES[1]:
         notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")
@@ -143,4 +154,14 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     unlabeled = sum(one.movements for one in labels if one.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
+    return notes + _notes_on_channels(demos)
+
+
+def _notes_on_channels(demos: Demonstrations) -> list[str]:
+    """Columns whose values do not fit their kind."""
+    notes = []
+    for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
+        values = demos.recorded[:, columns.start]
+        if one.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
+            notes.append(f"{one.name} is 0 or 1 throughout; if it is a switch, say --kind {one.name}=discrete")
     return notes

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
+from kineme.movements.channels.channel import Channel
 from kineme.movements.tables.parsed import Detected
 from kineme.output.table import Table, to_text
 from kineme.output.text import counted, printable
@@ -23,6 +24,7 @@ def as_data(inspection: Inspection) -> dict[str, Any]:
             for one in inspection.labels
         ],
         "detected": [{**how._asdict(), "files": n} for how, n in inspection.detected],
+        "channels": [one._asdict() for one in inspection.channels or ()],
         "duplicates": [list(group) for group in inspection.duplicates],
         "problems": [{"file": one.file, "line": one.line, "reason": one.reason} for one in inspection.problems],
         "notes": list(inspection.notes),
@@ -39,6 +41,7 @@ def as_words(inspection: Inspection) -> str:
     heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
     parts = [to_text(Table(title, heads, rows))]
     parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
+    parts += _listed("kinds", [_kind(one) for one in inspection.channels or () if one.kind != "position"])
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
     parts += _listed("not read", list(map(str, inspection.problems)))
     parts += _listed("note", list(inspection.notes))
@@ -64,6 +67,15 @@ def _range(values: Range) -> str:
     """The median alone if minimum and maximum are equal, else all three."""
     least, median, greatest = (f"{value:.4g}" if value < 1e6 else f"{value:.3g}" for value in values)
     return median if least == greatest else f"{median} ({least} to {greatest})"
+
+
+def _kind(channel: Channel) -> str:
+    what = {
+        "angle": f"angle{f' in {channel.unit}' if channel.unit else ''}; wraps are taken away",
+        "orientation": f"orientation, a quaternion {', '.join(channel.order)}; learned as integrated rotation",
+        "discrete": "discrete; kept as it is, not learned",
+    }
+    return f"{', '.join(channel.columns)}: {what[channel.kind]}"
 
 
 def _understood(how: Detected) -> str:

@@ -19,6 +19,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
 from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.generation.learned import Learned
 from kineme.sampling import evenly_spaced
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
@@ -35,6 +36,12 @@ def prototype_of(store: Store, one: Symbol) -> int:
 def primitive_of(store: Store, who: str) -> Primitives:
     """The primitive of the prototype of a symbol, a batch of one."""
     return _primitives(store, np.array([prototype_of(store, symbol(store, who))]))
+
+
+def learned_of(store: Store, who: str) -> Learned:
+    """The primitive of the prototype of a symbol with its recording."""
+    ids = np.array([prototype_of(store, symbol(store, who))])
+    return Learned(_primitives(store, ids), read.movements(store, ids)[0])
 
 
 def ground_symbol(

@@ -129,7 +129,7 @@ def _rotations(n: int, d: int, angle: float, random: np.random.Generator) -> Arr
 def _with_paths(demonstrations: Demonstrations, paths: Array) -> Demonstrations:
     """The same movements along other, evenly sampled paths (n, d, T)."""
     n, d, n_samples = paths.shape
-    old = demonstrations.movements
+    old = demonstrations.movements.positions_only
     positions = np.ascontiguousarray(paths.transpose(0, 2, 1)).reshape(-1, d)
     offsets = np.arange(n + 1) * n_samples
     new = replace(old, positions=positions, offsets=offsets, times=None)

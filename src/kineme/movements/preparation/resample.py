@@ -43,7 +43,7 @@ class Resample:
         starts = demonstrations.positions[demonstrations.offsets[:-1]]
         rows = relative_rows(demonstrations, 0, n, self.n_points)
         return replace(
-            demonstrations.movements,
+            demonstrations.movements.positions_only,
             positions=(rows.transpose(0, 2, 1) + starts[:, None]).reshape(-1, demonstrations.n_dims),
             offsets=np.arange(n + 1) * self.n_points,
             times=None,

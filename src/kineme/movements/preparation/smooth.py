@@ -52,7 +52,7 @@ class Smooth:
             _fill_smoothed(demonstrations, start, stop, self.cutoff, smoothed)
 
         for_tiles(smooth_tile, len(demonstrations), _TILE_MOVEMENTS)
-        return replace(demonstrations.movements, positions=smoothed)
+        return replace(demonstrations.movements.positions_only, positions=smoothed)
 
 
 def smooth_rows(demonstrations: Demonstrations, start: int, stop: int, cutoff: float, n_points: int) -> Array:

@@ -56,13 +56,14 @@ class TrimRest:
         still = extent.max(axis=1) == 0
         begin, end = np.where(still, first, begin), np.where(still, last, end)
         keep = (row >= np.repeat(begin, lengths)) & (row <= np.repeat(end, lengths))
-        times = demonstrations.times
+        times, recorded = demonstrations.times, demonstrations.movements.recorded
         return replace(
             demonstrations.movements,
             positions=x[keep],
             offsets=np.concatenate(([0], np.cumsum(end - begin + 1))),
             times=times[keep],
             durations=times[end] - times[begin],
+            recorded=None if recorded is None else recorded[keep],
         )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from kineme.movements.channels.channel import is_plain, learned_names
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.table import Segmenter
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -60,12 +61,17 @@ def pieces_of(recording: Trajectory, rows: Rows) -> Demonstrations:
     name = recording.name or "recording"
     whole = [slice(first, stop) for first, stop in rows.tolist()]
     spans = [(recording.times[one][0], recording.times[one][-1]) for one in whole]
-    return Demonstrations.from_arrays(
+    pieces = Demonstrations.from_arrays(
         [recording.positions[one] for one in whole],
         None if recording.label is None else [recording.label] * len(whole),
         [recording.times[one] for one in whole],
         [f"{name}[{_seconds(start)}-{_seconds(end)} s]" for start, end in spans],
     )
+    if (channels := recording.channels) is None:
+        return pieces
+    recorded = None if is_plain(channels) else np.concatenate([recording.recorded[one] for one in whole])
+    known = replace(pieces.movements, dimensions=learned_names(channels), channels=channels, recorded=recorded)
+    return Demonstrations.of_movements(known)
 
 
 def _seconds(time: float) -> str:

@@ -23,7 +23,8 @@ LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activ
 _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
-_BESIDE_COUNTERS = frozenset({"sub", "task", "number", "nr", "no", "id"})
+_BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
+_TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
@@ -184,4 +185,10 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
     if not head.strip() or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
-    return derived is not None and (derived[1] or derived[2]) in plain
+    if derived is None:
+        return False
+    quantity = derived[1] or derived[2]
+    turned = _TURNED.fullmatch(quantity)  # of a quaternion
+    return quantity in plain or (
+        turned is not None and any(turned[1] + dot + "w" in plain for dot in ("", ".", "_", " "))
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -34,6 +34,9 @@ class Layout:
         unit. As a number, it is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
+    kinds : mapping, optional
+        Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
+        order of a quaternion.
     topic : str or sequence of str, optional
         Topics of a bag; of several, the others are interpolated to the stamps of the first.
     frame : str or sequence of str, optional
@@ -51,6 +54,7 @@ class Layout:
     label: Column | None = None
     units: str | float | None = None
     skip: str = "movement"
+    kinds: Mapping[str, str] | None = None
     topic: str | Sequence[str] | None = None
     frame: str | Sequence[str] | None = None
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
@@ -40,6 +41,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
     times = np.concatenate([one.times for one in trajectories])
     labels = [one.label for one in trajectories]
     labeled = any(label is not None for label in labels)
+    channels, recorded = _channels_of(trajectories)
     return Movements(
         positions,
         offsets,
@@ -47,7 +49,18 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         times,
         label_array(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
+        None if channels is None else learned_names(channels),
+        channels,
+        recorded,
     )
+
+
+def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, Array | None]:
+    """The channels that all share, and what was recorded; (None, None) if they differ."""
+    channels = trajectories[0].channels if trajectories else None
+    if channels is None or any(one.channels != channels for one in trajectories):
+        return None, None
+    return channels, None if is_plain(channels) else np.concatenate([one.recorded for one in trajectories])
 
 
 def collect_arrays(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.data_frames import collect_data_frames, frames_of, is_data_frame
 from kineme.movements.trajectories.indexing import as_indices
@@ -193,6 +194,22 @@ class Demonstrations(Sequence[Trajectory]):
         return self.movements.dimensions
 
     @property
+    def channels(self) -> Channels | None:
+        """What was recorded, where that is known: positions, angles, orientations, discrete values, with their names.
+
+        An orientation is learned as three coordinates of `positions`, a discrete channel is none of them.
+        """
+        return self.movements.channels
+
+    @property
+    def recorded(self) -> Array:
+        """The columns of the `channels` as recorded, shape (total, columns); without channels the `positions`.
+
+        Orientations are quaternions of norm 1 in the order of the file, whose signs do not jump.
+        """
+        return self.positions if self.movements.recorded is None else self.movements.recorded
+
+    @property
     def times(self) -> Array:
         """Time stamps of all samples, shape (total,) [s]."""
         return self.movements.stamps
@@ -244,6 +261,8 @@ class Demonstrations(Sequence[Trajectory]):
         object.__setattr__(one, "positions", self.positions[rows])
         object.__setattr__(one, "label", None if self.labels is None else self.labels[i : i + 1].tolist()[0])
         object.__setattr__(one, "name", None if self.names is None else self.names[i])
+        object.__setattr__(one, "channels", self.channels)
+        object.__setattr__(one, "recorded", self.recorded[rows])
         return one
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.close_stamps import merge_close, spread_close
 from kineme.validation import Array
 
@@ -23,7 +24,9 @@ _SAMPLES_AT_ONCE = 65_536  # stamps checked at a time: uneven ones are found ear
 class Movements:
     """The block behind `Demonstrations`: validated, contiguous, read-only.
 
-    `times` is None for movements evenly sampled over their `durations`; `stamps` writes them out.
+    `times` is None for movements evenly sampled over their `durations`; `stamps` writes them out. `recorded` holds what
+    `positions` do not say, where there is such: orientations as quaternions, and discrete channels. Steps that change
+    samples drop it.
     """
 
     positions: Array  # (total, d)
@@ -33,9 +36,11 @@ class Movements:
     labels: NDArray[Any] | None = None  # (n,)
     names: Names = None
     dimensions: tuple[str, ...] | None = None  # what the d columns are called, where that is known
+    channels: Channels | None = None  # what was recorded, where that is known
+    recorded: Array | None = None  # (total, columns of the channels); None where it is the positions
 
     def __post_init__(self) -> None:
-        for field in ("positions", "offsets", "durations", "times", "labels"):
+        for field in ("positions", "offsets", "durations", "times", "labels", "recorded"):
             if (value := getattr(self, field)) is not None:
                 view = value.view()
                 view.setflags(write=False)
@@ -79,7 +84,7 @@ class Movements:
         merged = None if self.times is None else merge_close(self.times, self.positions, self.offsets)
         if merged is None:
             return self
-        return replace(self, times=merged[0], positions=merged[1], offsets=merged[2])
+        return replace(self.positions_only, times=merged[0], positions=merged[1], offsets=merged[2])
 
     @cached_property
     def spread(self) -> Array:
@@ -101,7 +106,14 @@ class Movements:
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
             self.dimensions,
+            self.channels,
+            None if self.recorded is None else self.recorded[rows],
         )
+
+    @property
+    def positions_only(self) -> Movements:
+        """The same movements without what `recorded` holds beside the positions, for steps that change samples."""
+        return self if self.recorded is None else replace(self, channels=None, recorded=None)
 
 
 def axis_names(n_dims: int) -> list[str]:

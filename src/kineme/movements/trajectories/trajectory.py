@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.validation import Array, as_positions, as_times, check_extents, check_finite, check_times
 
 
@@ -26,6 +27,14 @@ class Trajectory:
     name : str, optional
         Where it comes from; error messages show it.
 
+    Attributes
+    ----------
+    channels : tuple of Channel or None
+        What the columns of its recording are, where that is known; see `kineme.read_recordings`.
+    recorded : ndarray of shape (T, columns)
+        The columns of the channels as recorded, where orientations are quaternions and discrete channels are there;
+        without channels the positions.
+
     Raises
     ------
     TrajectoryError
@@ -41,6 +50,8 @@ class Trajectory:
     positions: Array
     label: Any = None
     name: str | None = None
+    channels: Channels | None = field(default=None, init=False)
+    recorded: Array = field(init=False)
 
     def __post_init__(self) -> None:
         if getattr(self.name, "__hash__", None) is None:
@@ -53,10 +64,11 @@ class Trajectory:
         check_finite(x, whole, names, "positions")
         check_extents(x, whole, names)
         check_times(t, whole, names)
-        for field, values in (("times", t), ("positions", x)):
+        for name, values in (("times", t), ("positions", x)):
             own = values.copy()
             own.setflags(write=False)
-            object.__setattr__(self, field, own)
+            object.__setattr__(self, name, own)
+        object.__setattr__(self, "recorded", self.positions)
 
     @property
     def duration(self) -> float:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from kineme.errors import SpecificationError
-from kineme.files.recordings import read_recording
-from kineme.files.write_movement import Columns
+from kineme.files.write_movement import ColumnNames, Columns
+from kineme.movements.channels.channel import is_plain
+from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.control.state import State, Status
-from kineme.primitives.discrete.dmp import DMP, Primitives
+from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.generation.learned import Learned
+from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.validation import Array
 
-SAVED = ".kineme"  # file extension of saved primitives
+_ROUNDING = 1e-9  # of a duration: stamps that are equal but for rounding
 _LONGEST = 10.0  # durations after which a movement around obstacles is given up
 
 
@@ -43,18 +47,18 @@ class MovementOptions:
     obstacles: Array | None = None
 
 
-def primitives_from(path: Path, dmp: DMP) -> Primitives:
-    """Saved primitives from a ``.kineme`` file, or those that `dmp` learns from a recording."""
-    return Primitives.load(path) if path.suffix.lower() == SAVED else dmp.learn(read_recording(path))
+class Generated(NamedTuple):
+    """A new movement: times (T,), positions (T, d), velocities and accelerations (T, e), and what they are called."""
+
+    columns: Columns
+    names: ColumnNames
 
 
-def generate(primitive: Primitives, options: MovementOptions) -> Columns:
-    """The new movement as columns times (T,), positions, velocities, accelerations (T, d).
+def generate(learned: Learned, options: MovementOptions) -> Generated:
+    """The new movement in the columns of the recording.
 
-    Parameters
-    ----------
-    primitive : Primitives
-        A batch of one.
+    Orientations are quaternions of norm 1, with angular velocities in the world frame; discrete channels step where
+    they did, at the same share of the duration.
 
     Raises
     ------
@@ -63,17 +67,56 @@ def generate(primitive: Primitives, options: MovementOptions) -> Columns:
         into memory, and numbers that are not finite: a robot gets no movement that was not checked.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
-        made = (_undisturbed if options.obstacles is None else _around_obstacles)(primitive, options)
+        plain = replace(options, start=_in_primitive(learned, options.start), goal=_in_primitive(learned, options.goal))
+        move = _undisturbed if options.obstacles is None else _around_obstacles
+        made = move(learned.primitive, plain)
     for name, column in made.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
                 f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
                 "goal and a duration nearer to those demonstrated"
             )
-    return made
+    if learned.demonstration is not None and learned.demonstration.channels is not None:
+        duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
+        made["positions"] = _as_recorded(made, learned.demonstration, duration)
+    return Generated(made, ColumnNames(learned.columns, learned.rates))
 
 
-def _undisturbed(primitive: Primitives, options: MovementOptions) -> Columns:
+def _in_primitive(learned: Learned, point: Array | None) -> Array | None:
+    """A start or goal in the columns of the recording, in those of the primitive: an orientation last, w first."""
+    one = learned.demonstration
+    if point is None or one is None or one.channels is None or is_plain(one.channels):
+        return point
+    moved = [channel for channel in one.channels if channel.coordinates]
+    names = [name for channel in moved for name in channel.columns]
+    if point.shape != (len(names),):
+        raise SpecificationError(f"expected {len(names)} numbers, {', '.join(names)}, got {point.size}")
+    parts = [(channel, point[columns]) for channel, columns in zip(moved, columns_of(tuple(moved)), strict=True)]
+    return np.concatenate(
+        [part for channel, part in parts if channel.kind != "orientation"]
+        + [as_wxyz(part, channel) for channel, part in parts if channel.kind == "orientation"]
+    )
+
+
+def _as_recorded(made: Columns, demonstration: Trajectory, duration: float) -> Array:
+    """The new movement (T, columns) in the columns of the recording, with its discrete channels."""
+    channels, recorded = demonstration.channels, demonstration.recorded
+    assert channels is not None
+    elapsed = (demonstration.times - demonstration.times[0]) / demonstration.duration
+    now = np.searchsorted(elapsed, made["times"] / duration + _ROUNDING, side="right") - 1
+    moved, parts = 0, []
+    for one, columns in zip(channels, columns_of(channels), strict=True):
+        if one.kind == "orientation":
+            parts.append(from_wxyz(made["positions"][:, -4:], one))
+        elif one.kind == "discrete":
+            parts.append(recorded[now, columns])
+        else:
+            parts.append(made["positions"][:, moved : moved + 1])
+            moved += 1
+    return np.concatenate(parts, axis=1)
+
+
+def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
     made = primitive.rollout(options.start, options.goal, options.duration, rate=options.rate, settle=options.settle)
     return {
         "times": made.times[0],
@@ -83,15 +126,15 @@ def _undisturbed(primitive: Primitives, options: MovementOptions) -> Columns:
     }
 
 
-def _around_obstacles(primitive: Primitives, options: MovementOptions) -> Columns:
+def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
     obstacles = np.asarray(options.obstacles)
-    if obstacles.ndim != 2 or obstacles.shape[1] != primitive.n_dims or primitive.n_dims < 2:
+    n_dims = primitive.n_dims - 3 if isinstance(primitive, PosePrimitives) else primitive.n_dims
+    if obstacles.ndim != 2 or obstacles.shape[1] != n_dims or n_dims < 2:
         raise SpecificationError(
-            f"expected obstacles in the {primitive.n_dims} dimensions of the movement, two or more, got shape "
-            f"{obstacles.shape}"
+            f"expected obstacles in the {n_dims} dimensions of the movement, two or more, got shape {obstacles.shape}"
         )
     duration = float(primitive.durations[0]) if options.duration is None else options.duration
-    steps = primitive.rollout(duration=duration, rate=options.rate).n_samples - 1
+    steps = primitive.rollout(duration=duration, rate=options.rate).times.shape[1] - 1
     control = primitive.controller(
         duration / steps, start=options.start, goal=options.goal, duration=duration, settle=options.settle
     )

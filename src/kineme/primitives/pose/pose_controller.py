@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.movements.rotations.quaternions import conjugate, normalized, product
+from kineme.movements.rotations.rotation_vectors import exp, log, nearest
 from kineme.primitives.control import inputs
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.options import Options
 from kineme.primitives.control.plan import Plan
 from kineme.primitives.control.state import State, Status
-from kineme.primitives.pose.quaternions import conjugate, normalized, product
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity, rotation_vector_rate
-from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
 _MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.rotations.quaternions import conjugate, normalized, product
+from kineme.movements.rotations.rotation_vectors import exp, log, nearest
 from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options, check_one
@@ -18,9 +20,7 @@ from kineme.primitives.discrete.rollout import broadcast_length, per_movement
 from kineme.primitives.persistence import Arrays
 from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout
-from kineme.primitives.pose.quaternions import conjugate, normalized, product
 from kineme.primitives.pose.rates import rotation_vector_rate
-from kineme.primitives.pose.rotation_vectors import exp, log, nearest
 from kineme.validation import Array
 
 

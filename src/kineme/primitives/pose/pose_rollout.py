@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.rotations.quaternions import product
+from kineme.movements.rotations.rotation_vectors import exp
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.rollout import Rollout
-from kineme.primitives.pose.quaternions import product
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity
-from kineme.primitives.pose.rotation_vectors import exp
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
-from kineme.primitives.pose.rotation_vectors import as_vectors
+from kineme.movements.rotations.rotation_vectors import as_vectors
 from kineme.validation import Array
 
 _SMALL = 1.0  # rad; below it the closed forms cancel and the series in t^2 converge fast

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.coordinates import as_wxyz, columns_of
 from kineme.movements.preparation.preprocess import Step, preprocess
+from kineme.movements.rotations.quaternions import conjugate, normalized_rows, product
+from kineme.movements.rotations.rotation_vectors import exp
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.pose.quaternions import conjugate, normalized_rows, product
-from kineme.primitives.pose.rotation_vectors import exp
 from kineme.primitives.pose.unwrap import unwrapped
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
@@ -31,7 +33,8 @@ def to_tangent(movements: MovementsLike, steps: Iterable[Step] = ()) -> tuple[De
     Parameters
     ----------
     movements : Demonstrations, Trajectory, sequence of Trajectory or of arrays, or (n, T, d) array
-        d = 4: orientations (w, x, y, z). d = 7: poses, a position and an orientation.
+        d = 4: orientations (w, x, y, z). d = 7: poses, a position and an orientation. Movements whose `channels` are
+        an orientation, with or without three positions, and any discrete ones, are taken as recorded.
     steps : iterable of preprocessing steps, default ()
         Applied to positions and rotation vectors; the goal is read again from what remains.
 
@@ -47,12 +50,7 @@ def to_tangent(movements: MovementsLike, steps: Iterable[Step] = ()) -> tuple[De
     TrajectoryError
         Another number of columns; a quaternion that is not of norm 1; more than a full turn about a changing axis.
     """
-    demos = Demonstrations.of(movements)
-    if demos.n_dims not in COLUMNS:
-        raise TrajectoryError(
-            "expected movements of 4 columns, an orientation (w, x, y, z), or 7, a position (x, y, z) and an "
-            f"orientation, got {demos.n_dims} columns"
-        )
+    demos = as_poses(movements)
     positions = np.empty((len(demos.positions), demos.n_dims - 1))
     positions[:, :-3] = demos.positions[:, :-4]
     references = np.empty((len(demos), 4))
@@ -67,6 +65,38 @@ def to_tangent(movements: MovementsLike, steps: Iterable[Step] = ()) -> tuple[De
     if not steps:
         return tangent, references
     return to_tangent(from_tangent(preprocess(tangent, steps), references))
+
+
+def as_poses(movements: MovementsLike) -> Demonstrations:
+    """Movements of 4 columns (w, x, y, z) or 7, a position before it; see `to_tangent`.
+
+    Raises
+    ------
+    TrajectoryError
+        Another number of columns, or channels that are no pose.
+    """
+    demos = Demonstrations.of(movements)
+    if demos.channels is not None and not is_plain(demos.channels):
+        kinds = [one.kind for one in demos.channels]
+        if kinds.count("orientation") != 1 or demos.n_dims not in (3, 6):
+            raise TrajectoryError(
+                "expected channels that are an orientation, or an orientation and three positions, got "
+                f"{', '.join(f'{one.name} ({one.kind})' for one in demos.channels)}; choose the columns"
+            )
+        return _with_positions(demos, np.concatenate(_pose_columns(demos.channels, demos.recorded), axis=1))
+    if demos.n_dims not in COLUMNS:
+        raise TrajectoryError(
+            "expected movements of 4 columns, an orientation (w, x, y, z), or 7, a position (x, y, z) and an "
+            f"orientation, got {demos.n_dims} columns"
+        )
+    return demos
+
+
+def _pose_columns(channels: Channels, recorded: Array) -> list[Array]:
+    """The positions, and after them the orientation as (w, x, y, z)."""
+    named = list(zip(channels, columns_of(channels), strict=True))
+    positions = [recorded[:, columns] for one, columns in named if one.kind in ("position", "angle")]
+    return positions + [as_wxyz(recorded[:, columns], one) for one, columns in named if one.kind == "orientation"]
 
 
 def _rotation_vectors(demos: Demonstrations, start: int, stop: int) -> tuple[Array, Array]:
@@ -104,4 +134,6 @@ def from_tangent(tangent: Demonstrations, references: Array) -> Demonstrations:
 
 
 def _with_positions(demos: Demonstrations, positions: Array) -> Demonstrations:
-    return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)
+    return Demonstrations.of_movements(
+        replace(demos.movements, positions=positions, dimensions=None, channels=None, recorded=None), demos.steps
+    )

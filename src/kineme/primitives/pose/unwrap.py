@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.primitives.pose.quaternions import angle_between
-from kineme.primitives.pose.rotation_vectors import TINY, logarithm_factor
+from kineme.movements.rotations.quaternions import angle_between
+from kineme.movements.rotations.rotation_vectors import TINY, logarithm_factor
 from kineme.validation import Array
 
 # Per radian turned, the rotation vector moves up to (t/2) / sin(t/2): 1.6 at t = pi, 5 at 5.2, without bound at 2 pi.

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from kineme import KinemeError, orientation
 from kineme.errors import TrajectoryError
+from kineme.movements.rotations.rotation_vectors import nearest
 from kineme.orientation import angle_between, conjugate, continuous, exp, log, normalized, product, slerp
-from kineme.primitives.pose.rotation_vectors import nearest
 from rotation_samples import as_rotation, random_quaternions, seeds
 
 ANGLES = [0.0, 1e-300, 1e-160, 1e-12, 0.99e-7, 1.01e-7, 2.1e-7, 1e-3, 1.0, 3.0, np.pi - 1e-6, np.pi - 1e-12]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
-from kineme.primitives.pose.quaternions import as_quaternions, conjugate, product
+from kineme.movements.rotations.quaternions import as_quaternions, conjugate, product
 from kineme.validation import Array, as_numbers
 
 _TURN = 2.0 * np.pi

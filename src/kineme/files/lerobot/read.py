@@ -1,0 +1,119 @@
+"""A data set of LeRobot as movements: one for each episode, named by its task."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.files.lerobot.episodes import Episodes, read_episodes, read_tasks
+from kineme.files.lerobot.info import Info, read_info
+from kineme.files.lerobot.order import episode_names, whole_episodes
+from kineme.files.lerobot.shards import Frames, joined, read_shard
+from kineme.movements.tables.columns import choose_roles, column_numbers
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, listed, no_lines
+from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.validation import Array
+
+STATE = "observation.state"
+_STAMP = "timestamp [s]"
+_TOLERANCE = 1e-4  # s between the stored stamps and the frames at the declared rate, as LeRobot allows
+
+
+def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
+    """Read a data set of LeRobot, version 2 or 3.
+
+    The coordinates are the entries of ``observation.state``, or of the features that ``columns`` names: whole ones or
+    single entries. A movement is an episode, its place is ``episode 12``, its label the text of its task. Where the
+    stamps are those of frames at the declared rate, to 0.1 ms, exactly these are taken.
+
+    Raises
+    ------
+    DataError
+        No such data set or a damaged description; no feature to choose, or none of that name; pyarrow is not installed.
+    """
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
+    info = read_info(folder)
+    features, heads, chosen = _chosen(info, layout)
+    declared, tasks = read_episodes(folder, info), read_tasks(folder)
+    frames, unread = _all_frames(folder, declared, features)
+    frames, offsets, wrong = whole_episodes(frames, declared, unread)
+    left_out = [*unread.values(), *wrong]
+    if len(offsets) < 2:
+        raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
+    places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
+    columns = [_stamps(frames, offsets, info.fps), *(frames.values[:, k] for k in chosen)]
+    table = Table(
+        (_STAMP, *heads), columns, len(frames.values), no_lines, frames.faults,
+        segments=Segments(offsets, places, _labels(frames, offsets, tasks)), maker="LeRobot",
+    )  # fmt: skip
+    plain = Layout(time=0, columns=range(1, len(columns)), skip=layout.skip)
+    roles = choose_roles(table.heads, ("number",) * len(table.heads), plain)
+    return table_movements(table, roles, plain, f"v{info.version}")._replace(left_out=tuple(left_out))
+
+
+def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
+    """Features that are read with their widths; heads of the coordinates; their columns among those features."""
+    if not info.heads:
+        raise DataError("expected features of numbers in a LeRobot data set, got none")
+    owners = [name for name, entries in info.heads.items() for _ in entries]
+    entries = [entry for one in info.heads.values() for entry in one]
+    full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
+    vectors = info.vectors
+    if layout.coordinates is not None:
+        numbers: Sequence[int] = column_numbers(full, layout.coordinates)
+    elif STATE in info.heads or len(vectors) == 1:
+        name = STATE if STATE in info.heads else next(iter(vectors))
+        numbers = [k for k, owner in enumerate(owners) if owner == name]
+    else:
+        got = listed(f"{name} ({width})" for name, width in (vectors or dict.fromkeys(info.heads, 1)).items())
+        raise DataError(f"expected the feature {STATE!r}, got {got}; say which with columns=")
+    features = {name: len(info.heads[name]) for name in dict.fromkeys(owners[k] for k in numbers)}
+    starts = dict(zip(features, np.cumsum([0, *features.values()]).tolist(), strict=False))
+    columns = [starts[owners[k]] + k - owners.index(owners[k]) for k in numbers]
+    alone = len(features) == 1
+    heads = tuple(entries[k] if alone and entries[k] and not entries[k].isdecimal() else full[k] for k in numbers)
+    return features, heads, columns
+
+
+def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> tuple[Frames, dict[str, str]]:
+    """The frames of all shards in the order of their episodes; shard -> why it could not be read."""
+    parts: list[Frames] = []
+    unread: dict[str, str] = {}
+    taken, width = 0, sum(features.values())
+    for shard in dict.fromkeys(declared.shards):
+        try:
+            part = read_shard(folder, shard, features, taken)
+        except DataError as error:
+            lost = [int(k) for k, one in zip(declared.numbers, declared.shards, strict=True) if one == shard]
+            unread[shard] = f"{error}; left out {episode_names(lost)}"
+            continue
+        parts.append(part)
+        taken += 8 * (width + 4) * len(part.values)
+    if not parts:
+        raise DataError(f"expected shards that can be read, got none; the first: {next(iter(unread.values()))}")
+    return joined(parts, width), unread
+
+
+def _stamps(frames: Frames, offsets: NDArray[np.intp], fps: float) -> Array:
+    """Seconds since the beginning of each episode: of its frames at the declared rate, else as they are stored."""
+    even = frames.frames / fps
+    others = np.add.reduceat(~(np.abs(frames.stamps - even) <= _TOLERANCE), offsets[:-1]) > 0
+    return np.where(np.repeat(others, np.diff(offsets)), frames.stamps, even)
+
+
+def _labels(frames: Frames, offsets: NDArray[np.intp], tasks: dict[int, str]) -> list[str | None]:
+    """The task of each episode, the most frequent one where there are several."""
+    first = frames.tasks[offsets[:-1]]
+    mixed = np.add.reduceat(frames.tasks != np.repeat(first, np.diff(offsets)), offsets[:-1]) > 0
+    for i in np.flatnonzero(mixed).tolist():
+        known, counts = np.unique(frames.tasks[offsets[i] : offsets[i + 1]], return_counts=True)
+        first[i] = known[counts.argmax()]
+    return [tasks.get(k) or None for k in first.tolist()]

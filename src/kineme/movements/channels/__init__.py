@@ -1,0 +1,1 @@
+"""What the columns of a recording are: positions, angles, orientations, discrete values."""

@@ -1,0 +1,83 @@
+"""From recorded columns to the coordinates that a movement primitive learns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.movements.channels.channel import Channel, Channels
+from kineme.movements.channels.wraps import period_of, without_wraps
+from kineme.movements.rotations.quaternions import conjugate, product
+from kineme.movements.rotations.rotation_vectors import log
+from kineme.validation import Array
+
+_ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
+
+
+def columns_of(channels: Channels) -> list[slice]:
+    """The columns of each channel."""
+    ends = np.cumsum([len(one.columns) for one in channels]).tolist()
+    return [slice(end - len(one.columns), end) for end, one in zip(ends, channels, strict=True)]
+
+
+def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
+    """Recorded columns (total, m) with angles that do not jump, and quaternions of norm 1 whose signs do not either.
+
+    Parameters
+    ----------
+    columns : ndarray of shape (total, m)
+        All movements, one after the other; the norms of quaternions have been checked.
+    offsets : ndarray of shape (n + 1,)
+    channels : Channels
+    """
+    result = np.array(columns, dtype=np.float64, order="C")
+    for one, rows in zip(channels, columns_of(channels), strict=True):
+        if one.kind == "angle":
+            angles = result[:, rows.start]
+            result[:, rows.start] = without_wraps(angles, offsets, period_of(angles, one.unit))
+        elif one.kind == "orientation":
+            result[:, rows] = _continuous(result[:, rows], offsets)
+    return result
+
+
+def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
+    """Coordinates (total, d) of `canonical` columns (total, m).
+
+    An orientation becomes the integral of its angular velocity in the world frame,
+    ``r_0 = 0, r_k+1 = r_k + log(q_k+1 conj(q_k))`` [rad], with the rotation vector ``log``. Unlike the rotation vector
+    from one reference it has no limit of a full turn, and it does not depend on what came before a movement but for
+    an offset. A tool that is mounted differently changes nothing; a scene that is turned turns it as it turns a path.
+    """
+    parts = []
+    for one, rows in zip(channels, columns_of(channels), strict=True):
+        if one.kind == "orientation":
+            parts.append(_integrated(as_wxyz(columns[:, rows], one), offsets))
+        elif one.coordinates:
+            parts.append(columns[:, rows])
+    return np.ascontiguousarray(np.concatenate(parts, axis=1))
+
+
+def as_wxyz(q: Array, channel: Channel) -> Array:
+    """Quaternions (..., 4) in the order of a channel's columns as (w, x, y, z)."""
+    return q[..., [channel.order.index(part) for part in "wxyz"]]
+
+
+def from_wxyz(q: Array, channel: Channel) -> Array:
+    """The inverse of `as_wxyz`."""
+    return q[..., ["wxyz".index(part) for part in channel.order]]
+
+
+def _continuous(q: Array, offsets: NDArray[np.intp]) -> Array:
+    """Quaternions (total, 4) of norm 1; along each movement neighbors lie in one hemisphere, its first stays."""
+    flips = np.concatenate(([False], (q[1:] * q[:-1]).sum(axis=1) < 0))
+    odd = np.logical_xor.accumulate(flips)
+    odd ^= np.repeat(odd[offsets[:-1]], np.diff(offsets))
+    norms = np.linalg.norm(q, axis=1, keepdims=True)
+    norms[np.abs(norms - 1.0) < _ROUNDING] = 1.0  # every bit as recorded
+    return np.asarray(np.where(odd[:, None], -q, q) / norms)
+
+
+def _integrated(q: Array, offsets: NDArray[np.intp]) -> Array:
+    steps = log(product(q[1:], conjugate(q[:-1])))
+    turned = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
+    return np.asarray(turned - np.repeat(turned[offsets[:-1]], np.diff(offsets), axis=0))

@@ -1,0 +1,53 @@
+"""Angles that wrap: find the period, and take the jumps away."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.validation import Array
+
+_TURN = 2.0 * np.pi
+#: Where recorded angles lie: between minus and plus half a turn, or from 0 to a whole one.
+_RANGES = ((-np.pi, np.pi), (0.0, _TURN), (-180.0, 180.0), (0.0, 360.0))
+_SLACK = 1e-3  # of a period, beyond the range
+_JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
+
+
+def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
+    """The period of a column (total,) whose range, and a jump through it, show that it wraps; else None."""
+    jump = float(np.abs(_steps(angles, offsets)).max(initial=0.0))
+    least, most = float(angles.min(initial=0.0)), float(angles.max(initial=0.0))
+    for low, high in _RANGES:
+        period = high - low
+        if low - _SLACK * period <= least and most <= high + _SLACK * period and jump > 0.9 * period:
+            return period
+    return None
+
+
+def period_of(angles: Array, unit: str | None) -> float:
+    """The period of an angle: 360 if its unit is the degree, or not known and its values are beyond one turn."""
+    if unit is None:
+        return _TURN if float(np.abs(angles).max(initial=0.0)) <= _TURN * (1 + _SLACK) else 360.0
+    return 360.0 if unit.lower().startswith(("deg", "°")) else _TURN
+
+
+def without_wraps(angles: Array, offsets: NDArray[np.intp], period: float) -> Array:
+    """Angles (total,) of movements one after the other, continuous along each; the first of each stays as it is.
+
+    A step of 3/4 of a period or more counts as a wrap. A shorter one is motion: with samples so sparse that a joint
+    turns further between two of them, no rule could tell.
+    """
+    steps = _steps(angles, offsets)
+    turns = np.sign(steps) * np.floor(np.abs(steps) / period + (1.0 - _JUMP))
+    if not turns.any():
+        return angles
+    total = np.concatenate(([0.0], np.cumsum(turns)))
+    return np.asarray(angles - period * (total - np.repeat(total[offsets[:-1]], np.diff(offsets))))
+
+
+def _steps(values: Array, offsets: NDArray[np.intp]) -> Array:
+    """Differences of neighbors (total - 1,), 0 from one movement to the next."""
+    steps = np.diff(values)
+    steps[offsets[1:-1] - 1] = 0.0
+    return steps

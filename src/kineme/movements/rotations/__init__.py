@@ -1,0 +1,1 @@
+"""Unit quaternions and rotation vectors."""

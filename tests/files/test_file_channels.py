@@ -1,0 +1,86 @@
+"""What columns are, from the file on: names and kinds are kept, and what is no orientation is refused by name."""
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import SpecificationError
+from kineme.orientation import exp, product
+
+HEADS = "frame_index,Sub Frame,t,pose.position.x," + ",".join(f"pose.orientation.{part}" for part in "xyzw")
+N = 60
+
+
+def write(path, spoiled=None, gripper="gripper", quaternion=4.0):
+    u = np.linspace(0, 1, N)
+    q = product(exp(np.outer(u, [0, 0.2, quaternion])), [0.0, 1.0, 0.0, 0.0])[:, [1, 2, 3, 0]]
+    if spoiled is not None:
+        q[spoiled] = 0.0
+    table = np.column_stack([np.arange(N), np.zeros(N), u, u**2, q, np.mod(2 + 3 * u, np.pi * 2) - np.pi, u > 0.5])
+    np.savetxt(path, table, delimiter=",", header=f"{HEADS},panda_joint1,{gripper}", comments="")
+    return path
+
+
+def test_names_and_kinds_are_kept_and_counters_are_left_out(tmp_path):
+    for k in range(3):
+        write(tmp_path / f"{k}.csv", quaternion=k + 1)
+    recordings = kineme.read_recordings(tmp_path)
+    demos = recordings.demonstrations
+    assert [(one.name, one.kind) for one in demos.channels] == [
+        ("pose.position.x", "position"),
+        ("pose.orientation", "orientation"),
+        ("panda_joint1", "angle"),
+        ("gripper", "discrete"),
+    ]
+    assert demos.dimensions == (
+        "pose.position.x", "pose.orientation.rx", "pose.orientation.ry", "pose.orientation.rz", "panda_joint1",
+    )  # fmt: skip
+    assert recordings.detected[0][0].ignored == ("frame_index", "Sub Frame")
+    assert np.abs(np.diff(demos[1].positions[:, 4])).max() < 0.1  # no jump where the joint wraps
+    np.testing.assert_allclose(np.linalg.norm(demos.recorded[:, 1:5], axis=1), 1.0)
+    assert set(demos.recorded[:, 6]) == {0.0, 1.0}
+    one = kineme.read_recording(tmp_path / "2.csv")
+    assert one.channels == demos.channels
+    np.testing.assert_array_equal(one.recorded, demos[2].recorded)
+
+
+def test_a_quaternion_of_zero_costs_its_movement_and_names_the_line(tmp_path):
+    write(tmp_path / "good.csv")
+    write(tmp_path / "bad.csv", spoiled=7)
+    recordings = kineme.read_recordings(tmp_path)
+    assert [source.path for source in recordings.sources] == ["good.csv"]
+    (problem,) = recordings.problems
+    assert problem.file == "bad.csv"
+    assert "expected unit quaternions in pose.orientation.x" in problem.reason
+    assert "got norm 0 at sample 7" in problem.reason
+    with pytest.raises(kineme.DataError, match="found none; the first that is none: bad"):
+        kineme.read_recordings(tmp_path / "bad.csv")
+    with pytest.raises(kineme.DataError, match="expected unit quaternions"):
+        kineme.read_recording(write(tmp_path / "alone.csv", spoiled=7))
+
+
+def test_a_file_of_other_heads_is_no_company_for_orientations(tmp_path):
+    for k in range(2):
+        write(tmp_path / f"{k}.csv")
+    write(tmp_path / "other.csv", gripper="claw")
+    recordings = kineme.read_recordings(tmp_path)
+    assert len(recordings) == 2
+    assert "'claw'] where most files have ['pose.position.x'" in recordings.problems[0].reason
+
+
+def test_the_caller_says_what_columns_are(tmp_path):
+    path = write(tmp_path / "a.csv", gripper="g")
+    assert kineme.read_recordings(path).demonstrations.channels[-1].kind == "position"
+    assert kineme.read_recordings(path, kinds={"g": "discrete"}).demonstrations.channels[-1].kind == "discrete"
+    with pytest.raises(SpecificationError, match="'h'; read are"):
+        kineme.read_recordings(path, kinds={"h": "discrete"})
+
+
+def test_a_recognizer_takes_poses_as_they_are_read(tmp_path):
+    for k in range(4):
+        folder = tmp_path / ("turn" if k % 2 else "twist")
+        folder.mkdir(exist_ok=True)
+        write(folder / f"{k}.csv", quaternion=1.0 + 4 * (k % 2) + 0.1 * k)
+    demos = kineme.read_recordings(tmp_path, columns=HEADS.split(",")[4:]).demonstrations
+    recognizer = kineme.Recognizer().fit(demos[::2])
+    assert recognizer.predict(demos[1::2]).tolist() == demos.labels[1::2].tolist()

@@ -1,0 +1,190 @@
+"""Data sets of LeRobot: episodes are movements, tasks are labels; what is wrong is said episode by episode."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from lerobot_sets import NAMES, TASKS, write_v2, write_v3
+
+import kineme
+from kineme.errors import DataError
+
+
+@pytest.fixture(params=["v2", "v3", "v3 lists"])
+def folder(request, tmp_path):
+    where = tmp_path / "set"
+    return write_v2(where) if request.param == "v2" else write_v3(where, fixed="lists" not in request.param)
+
+
+def shard_of(folder, k=0):
+    return sorted(folder.glob("data/*/*.parquet"))[k]
+
+
+def change(folder, frames, k=0):
+    """Write a changed shard."""
+    path = shard_of(folder, k)
+    frames(pd.read_parquet(path)).to_parquet(path)
+
+
+def test_episodes_are_movements_and_tasks_are_labels(folder):
+    found = kineme.read_recordings(folder)
+    demos, how = found.demonstrations, found.detected[0][0]
+    assert demos.dimensions == tuple(NAMES)
+    assert demos.lengths.tolist() == [20, 30, 25]
+    assert [source.place for source in found.sources] == ["episode 0", "episode 1", "episode 2"]
+    assert found.labels.tolist() == [TASKS[0], TASKS[1], TASKS[0]]
+    assert (found.problems, how.time, how.units) == ((), "timestamp [s]", "s")
+    assert how.format.startswith("LeRobot v")
+    assert {source.path for source in found.sources} == {"set"}
+    np.testing.assert_array_equal(demos[1].times, np.arange(30) / 50)  # exactly, though they are stored as float32
+    stored = np.vstack(pd.read_parquet(shard_of(folder))["observation.state"])[:20]
+    np.testing.assert_array_equal(demos[0].positions, stored.astype(np.float64))
+
+
+def test_features_are_chosen_whole_or_by_their_entries(folder):
+    both = kineme.read_recordings(folder, columns=["observation.state", "action"]).demonstrations
+    assert both.dimensions == tuple(f"{name}.{entry}" for name in ("observation.state", "action") for entry in NAMES)
+    one = kineme.read_recordings(folder, columns="action.elbow_flex.pos").demonstrations
+    assert one.dimensions == ("elbow_flex.pos",)
+    np.testing.assert_array_equal(one.positions[:, 0], both.positions[:, 4])
+    mixed = kineme.read_recordings(folder, columns=["action.gripper.pos", "observation.state.shoulder_pan.pos"])
+    np.testing.assert_array_equal(mixed.demonstrations.positions, both.positions[:, [5, 0]])
+    with pytest.raises(DataError, match=r"expected a column 'velocity', got the columns \['observation.state.shoulder"):
+        kineme.read_recordings(folder, columns="velocity")
+
+
+def test_without_a_state_the_vector_features_are_listed(folder):
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    features = {f"arm.{name}" if name == "observation.state" else name: one for name, one in info["features"].items()}
+    path.write_text(json.dumps(info | {"features": features}))
+    words = r"expected the feature 'observation.state', got \['arm.observation.state \(3\)', 'action \(3\)'\]"
+    with pytest.raises(DataError, match=words):
+        kineme.read_recordings(folder)
+
+
+def test_a_data_set_in_a_folder_is_one_source_and_goes_into_a_library(folder, tmp_path):
+    found = kineme.read_recordings(folder.parent)
+    assert {source.path for source in found.sources} == {"set"}
+    with kineme.ActionLibrary(tmp_path / "library", create=True) as library:
+        report = library.learn(found)
+    assert (report.added, sorted(report.symbols)) == (3, sorted(TASKS))
+
+
+def test_a_missing_or_damaged_shard_names_its_episodes(folder):
+    shard_of(folder).unlink()
+    found = kineme.read_recordings(folder)
+    lost = ["episode 0"] if (folder / "meta" / "tasks.jsonl").exists() else ["episode 0", "episode 1"]
+    assert len(found) == 3 - len(lost)
+    assert f"set: expected the shard {'data/chunk-000'}" in str(found.problems[0])
+    assert f"found none; left out {'episode 0' if len(lost) == 1 else 'episodes 0, 1'}" in found.problems[0].reason
+
+
+def test_a_damaged_shard_is_named(folder):
+    shard_of(folder, -1).write_bytes(b"PAR1 cut")
+    found = kineme.read_recordings(folder)
+    assert len(found) == 2
+    assert "to be a Parquet file, got a damaged one" in found.problems[0].reason
+    assert found.problems[0].reason.endswith("left out episode 2")
+    for shard in folder.glob("data/*/*"):
+        shard.unlink()
+    with pytest.raises(DataError, match="expected shards that can be read, got none; the first: expected the shard"):
+        kineme.read_recordings(folder)
+
+
+def swapped(frames):
+    frames.loc[[3, 4]] = frames.loc[[4, 3]].to_numpy()
+    return frames
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [
+        (lambda frames: frames.drop(index=7), "episode 0: expected frame 7 next, got frame 8"),
+        (swapped, "episode 0: expected frame 3 next, got frame 4"),
+        (lambda frames: frames[frames["frame_index"] < 15], "episode 0: expected 20 frames as declared, got 15"),
+        (lambda frames: frames.replace({"episode_index": {0: 9}}), "episode 9: expected an episode that the meta"),
+    ],
+)
+def test_an_episode_that_is_not_whole_is_named_and_the_others_are_read(folder, frames, words):
+    change(folder, frames)
+    found = kineme.read_recordings(folder)
+    assert words in "; ".join(map(str, found.problems))
+    assert "episode 2" in [source.place for source in found.sources]
+    assert "episode 0" not in [source.place for source in found.sources]
+
+
+def test_episodes_in_another_order_are_read_and_named(tmp_path):
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: pd.concat([frames[frames["episode_index"] == k] for k in (1, 0)]))
+    found = kineme.read_recordings(folder)
+    assert [source.place for source in found.sources] == ["episode 1", "episode 0", "episode 2"]
+    assert "episode 0: its frames stand behind those of episode 1" in found.problems[0].reason
+    change(folder, lambda frames: pd.concat([frames[:5], frames[-5:], frames[5:-5]]))
+    found = kineme.read_recordings(folder)
+    assert "expected its frames in one place, got them in" in found.problems[0].reason
+
+
+def test_a_vector_of_another_length_costs_its_episode_or_its_frame(tmp_path):
+    folder = write_v3(tmp_path / "set", fixed=False)
+
+    def shortened(frames):
+        frames.at[5, "observation.state"] = frames.at[5, "observation.state"][:2]
+        frames.at[6, "observation.state"] = None
+        return frames
+
+    change(folder, shortened)
+    found = kineme.read_recordings(folder)
+    assert "movement episode 0: expected 3 numbers in 'observation.state', got 2" in found.problems[0].reason
+    assert len(found) == 2
+    tolerant = kineme.read_recordings(folder, skip="sample")
+    assert tolerant.demonstrations.lengths.tolist() == [18, 30, 25]
+
+
+def test_stamps_that_do_not_follow_the_rate_are_kept(tmp_path):
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: frames.assign(timestamp=frames["timestamp"] * 1.5))
+    times = kineme.read_recordings(folder).demonstrations[0].times
+    np.testing.assert_allclose(times, 1.5 * np.arange(20) / 50, atol=1e-6)
+
+
+def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: frames.assign(task_index=np.where(frames["frame_index"] < 3, 0, 1)))
+    assert kineme.read_recordings(folder).labels.tolist() == [TASKS[1], TASKS[1], TASKS[0]]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"codebase_version": "v1.6"}, "of version 2 or 3, got v1.6; convert it"),
+        ({"codebase_version": None}, "with codebase_version and features"),
+        ({"fps": 0}, "expected fps above 0 in meta/info.json, got 0"),
+        ({"data_path": "../{file_index}.parquet"}, "a data_path within the data set"),
+        ({"data_path": "data/{other}.parquet"}, "expected a data_path such as"),
+        ({"features": {}}, "expected features of numbers"),
+    ],
+)
+def test_a_damaged_description_says_what_is_wrong(folder, change, words):
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text()) | change
+    path.write_text(json.dumps({name: one for name, one in info.items() if one is not None}))
+    with pytest.raises(DataError, match=words):
+        kineme.read_recordings(folder)
+    path.write_text("{")
+    with pytest.raises(DataError, match=r"expected meta/info.json of a LeRobot data set"):
+        kineme.read_recordings(folder)
+
+
+def test_missing_metadata_is_named(tmp_path):
+    folder = write_v2(tmp_path / "two")
+    (folder / "meta" / "tasks.jsonl").unlink()
+    assert set(kineme.read_recordings(folder).labels) == {None}
+    (folder / "meta" / "episodes.jsonl").unlink()
+    with pytest.raises(DataError, match=r"expected meta/episodes.jsonl"):
+        kineme.read_recordings(folder)
+    folder = write_v3(tmp_path / "three")
+    next(folder.glob("meta/episodes/*/*")).unlink()
+    with pytest.raises(DataError, match=r"expected meta/episodes/\*/\*.parquet of a LeRobot data set of version 3"):
+        kineme.read_recordings(folder)

@@ -1,0 +1,60 @@
+"""Angles that wrap come out continuous; nothing else is touched."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kineme.movements.channels.wraps import period_of, without_wraps, wrap_period
+
+
+@given(
+    steps=st.lists(st.floats(-0.24, 0.24), min_size=4, max_size=60),
+    start=st.floats(-20, 20),
+    period=st.sampled_from([2 * np.pi, 360.0]),
+    low=st.sampled_from([0.0, -0.5]),
+    cut=st.integers(1, 3),
+)
+def test_a_wrapped_angle_comes_back_as_it_turned_in_each_movement(steps, start, period, low, cut):
+    turned = period * (start + np.cumsum(steps))
+    wrapped = turned - period * np.floor(turned / period - low)  # from low to low + 1 periods
+    offsets = np.array([0, cut, len(steps)])
+    found = without_wraps(wrapped, offsets, period)
+    for first, stop in pairwise(offsets):
+        np.testing.assert_allclose(found[first:stop] - found[first], turned[first:stop] - turned[first], atol=1e-9)
+        assert found[first] == wrapped[first]
+
+
+def test_steps_below_three_quarters_of_a_period_are_motion():
+    angles = np.array([0.0, 4.5, 0.0, 4.5])
+    assert without_wraps(angles, np.array([0, 4]), 2 * np.pi) is angles
+
+
+@pytest.mark.parametrize(
+    ("angles", "period"),
+    [
+        ([3.0, 3.1, -3.1, -3.0], 2 * np.pi),
+        ([6.2, 0.05, 0.1, 0.2], 2 * np.pi),
+        ([-179.0, 179.0, 178.0, 177.0], 360.0),
+        ([359.0, 1.0, 2.0, 3.0], 360.0),
+        ([3.0, 3.1, 3.2, 3.3], None),
+        ([-3.0, -1.0, 1.0, 3.0], None),
+        ([0.0, 5.0, -700.0, 1.0], None),
+    ],
+)
+def test_only_a_jump_through_the_whole_range_shows_a_period(angles, period):
+    assert wrap_period(np.array(angles), np.array([0, 4])) == period
+
+
+def test_a_jump_from_one_movement_to_the_next_is_none():
+    assert wrap_period(np.array([3.0, 3.1, -3.1, -3.0]), np.array([0, 2, 4])) is None
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "period"),
+    [(3.0, None, 2 * np.pi), (90.0, None, 360.0), (3.0, "deg", 360.0), (9.0, "rad", 2 * np.pi)],
+)
+def test_the_unit_or_the_values_tell_the_period(largest, unit, period):
+    assert period_of(np.array([0.0, largest]), unit) == period
