@@ -39,7 +39,7 @@ def test_the_only_topic_that_can_be_read_is_read(tmp_path, kind, compress):
         "header.stamp",
         "s",
         "stamps of headers",
-        ("recorded",),
+        (),
     )
     assert problems == []
     assert read_recordings(path).sources[0].path == path.name
@@ -180,7 +180,7 @@ def test_columns_of_stamps_and_joints_are_chosen_by_name(tmp_path):
     assert only(path)[1].columns == tuple(names)
     _, how, _ = only(path, columns=["id", "time"], time="recorded")
     assert (how.columns, how.time, how.units_from) == (("id", "time"), "recorded", "as asked for")
-    assert how.ignored == ("header.stamp", "label", "index_0")
+    assert how.ignored == ("label", "index_0")
     with pytest.raises(kineme.DataError, match="expected a column 'x', got the columns"):
         read_recordings(path, columns="x")
     with pytest.raises(kineme.DataError, match="expected movements that are told apart by messages"):
@@ -224,7 +224,7 @@ def test_each_planned_trajectory_is_a_movement(tmp_path, kind):
     np.testing.assert_allclose(read.demonstrations[1].times, np.arange(12) / 10)
     assert [one.reason for one in read.problems] == [
         "movement 2: expected at least 4 samples, got 2",
-        "topic /plan: message 4: 1 positions for 2 joints",
+        "topic /plan: message 4: expected a position for each of 2 joints, got 1",
         "topic /plan: 1 message with other columns ['c']",
     ]
 

@@ -22,18 +22,31 @@ def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) 
 
     Shows, per label: how many movements, how long, sampled how fast and how evenly, with which gaps. Below: how the
     files were understood, movements that occur twice, and what could not be read and why. In a folder, the name of
-    the innermost folder is the label.
+    the innermost folder is the label. Of a ROS bag, its topics and frames are listed first.
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
+    from kineme.errors import DataError
+    from kineme.files.inspection.contents import contents_as_data, contents_as_words, contents_of
     from kineme.files.inspection.inspect import inspect as summarize
+    from kineme.files.inspection.inspect import nothing_read
     from kineme.files.inspection.report import as_data, as_words
 
-    recorded = read(recordings, options)
-    if plot is not None:
-        _draw(recorded, plot)
-    summary = summarize(recorded)
-    say(as_json, as_data(summary), lambda: as_words(summary))
+    contents = contents_of(recordings)
+    try:
+        recorded = read(recordings, options)
+    except DataError as error:
+        if not contents or plot is not None:
+            raise
+        summary = nothing_read(str(recordings), str(error))
+        text = f"not read: {error}"
+    else:
+        if plot is not None:
+            _draw(recorded, plot)
+        summary = summarize(recorded)
+        text = as_words(summary)
+    data = as_data(summary) | ({"contents": contents_as_data(contents)} if contents else {})
+    say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), text]))
 
 
 def _draw(recorded: Any, path: Path) -> None:

@@ -6,15 +6,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.files.arrays.arrays import POSITIONS, Named, arrays_movements, has_known_names, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names
+from kineme.files.arrays.hdf5 import hdf5_movements
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
-from kineme.files.arrays.matlab import read_demos
+from kineme.files.arrays.matlab import mat_movements
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
+from kineme.files.contents import Contents
 from kineme.files.lerobot.info import MARKER
 from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
+from kineme.files.ros.bag_contents import bag_contents
 from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
@@ -34,11 +37,14 @@ class Format(NamedTuple):
     read_bytes, read_path : callable or None
     label_is_stem : bool
         Whether the name of the file is the label of its movements.
+    contents : callable, optional
+        What a file holds besides what is read of it, for formats that hold more than one recording.
     """
 
     read_bytes: Callable[[bytes, Layout], Parsed] | None = None
     read_path: Callable[[Path, Layout], Parsed] | None = None
     label_is_stem: bool = False
+    contents: Callable[[Path], list[Contents]] | None = None
 
 
 class DataSet(NamedTuple):
@@ -87,13 +93,6 @@ def _read_npy(data: bytes, layout: Layout) -> Parsed:
     return arrays_movements({POSITIONS[0]: array_of_npy(data, Path("it"))}, layout, "NPY")
 
 
-def _read_matlab(data: bytes, layout: Layout) -> Parsed:
-    demos = read_demos(data)
-    return parsed_arrays(
-        demos.positions, demos.times, Named([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
-    )
-
-
 def _read_bvh(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_bvh_table(data, layout), layout, "BVH")
 
@@ -101,6 +100,8 @@ def _read_bvh(data: bytes, layout: Layout) -> Parsed:
 def _read_c3d(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_c3d_table(data, layout), layout, "C3D")
 
+
+_BAG = Format(read_path=read_bag, contents=bag_contents)
 
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
 FORMATS: dict[str, Format] = {
@@ -112,12 +113,14 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
-    ".mat": Format(_read_matlab, label_is_stem=True),
+    ".mat": Format(mat_movements, label_is_stem=True),
+    ".h5": Format(read_path=hdf5_movements),
+    ".hdf5": Format(read_path=hdf5_movements),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
-    ".bag": Format(read_path=read_bag),
-    ".db3": Format(read_path=read_bag),
-    ".mcap": Format(read_path=read_bag),
+    ".bag": _BAG,
+    ".db3": _BAG,
+    ".mcap": _BAG,
 }
 
 #: Folders that are one source.
@@ -128,7 +131,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
         Format(read_path=lerobot_movements),
     ),
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), Format(read_path=read_bag)),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG),
 )
 
 

@@ -170,17 +170,6 @@ def fill_pairs(rows: Rows, pairs: Rows) -> None:
 
 
 @jit
-def fill_squares(rows: Rows, squares: Any) -> None:
-    """Sums of squares of each row in double precision; the twin is `procrustes._squares`."""
-    for i in range(len(rows)):
-        total = 0.0
-        for k in range(rows.shape[1]):
-            x = np.float64(rows[i, k])
-            total += x * x
-        squares[i] = total
-
-
-@jit
 def fill_soft_in_plane(parts: Rows, a: Any, b: Any, best: Any, rotations: Any) -> None:
     """Best products (n, m) under a prior, and cosines and sines (n, m, 2) if there is room for them.
 

@@ -208,17 +208,17 @@ class Procrustes:
 
 
 _PLANE_OPERATIONS = 20  # elementary operations of a pair in the plane
+_ROWS_AT_ONCE = 256
 _MANY = 16  # rows from which on a product by BLAS is faster
 
 
 def _squares(rows: NDArray[Any]) -> Array:
     """Squared norms (n,), in double precision."""
-    if use_compiled(rows.size):
-        squares = np.empty(len(rows))
-        compiled_module("kineme.kernels._compiled").fill_squares(rows, squares)
-        return squares
-    double = rows.astype(np.float64, copy=False)
-    return np.asarray(np.einsum("ij,ij->i", double, double))
+    squares = np.empty(len(rows))
+    for start in range(0, len(rows), _ROWS_AT_ONCE):  # converted rows stay in the cache
+        some = rows[start : start + _ROWS_AT_ONCE].astype(np.float64, copy=False)
+        np.einsum("ij,ij->i", some, some, out=squares[start : start + _ROWS_AT_ONCE])
+    return squares
 
 
 def as_complex(rows: NDArray[Any]) -> NDArray[Any]:

@@ -121,10 +121,17 @@ def known_labels(
     calibration : Calibration
     error_rate : float
     """
-    possible = calibration.p_values(nearest, error_rate) > error_rate
-    possible |= ~possible.any(axis=1, keepdims=True)
+    p, p_known = calibration.p_values(nearest, error_rate), calibration.known_p_values(nearest, error_rate)
+    return _known_labels(classes, scores, p > error_rate, p_known > error_rate)
+
+
+def _known_labels(
+    classes: NDArray[Any], scores: Array, possible: NDArray[np.bool_], known: NDArray[np.bool_]
+) -> NDArray[np.object_]:
+    """The same, of classes that are possible (n, C) and movements that are known (n,)."""
+    possible = possible | ~possible.any(axis=1, keepdims=True)
     labels = classes.astype(object)[np.where(possible, scores, -np.inf).argmax(axis=1)]
-    labels[calibration.known_p_values(nearest, error_rate) <= error_rate] = None
+    labels[~known] = None
     return np.asarray(labels)
 
 
@@ -184,8 +191,8 @@ def verdicts_of(
     p = calibration.p_values(compared.nearest, error_rate)
     calibrated = bool(calibration.calibrated(error_rate).all())
     references = compared.references
-    labels = known_labels(references.classes, scores, compared.nearest, calibration, error_rate)
     p_known = calibration.known_p_values(compared.nearest, error_rate)
+    labels = _known_labels(references.classes, scores, p > error_rate, p_known > error_rate)
     rules = calibration.rules(compared.nearest, error_rate)
     classes = references.classes.tolist()
     ranks = np.argsort(-scores, axis=1, kind="stable")

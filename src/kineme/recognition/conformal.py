@@ -113,12 +113,9 @@ class Calibration:
         """P-values of each class (n, C), from as few classes as suffice to reach `error_rate`."""
         scores = self.scores(nearest)
         result = broad_law(scores)
-        ordered: dict[int, Array] = {}  # classes share what is pooled
-        for c, counted in enumerate(_counted(self.own, self.pooled, error_rate)):
+        for c, counted in enumerate(self._counting(error_rate)[0]):
             if counted is not None:
-                if id(counted[1]) not in ordered:
-                    ordered[id(counted[1])] = np.sort(counted[1])
-                result[:, c] = _shares(ordered[id(counted[1])], scores[:, c])
+                result[:, c] = _shares(counted[1], scores[:, c])
         return result
 
     def known_p_values(self, nearest: Array, error_rate: float) -> Array:
@@ -127,18 +124,18 @@ class Calibration:
         like = scores.argmin(axis=1)
         novelty = scores[np.arange(len(scores)), like]
         result = np.empty(len(scores))
-        counted = _counted(self.own_novelties, self.pooled_novelties, error_rate)
+        counted = self._counting(error_rate)[1]
         for c in np.unique(like):
             own, chosen, few = novelty[like == c], counted[c], self.pooled_novelties[c]
             if chosen is not None:
-                result[like == c] = _shares(np.sort(chosen[1]), own)
+                result[like == c] = _shares(chosen[1], own)
             else:
                 result[like == c] = law(own / max(few.mean(), LEAST)) if len(few) else broad_law(own)
         return result
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
         """The rule of each movement's `known_p_values`: "class", "pooled" or "guess", see `RULES`."""
-        counted = _counted(self.own_novelties, self.pooled_novelties, error_rate)
+        counted = self._counting(error_rate)[1]
         chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
         return ["guess" if one is None else one[0] for one in chosen]
 
@@ -147,29 +144,49 @@ class Calibration:
 
         They keep it where at least ``1 / error_rate - 1`` left-out scores count. One demonstration has none.
         """
-        return np.array([counted is not None for counted in _counted(self.own, self.pooled, error_rate)])
+        return np.array([counted is not None for counted in self._counting(error_rate)[0]])
 
     def select(self, classes: NDArray[np.intp]) -> Calibration:
-        """The calibration of some of the classes."""
+        """The calibration of some of the classes, in rising order."""
+        if len(classes) == len(self.scales):
+            return self
         parts = (self.own, self.pooled, self.own_novelties, self.pooled_novelties)
         return Calibration(self.scales[classes], *(tuple(part[c] for c in classes) for part in parts))
 
+    def _counting(self, error_rate: float) -> tuple[list[Counted | None], list[Counted | None]]:
+        """What counts of the scores and of the novelties; kept for the error rate that was asked for last."""
+        last = vars(self).get("_last_counting")
+        if last is None or last[0] != error_rate:
+            members = _counted(self.own, self.pooled, error_rate)
+            last = error_rate, members, _counted(self.own_novelties, self.pooled_novelties, error_rate)
+            vars(self)["_last_counting"] = last
+        return last[1], last[2]
 
-def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[tuple[str, Array] | None]:
+
+Counted = tuple[str, Array]  # a rule, and scores in rising order
+
+
+def _counted(own: Sequence[Array], pooled: Sequence[Array], error_rate: float) -> list[Counted | None]:
     """Of each class the rule and the scores that count: its own, else those of all, else None."""
+    ordered: dict[int, Array] = {}  # classes share what is pooled
 
     def enough(scores: Array) -> bool:
         return (len(scores) + 1) * error_rate > 1 - 1e-12
 
+    def of_all(scores: Array) -> Array:
+        if id(scores) not in ordered:
+            ordered[id(scores)] = np.sort(scores)
+        return ordered[id(scores)]
+
     return [
-        ("class", one) if enough(one) else ("pooled", every) if enough(every) else None
+        ("class", np.sort(one)) if enough(one) else ("pooled", of_all(every)) if enough(every) else None
         for one, every in zip(own, pooled, strict=True)
     ]
 
 
 def _shares(calibrating: Array, scores: Array) -> Array:
     """``(1 + #{calibrating >= score}) / (number of calibrating + 1)``, of sorted ones."""
-    above = len(calibrating) - np.searchsorted(calibrating, scores)
+    above = len(calibrating) - calibrating.searchsorted(scores)
     return np.asarray((1.0 + above) / (len(calibrating) + 1.0))
 
 

@@ -130,7 +130,7 @@ class TwoStageSearch:
             order = np.argsort(chosen, kind="stable")
             squares = np.concatenate((squares, others), axis=2)[:, :, order]
             chosen, logs = chosen[order], np.concatenate((logs, other_logs))[order]
-        return chosen, logs, self._compared(one, held, chosen).with_squares(squares)
+        return chosen, logs, self._compared(one, chosen).with_squares(squares)
 
     def _promising(self, bounds: Single) -> Rows:
         first, counts = self.stored.first, self.stored.counts
@@ -151,10 +151,12 @@ class TwoStageSearch:
         squares = self.comparison.similarity.squared_distances(one, others)
         return squares, LOG_MEANS[self.comparison.mean](self.comparison.similarity.logs_at(squares))[0]
 
-    def _compared(self, one: Described, held: HeldReferences, chosen: Rows) -> Compared:
-        """One movement and the members that it is compared with."""
+    def _compared(self, one: Described, chosen: Rows) -> Compared:
+        """One movement and the members that it was compared with: these are described no more."""
         rows = self.stored.members[chosen]
         owners = np.searchsorted(self.stored.first, chosen, side="right") - 1
         demonstrations = OnDemand(rows, self.stored.movements)
-        references = References.of(demonstrations, held.described(rows), self.classes[owners])
+        first = np.flatnonzero(np.diff(owners, prepend=-1))
+        none, labels = one.take(slice(0, 0)), self.classes[owners]
+        references = References(demonstrations, none, labels, labels[first], first)
         return Compared(self.comparison, references, one)

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kineme.cli.evaluate import _QUICK_SHOTS
+from kineme.experiments.evaluation import person_protocols
 from kineme.experiments.evaluation import score_split as scoring
 from kineme.experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
 from kineme.experiments.evaluation.data import DataSet
@@ -204,3 +206,9 @@ def test_rivals_learn_the_beginnings_to_answer_early(small, method):
     contender.fit(small[::4])
     for share in (0.5, 0.7):
         assert contender.classify_partial(cut(small[::4], share)).tolist() == small.labels[::4].tolist()
+
+
+@pytest.mark.parametrize("name", ["earliness-by-person", "spotting"])
+def test_captions_say_how_many_movements_train(name):
+    words = f"{max(person_protocols._SOME_SHOTS)} by default and {max(_QUICK_SHOTS)} with --quick"
+    assert words in PROTOCOLS[name].description.replace("\n", " ")

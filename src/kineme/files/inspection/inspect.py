@@ -76,6 +76,11 @@ class Inspection(NamedTuple):
     notes: tuple[str, ...]
 
 
+def nothing_read(file: str, reason: str) -> Inspection:
+    """The inspection of a file of which no movement is read."""
+    return Inspection(0, 0, 0, (), (), None, (), (Problem(file, None, reason),), ())
+
+
 def inspect(recordings: Recordings) -> Inspection:
     """Summarize recordings."""
     demos = recordings.demonstrations

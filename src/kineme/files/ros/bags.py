@@ -7,13 +7,15 @@ where the bag says so, by the checksum of its definition.
 
 from __future__ import annotations
 
+import os
+import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError, KinemeError
 
@@ -26,6 +28,8 @@ _REMEDIES = {
     ".db3": "copy it again, or give the folder of the bag",
     "": "copy it again, or run ros2 bag reindex",
 }
+
+_MEAN_MORE = frozenset("?#%")
 
 #: In ROS 1 both names of the type of /tf have one definition.
 _TF_1 = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -136,18 +140,31 @@ def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
             if parse is not None:
                 message, end = parse(raw, 0, cls, store)
                 if end != len(raw):
-                    raise ValueError(f"{len(raw)} bytes instead of {end}")
+                    raise ValueError(f"{len(raw)} bytes for {end}")
                 return message
-            if len(raw) < 4 or raw[0] != 0 or raw[1] > 1:
-                raise ValueError("bytes that are not in CDR")
+            if raw is None or len(raw) < 4 or raw[0] != 0 or raw[1] > 1:
+                raise ValueError("no bytes in CDR")
             # Bytes that follow are padding: writers in Python leave some.
             return (little if raw[1] else big)(raw[4:], 0, cls, store)[0]
         except MemoryError:
             raise
         except Exception as error:
-            raise ValueError(" ".join(str(error).split()) or type(error).__name__) from error
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise ValueError(f"expected a {topic.type}, got {reason}") from error
 
     return decode
+
+
+def logs_beside(path: Path) -> list[str]:
+    """What is left out of a bag in SQLite: the log of a recording that was cut off, which holds its last messages."""
+    files = sorted(path.glob("*.db3")) if path.is_dir() else [path] if path.suffix.lower() == ".db3" else []
+    logs = [(one, one.with_name(f"{one.name}-wal")) for one in files]
+    return [
+        f"{log.name}: messages that are not in the database yet; to add them, open it once: sqlite3 {one.name} "
+        "'PRAGMA wal_checkpoint(TRUNCATE)'"
+        for one, log in logs
+        if log.is_file() and log.stat().st_size
+    ]
 
 
 @contextmanager
@@ -159,7 +176,8 @@ def refused(expected: str, remedy: str) -> Iterator[None]:
         raise
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DataError(f"{expected}, got: {reason[:300]}; {remedy}") from error
+        unknown = ", which rosbags does not know" if isinstance(error, KeyError) else ""
+        raise DataError(f"{expected}, got: {reason[:300]}{unknown}; {remedy}") from error
 
 
 def _check_magic(path: Path, ending: str) -> None:
@@ -167,23 +185,49 @@ def _check_magic(path: Path, ending: str) -> None:
         return
     with path.open("rb") as file:
         first = file.read(len(_MAGIC[ending]))
-    if first != _MAGIC[ending]:
-        raise DataError(
-            f"expected a {ending} file of ROS, which begins with {_MAGIC[ending]!r}, got "
-            f"{'an empty file' if not first else repr(first)}"
-        )
+        if first != _MAGIC[ending]:
+            raise DataError(
+                f"expected a {ending} file of ROS, which begins with {_MAGIC[ending]!r}, got "
+                f"{'an empty file' if not first else repr(first)}"
+            )
+        if ending == ".mcap":
+            _refuse_zeros(file)
+
+
+def _refuse_zeros(file: BinaryIO) -> None:
+    """Refuse an MCAP file with a hole: rosbags takes each nine zeros for a record, of which there may be billions.
+
+    Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
+    """
+    end = file.seek(0, os.SEEK_END)
+    at = len(_MAGIC[".mcap"])
+    while at + 9 <= end - len(_MAGIC[".mcap"]):
+        file.seek(at)
+        kind, length = struct.unpack("<BQ", file.read(9))
+        if not kind:
+            raise DataError(f"expected a record of MCAP at byte {at:,}, got zeros; {_REMEDIES['.mcap']}")
+        at += 9 + length
 
 
 @contextmanager
 def _plain_name(path: Path, ending: str) -> Iterator[Path]:
     """The path, or a link to it: the name of a database is an address to SQLite, where these characters mean more."""
-    if ending not in ("", ".db3") or not set("?#%") & set(str(path)):
+    files = [one for kind in ("*.db3*", "*.mcap*") for one in path.glob(kind)] if not ending else [path]
+    if ending not in ("", ".db3") or not _MEAN_MORE & set("".join(map(str, files))):
         yield path
         return
+    plain = str.maketrans(dict.fromkeys(_MEAN_MORE, "_"))
     with TemporaryDirectory() as folder:
-        link = Path(folder) / f"bag{ending}"
-        link.symlink_to(path.resolve())
-        yield link
+        for one in files:
+            (Path(folder) / one.name.translate(plain)).symlink_to(one.resolve())
+        if ending:
+            yield Path(folder) / path.name.translate(plain)
+            return
+        about = (path / "metadata.yaml").read_text(encoding="utf-8")
+        for one in files:
+            about = about.replace(one.name, one.name.translate(plain))
+        (Path(folder) / "metadata.yaml").write_text(about, encoding="utf-8")
+        yield Path(folder)
 
 
 def _topics(connections: Sequence[Any]) -> tuple[Topic, ...]:

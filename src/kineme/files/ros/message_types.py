@@ -65,7 +65,7 @@ def _joint_state(message: Any) -> tuple[Heads, Row]:
     if not row:
         return (), ()
     if len(message.name) != len(row):
-        raise ValueError(f"{len(message.name)} names of joints for {len(row)} positions")
+        raise ValueError(f"expected a position for each joint, got {len(message.name)} names and {len(row)} positions")
     return tuple(message.name), row
 
 
@@ -83,9 +83,9 @@ def _joint_trajectory(message: Any) -> tuple[Heads, list[int], list[Row]]:
     heads = tuple(message.joint_names)
     rows = [point.positions.tolist() for point in message.points]
     if odd := next((len(row) for row in rows if len(row) != len(heads)), None):
-        raise ValueError(f"{odd} positions for {len(heads)} joints")
+        raise ValueError(f"expected a position for each of {len(heads)} joints, got {odd}")
     if any(not row for row in rows):
-        raise ValueError("points without positions")
+        raise ValueError("expected points with positions, got some without")
     return heads, [nanoseconds_of(point.time_from_start) for point in message.points], rows
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.ros.bags import Bag, open_bag
+from kineme.files.ros.bags import Bag, logs_beside, open_bag
 from kineme.files.ros.choose import Choice, choose
 from kineme.files.ros.compose import read_transforms
 from kineme.files.ros.merge_streams import SECOND, clock_of, merge_streams
@@ -36,7 +36,8 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
         choice = choose(bag, layout)
         paths = [topic for topic in choice.topics if TYPES[topic.type].path]
         if not paths:
-            return _streamed(bag, choice, layout)
+            parsed = _streamed(bag, choice, layout)
+            return parsed._replace(left_out=(*parsed.left_out, *logs_beside(path)))
         if len(choice.topics) > 1 or choice.frames:
             raise DataError(
                 f"topic {paths[0].name}: each of its messages is a movement of its own, expected it alone, got other "
@@ -76,7 +77,7 @@ def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
     heads = (paths.time, "message", *paths.heads)
     table = Table(heads, [times, names, *paths.values.T], len(numbers), no_lines, dates_in="s")
     chosen = _roles(heads, 0, layout)
-    roles = chosen._replace(movement=(1,), ignored=tuple(k for k in chosen.ignored if k != 1))
+    roles = chosen._replace(movement=(1,))
     about = (bag.kind, f"topic {paths.topic.name} of {paths.topic.type}, a movement a message", "stamps of its points")
     parsed = _parsed(table, roles, layout, about, paths.left_out)
     if paths.times is not None:
@@ -94,7 +95,7 @@ def _roles(heads: tuple[str, ...], time: int, layout: Layout) -> Roles:
         positions = column_numbers(heads, layout.coordinates)
     if layout.keys is not None or layout.label is not None:
         raise DataError("expected movements that are told apart by messages, got a column for that, or for labels")
-    used = {time, *positions}
+    used = {0, 1, *positions}  # stamps are not left aside: they are of two clocks, and one is chosen
     return Roles(time, positions, (), None, tuple(k for k in range(len(heads)) if k not in used))
 
 

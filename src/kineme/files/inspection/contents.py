@@ -1,0 +1,45 @@
+"""What a file or a data set holds, where its format can tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from kineme.errors import DataError
+from kineme.files.contents import Contents
+from kineme.files.formats import FORMATS, data_set_of
+from kineme.output.table import Table, to_text
+from kineme.output.text import printable
+
+
+def contents_of(path: Path) -> list[Contents]:
+    """The contents of one recording.
+
+    There are none of a folder of files, of formats that hold movements alone, and of what cannot be opened: reading it
+    gives the reason.
+    """
+    data_set = data_set_of(path)
+    form = FORMATS.get(path.suffix.lower()) if data_set is None else data_set.format
+    if form is None or form.contents is None or (data_set is None and not path.is_file()):
+        return []
+    try:
+        return form.contents(path)
+    except (DataError, OSError):
+        return []
+
+
+def contents_as_data(contents: list[Contents]) -> dict[str, Any]:
+    """A list of dictionaries under each name."""
+    return {one.name: [dict(zip(one.heads, row, strict=True)) for row in one.rows] for one in contents}
+
+
+def contents_as_words(contents: list[Contents]) -> list[str]:
+    """A table of each."""
+    return [
+        to_text(Table(f"{one.name}{f' {one.note}' if one.note else ''}", one.heads, [_row(row) for row in one.rows]))
+        for one in contents
+    ]
+
+
+def _row(row: tuple[str | int, ...]) -> tuple[str, ...]:
+    return tuple(f"{cell:,}" if isinstance(cell, int) else printable(cell) for cell in row)
