@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
+from kineme.library.storage.rows import Row, strange
+from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels, is_plain, learned_names
 from kineme.movements.channels.coordinates import canonical, columns_of
+from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array
 
 
@@ -65,7 +68,25 @@ def to_bytes(recorded: Array, offsets: NDArray[np.intp], channels: Channels) -> 
     return [blob[row * first : row * stop] for first, stop in pairwise(ends)]
 
 
-def from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
+def with_channels(stored: Movements, channels: Channels, rows: Sequence[Row]) -> Movements:
+    """Stored movements with their channels; rows of the table "recorded" for those that positions do not say.
+
+    Raises
+    ------
+    DataError
+        A row of another size.
+    """
+    known = replace(stored, channels=channels, dimensions=learned_names(channels))
+    if is_plain(channels):
+        return known
+    size = 4 * len(other_columns(channels))
+    for row, n in zip(rows, np.diff(stored.offsets).tolist(), strict=True):
+        if len(row[1]) != size * n:
+            raise strange("recorded", row)
+    return replace(known, recorded=_from_bytes([row[1] for row in rows], stored.positions, stored.offsets, channels))
+
+
+def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
     """What was recorded (total, columns): the stored columns, and the positions where they say it."""
     others = other_columns(channels)
     recorded = np.empty((len(positions), sum(len(one.columns) for one in channels)))

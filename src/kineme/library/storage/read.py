@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.storage.channels import from_bytes, other_columns
+from kineme.library.storage.channels import with_channels
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
-from kineme.movements.channels.channel import is_plain, learned_names
+from kineme.movements.channels.channel import is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
@@ -122,25 +122,12 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
     times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
     _check_increasing(times, offsets, wanted)
     stored = Movements(positions, offsets, durations, times, None, _names(about))
-    stored = replace(stored, **_recorded(store, wanted, positions, offsets))
+    if channels := store.channels:
+        chunks = () if is_plain(channels) else _chunks(store, "recorded", "movement", wanted)
+        stored = with_channels(stored, channels, [row for chunk in chunks for row in chunk])
     if not np.array_equal(wanted, ids):
         stored = stored.take(order)
     return Demonstrations.of_movements(replace(stored, labels=_labels(labels)))
-
-
-def _recorded(store: Store, wanted: Ids, positions: Array, offsets: NDArray[np.intp]) -> dict[str, Any]:
-    """The channels of movements, their names, and what was recorded besides positions, as fields of `Movements`."""
-    if (channels := store.channels) is None:
-        return {}
-    known = {"channels": channels, "dimensions": learned_names(channels)}
-    if is_plain(channels):
-        return known
-    rows = [row for chunk in _chunks(store, "recorded", "movement", wanted) for row in chunk]
-    size = 4 * len(other_columns(channels))
-    for row, n in zip(rows, np.diff(offsets).tolist(), strict=True):
-        if len(row[1]) != size * n:
-            raise strange("recorded", row)
-    return known | {"recorded": from_bytes([row[1] for row in rows], positions, offsets, channels)}
 
 
 def _check_total(store: Store, about: Sequence[dict[str, Any]], size: int) -> None:
