@@ -55,18 +55,26 @@ def read_transforms(bag: Bag, wanted: Sequence[Edge], skip: str) -> tuple[list[S
 def _collect(bag: Bag, needed: set[Edge], bad: list[str]) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
     """The needed transforms, and for their children how often each parent occurs."""
     found = {edge: Samples.empty() for edge in needed}
-    parents: dict[str, Counter[str]] = {child: Counter() for _, child in needed}
+    children = {child for _, child in needed}
+    counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
+    samples_of: dict[Edge, Samples | None] = {}
     for n, (_, recorded, transform) in enumerate(transforms_in(bag, transform_topics(bag), bad)):
-        edge = edge_of(transform)
-        if edge[1] in parents:
-            parents[edge[1]][edge[0]] += 1
-        if edge in found:
-            samples = found[edge]
+        header = transform.header
+        names = header.frame_id, transform.child_frame_id
+        counts[names] += 1
+        if names not in samples_of:
+            samples_of[names] = found.get(edge_of(transform))
+        if (samples := samples_of[names]) is not None:
             samples.values.extend(transform_row(transform.transform))
             samples.recorded.append(recorded)
-            samples.stamped.append(nanoseconds_of(transform.header.stamp))
+            samples.stamped.append(nanoseconds_of(header.stamp))
         if not n % _CHECKED:
             check_kept(list(found.values()))
+    parents: dict[str, Counter[str]] = {child: Counter() for child in children}
+    for names, n in counts.items():
+        parent, child = (name.removeprefix("/") for name in names)
+        if child in children:
+            parents[child][parent] += n
     return found, parents
 
 
