@@ -1,4 +1,4 @@
-"""Bags of a gigabyte, most of it pictures: time beside the bare deserialization by rosbags, and memory."""
+"""Bags of a gigabyte, most of it pictures: processor time beside the bare deserialization by rosbags, and memory."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _TRANSFORM, _STATE = 96, 420  # bytes of a message, about
 _OURS = """
 import json, sys, time
 from kineme.files.recordings import read_recordings
-begin = time.perf_counter()
+begin = time.process_time()
 read = read_recordings(sys.argv[1], **json.loads(sys.argv[2]))
-seconds = time.perf_counter() - begin
+seconds = time.process_time() - begin
 n = len(read.demonstrations.positions)
 peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
 print(json.dumps({"seconds": seconds, "n": n, "mib": int(peak.split()[1]) / 1024}))
@@ -37,14 +37,14 @@ _THEIRS = """
 import json, sys, time
 from pathlib import Path
 from rosbags.highlevel import AnyReader
-begin = time.perf_counter()
+begin = time.process_time()
 n = 0
 with AnyReader([Path(sys.argv[1])]) as reader:
     chosen = [one for one in reader.connections if one.topic in json.loads(sys.argv[2])]
     for connection, _, raw in reader.messages(connections=chosen):
         reader.deserialize(raw, connection.msgtype)
         n += 1
-seconds = time.perf_counter() - begin
+seconds = time.process_time() - begin
 peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
 print(json.dumps({"seconds": seconds, "n": n, "mib": int(peak.split()[1]) / 1024}))
 """

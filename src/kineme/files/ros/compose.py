@@ -11,7 +11,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.ros.bags import Bag
 from kineme.files.ros.frames import Edge, Step, chain, connected_graph, edge_of, transform_topics, transforms_in
-from kineme.files.ros.merge_streams import SECOND, clock_of, stamps_of, values_at
+from kineme.files.ros.merge_streams import SECOND, clock_of, in_order, stamps_of, values_at
 from kineme.files.ros.message_types import POSE, nanoseconds_of, transform_row
 from kineme.files.ros.rotations import are_rotations, conjugate, continuous, product, turned, unit
 from kineme.files.ros.streams import Samples, Stamps, Stream, check_kept, stream_of
@@ -92,6 +92,8 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
             raise DataError(left_out[-1])
     kept = np.flatnonzero(good)
     kept = kept[np.diff(stream.stamped[kept], prepend=stream.stamped[kept[0]] - 1) != 0]
+    if len(kept) == len(good):
+        return stream
     return replace(stream, values=stream.values[kept], recorded=stream.recorded[kept], stamped=stream.stamped[kept])
 
 
@@ -131,8 +133,8 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
     """A transform at the common stamps, (n, 7)."""
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
-    stamps, where = np.unique(stamps_of(stream, of_headers), return_index=True)
-    return values_at(seconds, (stamps - start) / SECOND, stream, stream.values[where])
+    stamps, values = in_order(stream, of_headers)
+    return values_at(seconds, (stamps - start) / SECOND, stream, values)
 
 
 def _then(p: Array, q: Array, transform: Array, forward: bool) -> tuple[Array, Array]:
