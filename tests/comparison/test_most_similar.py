@@ -72,3 +72,18 @@ def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):
     monkeypatch.setattr(module, "listed_distances", counted)
     np.testing.assert_array_equal(recognizer.predict(others), recognizer.classes_[expected])
     assert len(others) <= sum(pairs) <= 0.2 * len(others) * len(recognizer.classes_)
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 4])
+def test_no_other_pair_may_be_in_doubt(d):
+    stored = draw_shapes([1] * 40, d=d, spread=0.0)
+    recognizer = kineme.Recognizer(classifier="nearest").fit(stored)
+    np.testing.assert_array_equal(recognizer.predict(stored), stored.labels)
+
+
+def test_bounds_that_are_too_small_for_single_precision_decide_nothing(monkeypatch):
+    monkeypatch.setattr(module, "_LEAST_PAIRS", 1)
+    stored, asked = (describe(draw_shapes([1] * 20, seed=seed, spread=1.0)).select([0, 2]) for seed in (1, 2))
+    for width in np.geomspace(0.02, 0.2, 60):
+        similarity = AveragedSimilarity(stored.procrustes, np.full(2, width))
+        np.testing.assert_array_equal(most_similar(similarity, asked, stored), by_all(similarity, asked, stored))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import json
@@ -57,6 +58,28 @@ def _npz(save=np.savez, **arrays):
     return buffer.getvalue()
 
 
+def _npy(array):
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+def _cells():
+    cells = np.empty((1, 2), dtype=object)
+    for k in range(2):
+        cells[0, k] = {"t": _movement(k)[0], "q": _movement(k)[1].T, "label": "wave"}
+    return cells
+
+
+def _optional(*writers):
+    """The files whose packages are installed."""
+    written = {}
+    for name, write in writers:
+        with contextlib.suppress(ImportError):
+            written[name] = write()
+    return written
+
+
 def _json(**entries):
     return json.dumps({name: np.asarray(value).tolist() for name, value in entries.items()}).encode()
 
@@ -68,6 +91,61 @@ def _parquet(**columns):
     buffer = io.BytesIO()
     parquet.write_table(pa.table(columns), buffer)
     return buffer.getvalue()
+
+
+def _bvh():
+    head = "HIERARCHY\nROOT Hip\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zrotation\n}\nMOTION\nFrames: 12\n"
+    rows = np.column_stack((_movement()[1], _movement()[0])).tolist()
+    return (head + "Frame Time: 0.01\n" + "\n".join(" ".join(map(repr, row)) for row in rows)).encode()
+
+
+def _vicon():
+    head = "Trajectories\n100\n,,A:one,,,A:two,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm\n"
+    return (head + "\n".join(f"{k},0,{k},{k * k},1,2,{k},3" for k in range(N_SAMPLES))).encode()
+
+
+def _motive():
+    head = "Format Version,1.23,Export Frame Rate,120,Rotation Type,Quaternion,Length Units,Meters\n\n"
+    head += ",,Rigid Body,Rigid Body,Rigid Body\n,,A,A,A\n,,1,1,1\n,,Position,Position,Position\n"
+    rows = "\n".join(f"{k},{k / 120},{k},{k * k},1" for k in range(N_SAMPLES))
+    return f"{head}Frame,Time (Seconds),X,Y,Z\n{rows}".encode()
+
+
+def _qualisys():
+    head = f"NO_OF_FRAMES\t{N_SAMPLES}\nFREQUENCY\t200\nMARKER_NAMES\tone\ttwo\n"
+    return (head + "\n".join(f"{k}\t1\t2\t{k * k}\t0.5\t0" for k in range(N_SAMPLES))).encode()
+
+
+def _hdf5():
+    import h5py
+
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        for k in range(2):
+            t, x = _movement(k)
+            file[f"data/demo_{k}/t"], file[f"data/demo_{k}/obs/pos"] = t, x
+            file.create_dataset(f"data/demo_{k}/packed", data=t, compression="gzip")
+    return buffer.getvalue()
+
+
+def _c3d():
+    import ezc3d
+
+    content = ezc3d.c3d()
+    content["parameters"]["POINT"]["RATE"]["value"] = [100]
+    content["parameters"]["POINT"]["LABELS"]["value"] = ("one", "two")
+    content["data"]["points"] = np.arange(8.0 * N_SAMPLES).reshape(4, 2, N_SAMPLES)
+    with tempfile.TemporaryDirectory() as folder:
+        content.write(str(Path(folder) / "a.c3d"))
+        return (Path(folder) / "a.c3d").read_bytes()
+
+
+def _vectors():
+    import pyarrow as pa
+
+    t, x = _movement()
+    fixed = pa.array(x.tolist(), pa.list_(pa.float32(), 2))
+    return _parquet(**{"time": t, "observation.state": fixed, "lists": pa.array([[1.0, 2.0]] * N_SAMPLES)})
 
 
 def _demos():
@@ -145,6 +223,20 @@ def samples():
         "numbered.npz": _npz(positions_0=x, positions_1=x2, times_0=t, times_1=t2),
         "joined.json": _json(**both, labels=labels),
         "numbered.json": _json(x_0=x, x_1=x2),
+        "keyed.npz": _npz(wave=x, nod=x2),
+        "timed.npz": _npz(t=t, q=x, gripper=t),
+        "one.npy": _npy(np.stack((x, x))),
+        "samples.json": json.dumps([{"t": a, "x": b} for a, b in zip(t.tolist(), t.tolist(), strict=True)]).encode(),
+        "keyed.json": _json(wave=x, nod=x),
+        "samples.jsonl": "\n".join(json.dumps({"t": a, "q": [a, 1]}) for a in t.tolist()).encode(),
+        "walk.bvh": _bvh(),
+        "vicon.csv": _vicon(),
+        "motive.csv": _motive(),
+        "qualisys.tsv": _qualisys(),
+        "units.csv": b"time,x\nms,mm\n" + b"".join(b"%d,%d\n" % (10 * k, k * k) for k in range(N_SAMPLES)),
+        **_optional(("robomimic.hdf5", _hdf5), ("points.c3d", _c3d)),
+        "vectors.parquet": _vectors(),
+        "cells.mat": _mat(False, trials=_cells(), fs=100.0),
         "wide.parquet": _parquet(time=t, x=x[:, 0], y=x[:, 1]),
         "long.parquet": _parquet(**long_columns, **axes),
         "demos.mat": _mat(False, demos=_demos(), name="wave"),
@@ -171,7 +263,7 @@ def mutant(rng, data, name):
     if "compressed.mat" in name and rng.random() < 0.7:
         return _mat_mutant(rng, data)
     for _ in range(int(rng.integers(1, 5))):
-        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json")))
+        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh")))
     return data
 
 

@@ -127,3 +127,41 @@ def test_a_file_that_was_cut_is_refused_wherever_that_was():
     for at in range(0, len(whole) - 1, 7):
         with pytest.raises(kineme.DataError, match="expected a MATLAB file with 'demos', got"):
             read_demos(whole[:at])
+
+
+CELLS_T = np.arange(12) / 10
+CELLS_X = np.column_stack((np.sin(CELLS_T), CELLS_T**2))
+
+
+def read_mat(tmp_path, **variables):
+    from scipy.io import savemat
+
+    import kineme
+
+    savemat(tmp_path / "a.mat", variables)
+    return kineme.read_recordings(tmp_path / "a.mat")
+
+
+def test_cells_structures_and_variables_are_movements_or_columns(tmp_path):
+    cells = np.empty((1, 2), object)
+    cells[0, 0], cells[0, 1] = CELLS_X, CELLS_X[:9].T  # samples along the longer axis
+    found = read_mat(tmp_path, trials=cells)
+    assert [source.place for source in found.sources] == ["trials/0", "trials/1"]
+    np.testing.assert_array_equal(found.demonstrations[1].positions, CELLS_X[:9])
+    structures = np.zeros((1, 2), [("t", object), ("q", object), ("label", object)])
+    for k, label in enumerate(("wave", "nod")):
+        structures[0, k] = (CELLS_T, CELLS_X.T, label)
+    found = read_mat(tmp_path, data=structures)
+    assert found.labels.tolist() == ["wave", "nod"]
+    np.testing.assert_array_equal(found.demonstrations[0].positions, CELLS_X)
+    np.testing.assert_array_equal(found.demonstrations[0].times, CELLS_T)
+    assert read_mat(tmp_path, t=CELLS_T, a=CELLS_T, b=CELLS_T**2).demonstrations.dimensions == ("a", "b")
+    rated = read_mat(tmp_path, q=CELLS_X, grip=CELLS_T, fps=50.0)
+    np.testing.assert_allclose(np.diff(rated.demonstrations.times), 0.02)
+
+
+def test_matrices_with_their_own_times_win_over_the_longer_axis(tmp_path):
+    few = np.arange(5) / 5
+    wide = np.arange(40.0).reshape(8, 5)
+    found = read_mat(tmp_path, trial={"t": few, "q": wide})
+    np.testing.assert_array_equal(found.demonstrations.positions, wide.T)

@@ -1,6 +1,7 @@
 """Reading recorded movements, and writing generated ones so that nothing is lost."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -142,3 +143,11 @@ def test_arguments_in_the_other_order_are_said_to_be():
 def test_lists_are_written_as_arrays_are(tmp_path):
     path = kineme.write_movement(tmp_path / "a.json", {"times": TIMES.tolist(), "positions": PATH.tolist()})
     np.testing.assert_array_equal(kineme.read_recording(path).positions, PATH)
+
+
+def test_the_page_lists_every_format():
+    from kineme.files.formats import DATA_SETS, FORMATS
+
+    page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
+    table = page.partition("## What is read")[2].partition("\n## ")[0]
+    assert [ending for ending in (*FORMATS, *(one.marker for one in DATA_SETS)) if f"`{ending}`" not in table] == []

@@ -151,3 +151,9 @@ def test_a_movement_that_lacks_an_array_costs_itself_alone():
     found = read(npz(**{"a/q": X, "a/t": T, "b/q": X, "b/t": T, "c/t": T, "c/p": X}), "a.npz")
     assert [source.place for source in found.sources] == ["a", "b"]
     assert "c: expected an array 'q' as others have, got none" in str(found.problems[0])
+
+
+def test_movements_of_other_dimensions_cost_themselves_alone():
+    found = read(npz(wave=X, nod=X[:7], bow=np.ones((6, 3))), "a.npz")
+    assert [source.place for source in found.sources] == ["wave", "nod"]
+    assert "movement bow: 3 dimensions where most have 2" in str(found.problems[0])

@@ -162,7 +162,8 @@ def test_listed_pairs_have_the_distances_of_all_pairs(d, choice):
     exact = {"rtol": 0, "atol": 0 if choice == "always" else 1e-6}
     np.testing.assert_allclose(listed_distances(A, B, i, j, R[i, j]), pair_distances(A, B, R)[:, i, j], **exact)
     np.testing.assert_allclose(listed_distances(A, B, i, j), pair_distances(A, B)[:, i, j], **exact)
-    assert listed_distances(A, B, i[:0], j[:0]).shape == (3, 0)
+    for none in (None, R[i[:0], j[:0]]):
+        assert listed_distances(A, B, i[:0], j[:0], none).shape == (3, 0)
     with pytest.raises(SpecificationError, match="expected rotations of shape"):
         listed_distances(A, B, i, j, R[i[:3], j[:3]])
 

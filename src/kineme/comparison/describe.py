@@ -82,13 +82,14 @@ def prepare(rows: Iterable[NDArray[Any]], like: Compares, procrustes: Procrustes
     """
     how, rows = like.specification, tuple(rows)
     blocks = tuple(procrustes.prepare(np.ascontiguousarray(block, dtype=np.float32)) for block in rows)
+    own = tuple(one.weight for one in how.representations)
     if not how.by_pairs:
-        return Described(blocks, procrustes, how.mean)
+        return Described(blocks, procrustes, how.mean, own_weights=own)
     r = rotating(how.representations)
     single = np.ascontiguousarray(rows[r], dtype=np.float32)  # so that stored rows say the same
     shapes = shapes_of(single.reshape(len(single), procrustes.n_dims, -1))
     measures = tuple(PAIR_QUANTITIES.index(one.quantity) for one in how.by_pairs)
-    return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures))
+    return Described(blocks, procrustes, how.mean, Pairs(blocks[r], shapes, measures), own)
 
 
 def feature_rows(movements: MovementsLike, specification: ComparisonSpecification) -> tuple[Array, ...]:

@@ -44,12 +44,15 @@ class Described:
         The A-average over representations.
     pairs : Pairs or None
         For the representations after those, which are compared pair by pair.
+    own_weights : tuple of float, or None
+        The weights of the representations themselves; equal if None.
     """
 
     blocks: tuple[Prepared, ...]
     procrustes: Procrustes
     mean: str = "arithmetic"
     pairs: Pairs | None = None
+    own_weights: tuple[float, ...] | None = None
 
     def __len__(self) -> int:
         return len((self.blocks[0] if self.pairs is None else self.pairs.positions).rows)
@@ -91,6 +94,7 @@ class Described:
             self,
             blocks=tuple(self.blocks[r] for r in chosen if r < n),
             pairs=replace(self.pairs, measures=measures) if self.pairs is not None and measures else None,
+            own_weights=None if self.own_weights is None else tuple(self.own_weights[r] for r in chosen),
         )
 
     def _changed(self, change: Callable[[Any], Any]) -> Described:

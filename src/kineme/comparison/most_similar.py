@@ -23,7 +23,7 @@ Single = NDArray[np.float32]
 Indices = NDArray[np.intp]
 
 _LEAST_ASKED, _LEAST_PAIRS = 16, 1000  # with fewer it is faster to compare all
-_ROUNDING = np.float32(1e-3)  # of a bar: bounds are computed in single precision
+_ROUNDING, _SMALLEST = 1e-3, 1e-30  # of a bar: bounds are computed in single precision
 
 
 def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> Indices:
@@ -36,7 +36,8 @@ def most_similar(similarity: AveragedSimilarity, A: Described, B: Described) -> 
     each, first = np.arange(len(A)), known.argmax(axis=1)
     logs = np.full(known.shape, -np.inf)
     logs[each, first] = search.log_averages(each, first)
-    bars = np.exp(logs[each, first]).astype(np.float32) * (1 - _ROUNDING)
+    bars = np.exp(logs[each, first])
+    bars = np.where(bars > _SMALLEST, (1 - _ROUNDING) * bars, 0.0)
     bounds = known + search.upper_bounds()
     bounds[each, first] = -1.0  # compared already
     i, j = np.divmod(np.flatnonzero(bounds >= bars[:, None]), len(B))

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kineme.files.arrays.arrays import POSITIONS, Named, arrays_movements, has_known_names, parsed_arrays
+from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names
+from kineme.files.arrays.hdf5 import hdf5_movements
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
-from kineme.files.arrays.matlab import read_demos
+from kineme.files.arrays.matlab import mat_movements
 from kineme.files.arrays.npz import Npz, array_of_npy
 from kineme.files.arrays.tree_movements import nested, tree_movements
 from kineme.files.contents import Contents
@@ -92,13 +93,6 @@ def _read_npy(data: bytes, layout: Layout) -> Parsed:
     return arrays_movements({POSITIONS[0]: array_of_npy(data, Path("it"))}, layout, "NPY")
 
 
-def _read_matlab(data: bytes, layout: Layout) -> Parsed:
-    demos = read_demos(data)
-    return parsed_arrays(
-        demos.positions, demos.times, Named([demos.name] * len(demos.times), "t"), layout, ("MATLAB", "demos")
-    )
-
-
 def _read_bvh(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_bvh_table(data, layout), layout, "BVH")
 
@@ -119,7 +113,9 @@ FORMATS: dict[str, Format] = {
     ".jsonl": Format(json_lines_movements),
     ".npy": Format(_read_npy),
     ".parquet": Format(_read_parquet),
-    ".mat": Format(_read_matlab, label_is_stem=True),
+    ".mat": Format(mat_movements, label_is_stem=True),
+    ".h5": Format(read_path=hdf5_movements),
+    ".hdf5": Format(read_path=hdf5_movements),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
     ".bag": _BAG,

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
@@ -79,7 +80,7 @@ def listed_distances(
     entries = np.empty((k, 1, 0), np.float32)
     if rotations is not None:
         _check_rotations(rotations, (k,), A.n_dims)
-        entries = np.ascontiguousarray(rotations, np.float32).reshape(k, 1, -1)
+        entries = np.ascontiguousarray(rotations, np.float32).reshape(k, 1, math.prod(rotations.shape[1:]))
     squares = np.empty((3, k), np.float32)
     if use_compiled(k * _PAIR_OPERATIONS):
         sides, numbers = (_arrays(A, slice(None)), _arrays(B, slice(None))), _numbers(A.elastic, A.cloud)

@@ -368,8 +368,9 @@ class ActionLibrary:
 
         If there are symbols, their members define how similar movements of one symbol are, see
         `kineme.anchoring.assign`. If there are none, or if `method` or `n_clusters` is given, the movements are
-        clustered, see `kineme.anchoring.propose`. A proposal is left out if four fifths of its movements were in one
-        rejected proposal. Fewer than three movements make no proposal.
+        clustered, see `kineme.anchoring.propose`, with the people who were named when they were learned as groups. A
+        proposal is left out if four fifths of its movements were in one rejected proposal. Fewer than three movements
+        make no proposal.
         """
         from kineme.library.symbols.proposals import propose
 

@@ -40,6 +40,8 @@ def warm_up(n_dims: Sequence[int] = (2, 3)) -> None:
             moved = waves[:: _SAMPLES // 50] @ rng.normal(size=(n, 4, d))
             recognizer = Recognizer().fit(moved, np.arange(n) // 2)
             recognizer.recognize(moved[:2])
+            recognizer = Recognizer().fit(moved, np.arange(n))  # labels alone skip pairs, see `most_similar`
+            recognizer.predict(moved)
         for times in (even, even**2):  # evenly timed and not, as recordings are
             timed = Demonstrations.from_arrays(waves @ rng.normal(size=(20, 4, d)), times=times)
             recognizer = Recognizer().fit(timed, np.arange(len(timed)) // 2)

@@ -8,7 +8,7 @@ are chains of neighbors, in one representation or another.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -16,15 +16,15 @@ from kineme.validation import Array
 
 #: Neighbors in the graph of each representation; the fused similarities of both are added up.
 NEIGHBORS = (7, 15)
-_WIDTH = 0.5  # mu of the source, Eq. (2)
+_WIDTH = 0.4  # mu of the source, Eq. (2), which recommends 0.3 to 0.8; wider ones merge classes of a few movements
 _ROUNDS = 5  # of fusion; it has converged
 _FAR = 5.0  # times the usual distance to a neighbor
-_APART = 1e-3  # of their similarity is left to movements of groups apart
+_APART = 1e-3  # of their similarity is left to movements of components apart
 _NONE = 1e-6  # largest distance, as a share of the typical one, of movements that do not differ
 _LEAST = 1e-30  # similarity, above 0
 
 
-def fuse(squares: Array) -> Array:
+def fuse(squares: Array, weights: ArrayLike | None = None) -> Array:
     """Similarities W (n, n) of movements: symmetric, at least 0, and 0 on the diagonal.
 
     In representation r, ``A_r(i, j) = exp(-d_r^2 / (mu e_ij^2))`` with e_ij the mean of d_r(i, j) and of the typical
@@ -32,24 +32,33 @@ def fuse(squares: Array) -> Array:
     P_r and a sparse S_r, of the nearest neighbors alone, have rows that sum to 1. Five times, every
     ``P_r <- S_r (mean of the other P) S_r^T``: pairs are similar whose neighbors are similar in the other
     representations. W is the mean of the P_r, added up over 7 and 15 neighbors: few for classes of a few movements, and
-    many so that the movements of several people connect.
+    many so that the movements of several people connect. Means are weighted.
 
     Parameters
     ----------
     squares : ndarray of shape (R, n, n)
         Squared distances, for at least three movements. Representations in which no two differ are left out.
+    weights : array_like of shape (R,), optional
+        Of the representations in each mean, above 0; equal by default.
     """
-    differ = [one for one in squares if one.max() > 0] or [squares[0]]
-    return np.asarray(sum(_fused(differ, neighbors) for neighbors in NEIGHBORS))
+    differ, weights = _differing(squares, weights)
+    return np.asarray(sum(_fused(differ, weights, neighbors) for neighbors in NEIGHBORS))
 
 
-def groups(squares: Array) -> NDArray[np.intp]:
-    """Index of the group of each movement, (n,): far from all other groups, in chains of neighbors.
+def local_similarities(squares: Array, weights: ArrayLike | None = None) -> Array:
+    """The mean of the A_r of `fuse` with 7 neighbors, (n, n): at the local scale, and not yet fused."""
+    differ, weights = _differing(squares, weights)
+    k = min(*NEIGHBORS, squares.shape[1] - 1)
+    return np.asarray(sum(w * _similar(one, k) for w, one in zip(weights, differ, strict=True)) / weights.sum())
+
+
+def components(squares: Array) -> NDArray[np.intp]:
+    """Index of the component of each movement, (n,): far from all other components, in chains of neighbors.
 
     s_r(i) is the distance of movement i to its second nearest neighbor in representation r, and u_r(i) the smallest
     s_r of these neighbors, but at least the median of all. Two movements i and j are linked if d_r(i, j) is less than
-    five times the larger of u_r(i) and u_r(j), in the geometric mean over representations; groups are what links
-    connect. Movements of one class have 3.2 to their second neighbors at most, among people's and drawn ones;
+    five times the larger of u_r(i) and u_r(j), in the geometric mean over representations; components are what
+    links connect. Movements of one class have 3.2 to their second neighbors at most, among people's and drawn ones;
     movements of no class have 8 and more.
     """
     logs = []
@@ -66,42 +75,44 @@ def groups(squares: Array) -> NDArray[np.intp]:
     return np.asarray(connected_components(np.mean(logs, axis=0) < np.log(_FAR))[1], dtype=np.intp)
 
 
-def set_apart(similar: Array, group: NDArray[np.intp]) -> Array:
-    """Similarities in which small groups, of fewer movements than a neighborhood has, are nearly alone.
+def set_apart(similar: Array, component: NDArray[np.intp]) -> Array:
+    """Similarities in which small components, of fewer movements than a neighborhood has, are nearly alone.
 
-    The neighbors of such a movement are not all of its group, so that fusion connects it with whatever comes next.
+    The neighbors of such a movement are not all of its component, so that fusion connects it with whatever comes next.
     """
-    few = np.bincount(group)[group] <= min(NEIGHBORS)
-    apart = (group[:, None] != group) & (few[:, None] | few)
+    few = np.bincount(component)[component] <= min(NEIGHBORS)
+    apart = (component[:, None] != component) & (few[:, None] | few)
     return np.where(apart, _APART * similar, similar)
 
 
-def _fused(squares: list[Array], neighbors: int) -> Array:
+def _differing(squares: Array, weights: ArrayLike | None) -> tuple[list[Array], Array]:
+    """Representations in which movements differ, one at least, and their weights."""
+    given = np.ones(len(squares)) if weights is None else np.asarray(weights, dtype=np.float64)
+    kept = [r for r, one in enumerate(squares) if one.max() > 0] or [0]
+    return [squares[r] for r in kept], given[kept]
+
+
+def _fused(squares: list[Array], weights: Array, neighbors: int) -> Array:
     """The mean of the P_r after all rounds."""
     n = len(squares[0])
     k = max(2, min(neighbors, n // 2 - 1))
     graphs = [_graphs(one, min(k, n - 1)) for one in squares]
     full, sparse = [one[0] for one in graphs], [one[1] for one in graphs]
-    total = sum(full)
-    for _ in range(_ROUNDS if len(full) > 1 else 0):
-        full = [_diffused(S, (total - P) / (len(full) - 1)) for P, S in zip(full, sparse, strict=True)]
-        total = sum(full)
     if len(full) == 1:
-        total = _diffused(sparse[0], full[0])
-    fused = np.asarray(total) / len(full)
+        full = [_diffused(sparse[0], full[0])]
+    else:
+        for _ in range(_ROUNDS):
+            total = sum(w * P for w, P in zip(weights, full, strict=True))
+            others = [(total - w * P) / (weights.sum() - w) for w, P in zip(weights, full, strict=True)]
+            full = [_diffused(S, P) for S, P in zip(sparse, others, strict=True)]
+    fused = np.asarray(sum(w * P for w, P in zip(weights, full, strict=True)) / weights.sum())
     np.fill_diagonal(fused, 0.0)
     return fused
 
 
 def _graphs(squares: Array, k: int) -> tuple[Array, csr_array]:
     """P_r (n, n) with half of each row on the diagonal, and S_r (n, n) with k neighbors and the movement itself."""
-    n = len(squares)
-    distances = np.sqrt(np.maximum(squares, 0.0))
-    np.fill_diagonal(distances, 0.0)
-    typical = np.partition(distances, k, axis=1)[:, : k + 1].sum(axis=1) / k
-    scale = (typical[:, None] + typical + distances) / 3.0
-    scale = np.maximum(scale, _NONE * float(np.median(distances)) + np.finfo(float).tiny)
-    similar = np.maximum(np.exp(-((distances / scale) ** 2) / _WIDTH), _LEAST)
+    n, similar = len(squares), _similar(squares, k)
     np.fill_diagonal(similar, 2.0)  # itself first
     nearest = np.argpartition(-similar, k, axis=1)[:, : k + 1]
     np.fill_diagonal(similar, 1.0)
@@ -113,6 +124,16 @@ def _graphs(squares: Array, k: int) -> tuple[Array, csr_array]:
     full = 0.5 * similar / similar.sum(axis=1, keepdims=True)
     np.fill_diagonal(full, 0.5)
     return full, sparse
+
+
+def _similar(squares: Array, k: int) -> Array:
+    """A_r (n, n), at the scale of k neighbors."""
+    distances = np.sqrt(np.maximum(squares, 0.0))
+    np.fill_diagonal(distances, 0.0)
+    typical = np.partition(distances, k, axis=1)[:, : k + 1].sum(axis=1) / k
+    scale = (typical[:, None] + typical + distances) / 3.0
+    scale = np.maximum(scale, _NONE * float(np.median(distances)) + np.finfo(float).tiny)
+    return np.asarray(np.maximum(np.exp(-((distances / scale) ** 2) / _WIDTH), _LEAST))
 
 
 def _diffused(sparse: csr_array, full: Array) -> Array:

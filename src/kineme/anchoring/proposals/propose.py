@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.anchoring.clustering.clustering import METHODS, Clusters
-from kineme.anchoring.clustering.fusion import fuse, groups, set_apart
+from kineme.anchoring.clustering.fusion import components, fuse, local_similarities, set_apart
 from kineme.anchoring.clustering.number_of_clusters import count_clusters
+from kineme.anchoring.clustering.people import link_people
 from kineme.anchoring.clustering.spectral import count_by_eigengap, spectral
 from kineme.anchoring.clustering.stability import stabilities
 from kineme.anchoring.proposals.proposals import Proposals, describe_clusters
@@ -19,6 +20,7 @@ from kineme.comparison.similarity import AveragedSimilarity, averaged, similarit
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.recognition.left_out import check_groups, several
 from kineme.validation import Array, check_choice, check_count
 
 _SPECTRAL = "spectral"
@@ -28,11 +30,12 @@ _LARGEST = 2000  # movements whose similarities are fused at once
 _REPEATS = 20  # subsets that clusters must come again in
 
 
-def propose(
+def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     movements: MovementsLike | Described,
     method: str = DEFAULT_METHOD,
     n_clusters: int | None = None,
     *,
+    groups: ArrayLike | None = None,
     min_members: int = 3,
     like: Compares | None = None,
     max_clustered: int | None = None,
@@ -41,7 +44,8 @@ def propose(
 
     By default (``method="spectral"``) movements are similar whose neighbors are similar, in several representations
     together and at the scale of each neighborhood: see `kineme.anchoring.clustering.fusion.fuse`. So movements of
-    several people connect, of whom each repeats the own way more closely than that of others. The other methods take
+    several people connect, of whom each repeats the own way more closely than that of others. Name who made each
+    movement by `groups` where that is known: it is the better the more similar classes are. The other methods take
     distances ``1 - K`` of the averaged kernel at `gap_widths`: bounded, so that what is far is just far.
 
     Parameters
@@ -56,6 +60,10 @@ def propose(
         clusters of the tree, those too small to be proposed included. By default it is found, by the largest gap
         between eigenvalues or by `count_clusters`, and is at least two: whether all movements are one cluster cannot be
         told from their own distances.
+    groups : array_like of shape (n,), optional
+        Who made each movement; the other methods ignore it. Movements of two people are linked if they are among each
+        other's nearest: classes that each draws in an own way are found together, and classes that are alike apart. See
+        `kineme.anchoring.clustering.people.link_people`.
     min_members : int, default 3
         Movements of a proposal, at least; smaller clusters are left over.
     like : Recognizer, Comparison or ComparisonSpecification, optional
@@ -73,17 +81,21 @@ def propose(
     ------
     SpecificationError
         Parameters out of range, fewer than three movements, or copies of one movement.
+    TrajectoryError
+        Not one group for each movement.
     """
     check_choice("method", method, [_SPECTRAL, *METHODS])
     check_count("min_members", min_members, 2)
     described = describe(movements, like)
     _check_count_of(n_clusters, method, len(described))
+    people = None if groups is None else several(check_groups(groups, len(described)))
     limit = _largest(method, described.n_dims) if max_clustered is None else max_clustered
     check_count("max_clustered", limit, 3)
     if len(described) <= limit:
-        return _propose(described, averaged(described), method, n_clusters, min_members)[1]
+        return _propose(described, averaged(described), method, n_clusters, min_members, people)[1]
     sample, similarity = subsample(described, limit)
-    K, found = _propose(described.take(sample), similarity, method, n_clusters, min_members)
+    people = None if people is None else people[sample]
+    K, found = _propose(described.take(sample), similarity, method, n_clusters, min_members, people)
     return extend(described, sample, K, found, similarity)
 
 
@@ -103,31 +115,43 @@ def _check_count_of(n_clusters: int | None, method: str, n: int) -> None:
 
 
 def _propose(
-    described: Described, similarity: AveragedSimilarity, method: str, n_clusters: int | None, min_members: int
+    described: Described,
+    similarity: AveragedSimilarity,
+    method: str,
+    n_clusters: int | None,
+    min_members: int,
+    people: NDArray[np.intp] | None,
 ) -> tuple[Array, Proposals]:
     """Similarities K (n, n) at the widths given, and proposals."""
     K = similarities(described, widths=similarity.widths)
     order = own_order(K)
     clusters = np.empty(len(K), dtype=np.intp)
     if method == _SPECTRAL:
-        found, stable = _by_neighbors(described.take(order), n_clusters, min_members)
+        ordered = None if people is None else people[order]
+        found, stable = _by_neighbors(described.take(order), n_clusters, min_members, ordered)
     else:
         found, stable = _by_distances(1.0 - K[np.ix_(order, order)], method, n_clusters, min_members)
     clusters[order] = found
     return K, describe_clusters(K, clusters, stable, similarity.widths)
 
 
-def _by_neighbors(described: Described, n_clusters: int | None, min_members: int) -> tuple[Clusters, Array]:
+def _by_neighbors(
+    described: Described, n_clusters: int | None, min_members: int, people: NDArray[np.intp] | None
+) -> tuple[Clusters, Array]:
     """Clusters of movements that are not alone, and how stable each is."""
     described = by_shape(described)
     squares = squared_distances(described, described)
     squares = 0.5 * (squares + squares.transpose(0, 2, 1))
-    group = groups(squares)
-    kept = np.flatnonzero(np.bincount(group)[group] >= min_members)
+    component = components(squares)
+    kept = np.flatnonzero(np.bincount(component)[component] >= min_members)
     clusters = np.full(len(described), -1, dtype=np.intp)
     if len(kept) < 3:
         return clusters, np.empty(0)
-    similar = set_apart(fuse(squares[:, kept[:, None], kept]), group[kept])
+    squares, weights = squares[:, kept[:, None], kept], described.own_weights
+    similar = fuse(squares, weights)
+    if people is not None:
+        similar = link_people(similar, local_similarities(squares, weights), people[kept])
+    similar = set_apart(similar, component[kept])
     wanted = count_by_eigengap(similar) if n_clusters is None else n_clusters
     clusters[kept] = spectral(similar, wanted, min_members)
     stable = stabilities(similar, clusters[kept], lambda some: spectral(some, wanted), _REPEATS)

@@ -81,10 +81,11 @@ def _early(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
 def _spotting(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
     for own in (True, False):
         split = _split(data, max(settings.shots or _SOME_SHOTS), settings.seed, index, own=own)
+        people = None if own or data.people is None else data.people[split.train]
         for k, (rests, label) in enumerate(_RESTS):
             if _usable(data, split):
                 condition = Condition(f"spotting {own}", k, f"{'own' if own else 'others'}, {label}")
-                yield Trial(condition, data.demonstrations, split, "spot", rests=rests)
+                yield Trial(condition, data.demonstrations, split, "spot", rests=rests, people=people)
 
 
 def _anchoring(data: DataSet, _: Settings, index: int) -> Iterator[Trial]:
@@ -123,19 +124,23 @@ PERSON_PROTOCOLS: dict[str, Protocol] = {
         person=_person, by_person=True, min_classes=4,
     ),
     "earliness-by-person": Protocol(
-        "Early, user-independent", "As user-independent, but only the first part of each test movement's path is "
-        "given.", _early, _n_splits, "classify partial", person=_person, by_person=True,
+        "Early, user-independent", "As user-independent, with the most movements of each class that are asked for, 4 "
+        "by default and 3 with --quick, but only the first part of each test movement's path is given.", _early,
+        _n_splits, "classify partial", person=_person, by_person=True,
     ),
     "spotting": Protocol(
         "Spotting", "The test movements of one person in random order, in recordings of up to twenty, with rests and "
         "straight transits between them, or linked without a stop; templates by the same person (own) or by the "
-        "others. A movement is found if its class is right and the stretch overlaps it by half of their union or more.",
+        "others: the most of each class that are asked for, 4 by default and 3 with --quick. A movement is found if "
+        "its class is right and the stretch overlaps it by half of their union or more. Methods are told which of the "
+        "others made each template.",
         _spotting, _n_splits, "spot", person=_person, by_person=True,
     ),
     "anchoring": Protocol(
-        "Anchoring", "Movements without labels are clustered, those of each person alone and those of all people "
-        "together: adjusted Rand index, and number of clusters per class, where the number of clusters is found, and "
-        "the index where the number of classes is given. Rivals get average linkage, and the number.", _anchoring,
+        "Anchoring", "Movements without labels are clustered, those of each person alone and, where at least as "
+        "many splits as people are asked for, those of all people together: adjusted Rand index, and number of "
+        "clusters per class, where the number of clusters is found, and the index where the number of classes is "
+        "given. Rivals get average linkage, and the number.", _anchoring,
         _n_splits_of_anchoring, "cluster", person=_person_or_all, by_person=True,
     ),
 }  # fmt: skip

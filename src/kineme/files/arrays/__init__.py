@@ -1,1 +1,1 @@
-"""Files of named arrays: NPZ, JSON, MATLAB."""
+"""Files of named arrays: NPZ, JSON, MATLAB, HDF5."""

@@ -76,7 +76,7 @@ def elements(data: memoryview, order: str) -> Iterator[Element]:
 
 def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matrix]:
     """The variables with these names; others are neither decompressed nor read."""
-    variables = {}
+    variables, taken = {}, 0
     for element in elements(memoryview(data)[HEADER:], order):
         if element.type == _COMPRESSED:
             matrix = _expanded(element.data, order, wanted)
@@ -85,6 +85,8 @@ def matrices(data: bytes, order: str, wanted: Container[str]) -> dict[str, Matri
         else:
             raise ValueError(f"an element of type {element.type} in place of a variable")
         if matrix.name in wanted:
+            taken += len(matrix.content)
+            check_expanded(taken)
             variables[matrix.name] = matrix
     return variables
 
@@ -129,6 +131,17 @@ def _matrix(data: memoryview, order: str) -> Matrix:
     if third is None or third.type not in (1, 2) or min(sizes) < 0:
         raise ValueError(f"a damaged head of a matrix of shape {sizes}")
     return Matrix(bits & 0xFF, bool(bits & 0x800), sizes, bytes(third.data).decode("latin-1"), data[third.end :])
+
+
+def field_names(matrix: Matrix, order: str) -> list[str]:
+    """The names of a structure's fields, which the first two elements of its content tell."""
+    parts = elements(matrix.content, order)
+    width, names = next(parts, None), next(parts, None)
+    size = int.from_bytes(width.data, "little" if order == "<" else "big") if width else 0
+    if names is None or size < 1 or len(names.data) % size:
+        raise ValueError("damaged names of fields")
+    plain = bytes(names.data)
+    return [plain[k : k + size].partition(b"\0")[0].decode("latin-1") for k in range(0, len(plain), size)]
 
 
 def numbers(matrix: Matrix, order: str) -> Array:

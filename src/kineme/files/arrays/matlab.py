@@ -1,14 +1,15 @@
-"""MATLAB files in the layout of LASA: a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T)."""
+"""MATLAB files: LASA's, a list ``demos`` of structures with ``pos`` (d, T) and ``t`` (1, T), and any other layout."""
 
 from __future__ import annotations
 
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import NamedTuple
 
 from kineme.errors import DataError
+from kineme.files.arrays.arrays import Named, parsed_arrays
 from kineme.files.arrays.mat_elements import (
     CELL,
     STRUCT,
@@ -17,11 +18,17 @@ from kineme.files.arrays.mat_elements import (
     as_matrix,
     byte_order,
     elements,
+    field_names,
     matrices,
     numbers,
     text,
 )
+from kineme.files.arrays.mat_trees import as_tree
+from kineme.files.arrays.tree_movements import tree_movements
+from kineme.files.arrays.trees import has_times
 from kineme.files.limits import check_expanded
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed, listed
 from kineme.validation import Array
 
 _FIELDS = ("t", "pos")
@@ -77,12 +84,8 @@ def _of_structures(demos: Matrix, order: str) -> Iterator[tuple[Matrix, Matrix]]
     if demos.kind != STRUCT:
         raise ValueError("something else than structures in it")
     parts = elements(demos.content, order)
-    width, names = next(parts, None), next(parts, None)
-    size = int.from_bytes(width.data, "little" if order == "<" else "big") if width else 0
-    if names is None or size < 1 or len(names.data) % size:
-        raise ValueError("damaged names of fields")
-    plain = bytes(names.data)
-    fields = [plain[k : k + size].partition(b"\0")[0].decode("latin-1") for k in range(0, len(plain), size)]
+    next(parts, None), next(parts, None)  # the width of the names and the names
+    fields = field_names(demos, order)
     if missing := [field for field in _FIELDS if field not in fields]:
         raise ValueError(f"structures without {missing[0]!r}, but with {fields}")
     for _ in range(math.prod(demos.dims)):
@@ -102,3 +105,49 @@ def _arrays(t: Array, x: Array) -> tuple[Array, Array]:
     if t.ndim != 1 or x.ndim != 2 or len(t) != len(x):
         raise ValueError(f"t of shape {t.shape} and pos of shape {x.T.shape}")
     return t, x
+
+
+def mat_movements(data: bytes, layout: Layout) -> Parsed:
+    """The movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
+
+    Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
+    count only beside times or a rate.
+
+    Raises
+    ------
+    DataError
+        Not such a file, damaged, without movements, or with several arrays of coordinates of which none is chosen.
+    """
+    variables = _variables(data)
+    if "demos" in variables or not variables:
+        demos = read_demos(data)
+        named = Named([demos.name] * len(demos.times), "t")
+        return parsed_arrays(demos.positions, demos.times, named, layout, ("MATLAB", "demos"))
+    try:
+        tree = as_tree(variables, byte_order(data))
+    except (ValueError, struct.error) as error:
+        raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
+    if not has_times(tree):  # matrices on their own may be anything
+        tree = {name: one for name, one in tree.items() if isinstance(one, (dict, list))}
+    if not tree:
+        got = listed(variables)
+        raise DataError(
+            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}"
+        )
+    return tree_movements(tree, layout, "MATLAB")
+
+
+def _variables(data: bytes) -> dict[str, Matrix]:
+    """All variables; none of what is no file of version 5 to 7.2, which `read_demos` says."""
+    try:
+        return matrices(data, byte_order(data), _EVERYTHING)
+    except (ValueError, struct.error, zlib.error):
+        return {}
+
+
+class _Everything(Container[str]):
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+_EVERYTHING = _Everything()

@@ -11,19 +11,20 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
-from kineme.files.arrays.trees import Found, listed_shapes, movements_in
+from kineme.files.arrays.trees import NAMES, Found, Style, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
+from kineme.movements.tables.time_stamps import words_of
 from kineme.movements.trajectories.movements import axis_names
 
 _STAMP = "time [s]"
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
-def tree_movements(tree: Any, layout: Layout, kind: str, separator: str = ".", many: str = "refuse") -> Parsed:
+def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, many: str = "refuse") -> Parsed:
     """The movements of a tree, see `kineme.files.arrays.trees`.
 
     Parameters
@@ -37,7 +38,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, separator: str = ".", m
     DataError
         No movements; several arrays, none of them chosen; or no times where they are needed.
     """
-    found = [one for one in movements_in(tree, separator) if one.entries]
+    found = [one for one in movements_in(tree, style) if one.entries]
     if not found:
         got = f"no entry 'positions' but {listed(tree)}" if isinstance(tree, Mapping) else "none of numbers"
         raise DataError(f"expected arrays times and positions, got {got}")
@@ -70,8 +71,18 @@ def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
     xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]
+    width = Counter(x.shape[1] for x in xs).most_common(1)[0][0]
+    odd = tuple(
+        f"movement {one.place}: {x.shape[1]} dimensions where most have {width}"
+        for one, x in zip(found, xs, strict=True)
+        if x.shape[1] != width
+    )
+    found = [one for one, x in zip(found, xs, strict=True) if x.shape[1] == width]
+    xs = [x for x in xs if x.shape[1] == width]
     labels = [one.label for one in found]
-    return parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
+    return parsed_arrays(
+        xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed")
+    )._replace(left_out=odd)
 
 
 def _plainly_named(one: Found) -> Found:
@@ -94,8 +105,7 @@ def _heads(one: Found, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str
         elif len(shape) == 1:
             heads.append(name)
         else:
-            last = name.replace("/", ".").split(".")[-1].lower()
-            if last in _POINTS and width in (2, 3):
+            if words_of(name)[-1:] and words_of(name)[-1] in _POINTS and width in (2, 3):
                 ends = "xyz"[:width]
             heads += [f"{name}.{end}" for end in ends]
         owners += [name] * width

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,16 @@ _RATES = frozenset({"fps", "rate", "hz", "frequency", "sampling_rate", "sample_r
 _TIMES_OF = re.compile(r"(.+)[_./-](?:t|times?|time_?stamps?)|(?:t|times?|time_?stamps?)[_./-](.+)", re.IGNORECASE)
 _WIDEST = 1000  # numbers in a sample; images have more
 _DEEPEST = 12  # groups within groups
+
+
+class Style(NamedTuple):
+    """What arrays side by side mean, and what joins the names of groups and arrays within a movement."""
+
+    separator: str
+    alike_are_columns: bool  # arrays of one length and one width: columns of one movement, or movements each
+
+
+NAMES, GROUPS = Style(".", False), Style("/", True)
 
 
 class Found(NamedTuple):
@@ -38,25 +48,25 @@ class Found(NamedTuple):
         return counts.most_common(1)[0][0]
 
 
-def movements_in(tree: Any, separator: str = ".", place: str = "", label: str | None = None) -> Iterator[Found]:
+def movements_in(tree: Any, style: Style = NAMES, place: str = "", label: str | None = None) -> Iterator[Found]:
     """The movements in a tree, in its order.
 
     Parameters
     ----------
     tree : Mapping, list, array or text
         An array has ``shape`` and ``dtype``, and is converted to one of NumPy only when it is needed.
-    separator : str
-        Between the names of groups and arrays within a movement.
+    style : Style
+        `NAMES` where arrays are named, `GROUPS` where they lie in groups.
     """
     if place.count("/") > _DEEPEST:
         return
     if is_array(tree):
         yield from _of_array(tree, place, label)
     elif isinstance(tree, Mapping):
-        yield from _of_group(tree, separator, place, label)
+        yield from _of_group(tree, style, place, label)
     elif isinstance(tree, (list, tuple)):
         for k, one in enumerate(tree):
-            yield from movements_in(one, separator, f"{place}/{k}" if place else str(k), label)
+            yield from movements_in(one, style, f"{place}/{k}" if place else str(k), label)
 
 
 def is_array(tree: Any) -> bool:
@@ -72,12 +82,12 @@ def _of_array(array: Any, place: str, label: str | None) -> Iterator[Found]:
         yield Found(place, label, {"": array})
 
 
-def _of_group(tree: Mapping[str, Any], separator: str, place: str, label: str | None) -> Iterator[Found]:
+def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | None) -> Iterator[Found]:
     label = _own_label(tree) or label
     arrays = {name: one for name, one in tree.items() if is_array(one) and one.dtype.kind != "O"}
     groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list))}
-    if arrays and (_are_columns(arrays) or _continues(arrays, groups)):
-        entries = dict(_flat(tree, separator))
+    if arrays and (_are_columns(arrays, style) or _continues(arrays, groups)):
+        entries = dict(_flat(tree, style.separator))
         yield Found(place, label, {name: one for name, one in entries.items() if _fits(one)}, _rate(tree))
         return
     times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
@@ -89,15 +99,17 @@ def _of_group(tree: Mapping[str, Any], separator: str, place: str, label: str | 
             stamps = {"time": times[name]} if name in times else {}
             yield found._replace(entries=stamps | found.entries, rate=_rate(tree))
     for name, one in groups.items():
-        yield from movements_in(one, separator, f"{place}/{name}" if place else name, label or label_of(name))
+        yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name))
 
 
-def _are_columns(arrays: Mapping[str, Any]) -> bool:
+def _are_columns(arrays: Mapping[str, Any], style: Style) -> bool:
     """Whether arrays are the columns of one movement: with times, or of one length but not of one width."""
     if any(is_time(name) and len(one.shape) == 1 for name, one in arrays.items()):
         return True
     flat = [one.shape for one in arrays.values()]
-    return len({shape[0] for shape in flat}) == 1 and (len(set(flat)) > 1 or all(len(shape) == 1 for shape in flat))
+    if len({shape[0] for shape in flat}) > 1:
+        return False
+    return len(set(flat)) > 1 or all(len(shape) == 1 for shape in flat) or (style.alike_are_columns and len(flat) > 1)
 
 
 def _continues(arrays: Mapping[str, Any], groups: Mapping[str, Any]) -> bool:
@@ -133,6 +145,11 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
         if name.lower() in LABEL_WORDS | {"task"} and isinstance(one, str) and one:
             return one
     return None
+
+
+def has_times(names: Iterable[str]) -> bool:
+    """Whether any name means times, the times of another array, or a rate."""
+    return any(is_time(name) or name.lower() in _RATES or _TIMES_OF.fullmatch(name) for name in names)
 
 
 def label_of(name: str) -> str | None:

@@ -14,7 +14,7 @@ from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import DEFAULT_METHOD
 from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import SpecificationError
-from kineme.library.recognition.members import described
+from kineme.library.recognition.members import described, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
@@ -108,7 +108,8 @@ def propose(
     else:
         members, like = described(store, chosen), store.specification.comparison
         how = method or DEFAULT_METHOD
-        proposals = propose_clusters(members, how, n_clusters, min_members=min_members, like=like)
+        people = groups_of(store, chosen)
+        proposals = propose_clusters(members, how, n_clusters, groups=people, min_members=min_members, like=like)
     if ids is None:
         proposals = _without(proposals, _rejected_before(store, chosen))
     return LibraryProposals(chosen, proposals)

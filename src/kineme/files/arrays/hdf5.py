@@ -1,0 +1,76 @@
+"""HDF5 as a tree of arrays: robomimic, ALOHA and whatever else keeps movements in groups of data sets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError
+from kineme.files.arrays.tree_movements import tree_movements
+from kineme.files.arrays.trees import GROUPS
+from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.parsed import Parsed
+
+_DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
+_ATTRIBUTES = frozenset({"label", "task", "fps", "rate", "frequency", "hz"})
+
+
+def hdf5_movements(path: Path, layout: Layout) -> Parsed:
+    """The movements in an HDF5 file: groups of data sets of one length; only those that are needed are read.
+
+    Data sets that lie in other files are passed over: a file from elsewhere must not make the program read others.
+
+    Raises
+    ------
+    DataError
+        Not such a file, damaged, without movements, with several vectors of which none is chosen, or the package that
+        reads it is not installed; the message names the extra.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise DataError("expected the package h5py to read HDF5; pip install 'kineme[hdf5]'") from error
+    try:
+        with h5py.File(os.fspath(path), "r") as file:
+            return tree_movements(_tree(file, h5py, [0]), layout, "HDF5", GROUPS)
+    except DataError:
+        raise
+    except (OSError, RuntimeError, KeyError) as error:  # as which h5py raises what the HDF5 library finds
+        raise DataError(f"expected an HDF5 file, got something foreign, truncated or damaged ({error})") from error
+
+
+def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0) -> dict[str, Any]:
+    """A group as a mapping: data sets that are not read yet, single numbers and texts, groups."""
+    tree: dict[str, Any] = {}
+    for name in group.attrs:
+        if name.lower() in _ATTRIBUTES and (value := _single(group.attrs[name])) is not None:
+            tree[name] = value
+    for name in group:
+        counted[0] += 1
+        if counted[0] > _MOST:
+            raise DataError(f"expected an HDF5 file of at most {_MOST:,} groups and data sets, got more")
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        one = group[name]
+        if isinstance(one, Mapping):
+            if depth < _DEEPEST:
+                tree[name] = _tree(one, h5py, counted, depth + 1)
+        elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
+            if one.shape == ():
+                tree[name] = _single(one[()])
+            elif one.shape and one.dtype.kind in "biuf":
+                tree[name] = one
+    return tree
+
+
+def _single(value: Any) -> str | float | None:
+    """A text or a number; None for anything else."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    if isinstance(value, str):
+        return value
+    return float(value) if np.ndim(value) == 0 and isinstance(value, (int, float, np.integer, np.floating)) else None

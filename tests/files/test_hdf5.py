@@ -1,0 +1,123 @@
+"""HDF5 files in the layouts of robomimic and ALOHA, and plain ones, written by h5py."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import DataError
+
+T = np.arange(20) / 20
+X = np.column_stack((np.sin(T), T**2, T))
+
+
+@pytest.fixture
+def write(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py reads and writes HDF5")
+
+    def written(fill):
+        path = tmp_path / "a.hdf5"
+        with h5py.File(path, "w") as file:
+            fill(file)
+        return path
+
+    return written
+
+
+def robomimic(file):
+    for k in range(3):
+        group = file.create_group(f"data/demo_{k}")
+        group.attrs["num_samples"] = n = 10 + k
+        group["actions"], group["dones"], group["states"] = np.ones((n, 7)), np.zeros(n), np.ones((n, 5))
+        group["obs/robot0_eef_pos"], group["obs/image"] = X[:n], np.zeros((n, 64, 64, 3), np.uint8)
+        group["next_obs/robot0_eef_pos"] = X[:n]
+    file["mask/train"] = np.array([b"demo_0"])
+
+
+def aloha(file):
+    file.attrs["sim"] = True
+    file["action"], file["observations/qpos"] = np.ones((20, 14)), np.cumsum(np.ones((20, 14)), axis=0)
+    file["observations/images/top"] = np.zeros((20, 48, 64, 3), np.uint8)
+
+
+def test_groups_are_movements_and_data_sets_are_chosen(write):
+    found = kineme.read_recordings(write(robomimic), columns="obs/robot0_eef_pos", units=0.05)
+    assert [(source.place, source.label) for source in found.sources] == [(f"data/demo_{k}", None) for k in range(3)]
+    assert found.demonstrations.dimensions == tuple(f"obs/robot0_eef_pos.{axis}" for axis in "xyz")
+    assert found.demonstrations.lengths.tolist() == [10, 11, 12]
+    np.testing.assert_array_equal(found.demonstrations[1].positions, X[:11])
+    np.testing.assert_allclose(found.demonstrations.durations, 0.05 * np.array([9, 10, 11]))
+
+
+def test_without_a_choice_the_vectors_are_listed(write):
+    words = r"got actions \(7\), next_obs/robot0_eef_pos \(3\), obs/robot0_eef_pos \(3\), states \(5\); say which with"
+    with pytest.raises(DataError, match=words):
+        kineme.read_recordings(write(robomimic))
+    with pytest.raises(DataError, match="the step between samples with units="):
+        kineme.read_recordings(write(robomimic), columns="states")
+
+
+def test_a_file_may_be_one_movement(write):
+    found = kineme.read_recordings(write(aloha), columns="observations/qpos", units=0.02)
+    assert (len(found), found.demonstrations.n_dims) == (1, 14)
+
+
+def test_groups_with_names_are_labels_and_arrays_of_their_own_are_movements(write):
+    def named(file):
+        for name in ("wave", "nod"):
+            file[f"{name}/t"], file[f"{name}/pos"] = T, X
+        file["nod"].attrs["label"] = "bow"
+
+    found = kineme.read_recordings(write(named))
+    assert {source.place: source.label for source in found.sources} == {"wave": "wave", "nod": "bow"}
+    assert found.demonstrations.dimensions == ("x", "y", "z")
+
+    def bare(file):
+        file["wave"], file["nod"] = X, X[:9]
+
+    assert {source.place for source in kineme.read_recordings(write(bare)).sources} == {"wave", "nod"}
+
+
+def test_rates_give_times(write):
+    def rated(file):
+        file["pos"], file["gripper"] = X, T
+        file.attrs["fps"] = 50
+
+    times = kineme.read_recordings(write(rated)).demonstrations.times
+    np.testing.assert_allclose(times, np.arange(20) / 50)
+
+
+def test_other_files_are_not_read_through_this_one(write, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "secret.h5", "w") as other:
+        other["y"] = X[:, 1]
+
+    def linked(file):
+        file["t"], file["x"] = T, X[:, 0]
+        file["y"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/y")
+        layout = h5py.VirtualLayout((20,), "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "y", (20,))
+        file.create_virtual_dataset("v", layout)
+        file.create_dataset("e", (20,), "f8", external=[(str(tmp_path / "secret.h5"), 0, 160)])
+
+    assert kineme.read_recordings(write(linked)).demonstrations.dimensions == ("x",)
+
+
+def test_damaged_files_and_a_missing_package_say_so(write, tmp_path, monkeypatch):
+    path = write(aloha)
+    path.write_bytes(path.read_bytes()[:900])
+    with pytest.raises(DataError, match="expected an HDF5 file, got something foreign, truncated or damaged"):
+        kineme.read_recordings(path)
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(DataError, match=r"pip install 'kineme\[hdf5\]'"):
+        kineme.read_recordings(path)
+
+
+def test_a_file_larger_than_the_limit_is_refused_before_it_is_read(write):
+    def sparse(file):
+        file.create_dataset("wave/t", (2**40,), "f8", chunks=(1024,), compression="gzip")
+        file.create_dataset("wave/x", (2**40,), "f8", chunks=(1024,), compression="gzip")
+
+    with pytest.raises(DataError, match="takes at most"):
+        kineme.read_recordings(write(sparse))
