@@ -9,6 +9,7 @@ from lerobot_sets import NAMES, TASKS, write_v2, write_v3
 
 import kineme
 from kineme.errors import DataError
+from kineme.files.inspection.inspect import inspect
 
 
 @pytest.fixture(params=["v2", "v3", "v3 lists"])
@@ -36,6 +37,8 @@ def test_episodes_are_movements_and_tasks_are_labels(folder):
     assert found.labels.tolist() == [TASKS[0], TASKS[1], TASKS[0]]
     assert (found.problems, how.time, how.units) == ((), "timestamp [s]", "s")
     assert how.format.startswith("LeRobot v")
+    assert how.ignored == ("action", "next.done", "observation.images.top")
+    assert "LeRobot does not declare the units of joints: they are taken as they are stored" in inspect(found).notes
     assert {source.path for source in found.sources} == {"set"}
     np.testing.assert_array_equal(demos[1].times, np.arange(30) / 50)  # exactly, though they are stored as float32
     stored = np.vstack(pd.read_parquet(shard_of(folder))["observation.state"])[:20]
@@ -175,6 +178,13 @@ def test_a_damaged_description_says_what_is_wrong(folder, change, words):
     path.write_text("{")
     with pytest.raises(DataError, match=r"expected meta/info.json of a LeRobot data set"):
         kineme.read_recordings(folder)
+
+
+def test_choices_that_the_data_set_makes_itself_are_refused(folder):
+    assert len(kineme.read_recordings(folder, label="task", time="timestamp", movement="episode_index")) == 3
+    for choice in ({"label": "next.done"}, {"time": "frame_index"}, {"movement": "task_index"}):
+        with pytest.raises(DataError, match=f"as {next(iter(choice))} of a LeRobot data set"):
+            kineme.read_recordings(folder, **choice)
 
 
 def test_missing_metadata_is_named(tmp_path):

@@ -25,9 +25,10 @@ from kineme.files.arrays.mat_elements import (
 )
 from kineme.files.arrays.mat_trees import as_tree
 from kineme.files.arrays.tree_movements import tree_movements
+from kineme.files.arrays.trees import has_times
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.layout import Layout
-from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.parsed import Parsed, listed
 from kineme.validation import Array
 
 _FIELDS = ("t", "pos")
@@ -109,7 +110,8 @@ def _arrays(t: Array, x: Array) -> tuple[Array, Array]:
 def mat_movements(data: bytes, layout: Layout) -> Parsed:
     """The movements in a MATLAB file: those of ``demos``, see `read_demos`, else of all its variables.
 
-    Structures with times hold one movement; cells and arrays of structures hold many; so do matrices of their own.
+    Structures with times hold one movement; cells and arrays of structures hold many. Matrices among the variables
+    count only beside times or a rate.
 
     Raises
     ------
@@ -125,6 +127,13 @@ def mat_movements(data: bytes, layout: Layout) -> Parsed:
         tree = as_tree(variables, byte_order(data))
     except (ValueError, struct.error) as error:
         raise DataError(f"expected a MATLAB file of arrays, got {error}") from error
+    if not has_times(tree):  # matrices on their own may be anything
+        tree = {name: one for name, one in tree.items() if isinstance(one, (dict, list))}
+    if not tree:
+        got = listed(variables)
+        raise DataError(
+            f"expected a MATLAB file with 'demos', got none of that name, nor cells, structures, times: {got}"
+        )
     return tree_movements(tree, layout, "MATLAB")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,6 +145,11 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
         if name.lower() in LABEL_WORDS | {"task"} and isinstance(one, str) and one:
             return one
     return None
+
+
+def has_times(names: Iterable[str]) -> bool:
+    """Whether any name means times, the times of another array, or a rate."""
+    return any(is_time(name) or name.lower() in _RATES or _TIMES_OF.fullmatch(name) for name in names)
 
 
 def label_of(name: str) -> str | None:

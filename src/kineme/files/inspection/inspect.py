@@ -148,6 +148,8 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
         notes.append(f"time counts in {' here, in '.join(guessed)} there, to judge by its size; give --units")
     if any(how.units_from.startswith("no times") for how, _ in recordings.detected):
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
+    if any(how.format.startswith("LeRobot") for how, _ in recordings.detected):
+        notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
     single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]
     if single:
         notes.append(f"only one movement labeled {', '.join(single[:5])}{' and others' if len(single) > 5 else ''}")

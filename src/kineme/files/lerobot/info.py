@@ -28,6 +28,8 @@ class Info(NamedTuple):
     fps : float
     heads : dict of str to tuple of str
         Feature of numbers -> the names of its entries; one empty name where the feature is a single number.
+    others : tuple of str
+        Features that cannot be coordinates: images, texts.
     data_path : str
         Where the shards are, in the syntax of `str.format`.
     episodes : int or None
@@ -39,6 +41,7 @@ class Info(NamedTuple):
     version: int
     fps: float
     heads: dict[str, tuple[str, ...]]
+    others: tuple[str, ...]
     data_path: str
     episodes: int | None
     chunk: int
@@ -81,8 +84,9 @@ def read_info(folder: Path) -> Info:
         raise DataError(f"expected a data_path within the data set in {MARKER}, got {path!r}")
     total, chunk = known.get("total_episodes"), known.get("chunks_size")
     heads = {name: entries for name, one in features.items() if (entries := _entries(name, one))}
+    others = tuple(name for name in features if name not in heads and name not in COUNTERS)
     return Info(
-        int(major), float(fps), heads, path, total if isinstance(total, int) else None,
+        int(major), float(fps), heads, others, path, total if isinstance(total, int) else None,
         chunk if isinstance(chunk, int) and chunk > 0 else 1000,
     )  # fmt: skip
 

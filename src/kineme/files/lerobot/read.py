@@ -40,6 +40,7 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
         import pyarrow  # noqa: F401
     except ImportError as error:
         raise DataError("expected the package pyarrow to read Parquet; pip install 'kineme[parquet]'") from error
+    _check_choices(layout)
     info = read_info(folder)
     features, heads, chosen = _chosen(info, layout)
     declared, tasks = read_episodes(folder, info), read_tasks(folder)
@@ -56,7 +57,21 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     )  # fmt: skip
     plain = Layout(time=0, columns=range(1, len(columns)), skip=layout.skip)
     roles = choose_roles(table.heads, ("number",) * len(table.heads), plain)
-    return table_movements(table, roles, plain, f"v{info.version}")._replace(left_out=tuple(left_out))
+    parsed = table_movements(table, roles, plain, f"v{info.version}")
+    ignored = (*(name for name in info.heads if name not in features), *info.others)
+    return parsed._replace(detected=parsed.detected._replace(ignored=ignored), left_out=tuple(left_out))
+
+
+def _check_choices(layout: Layout) -> None:
+    """Refuse a choice of times, movements or labels that the data set has already made otherwise."""
+    named = {"label": (layout.label, ("task", "task_index")), "time": (layout.time, ("timestamp",))}
+    for what, (given, known) in named.items():
+        if given is not None and given not in known:
+            raise DataError(f"expected {known[0]!r} as {what} of a LeRobot data set, which declares it, got {given!r}")
+    if layout.keys is not None and not set(layout.keys) <= {"episode_index", "episode"}:
+        raise DataError(
+            f"expected 'episode_index' as movement of a LeRobot data set, got {listed(map(str, layout.keys))}"
+        )
 
 
 def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
