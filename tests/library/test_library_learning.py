@@ -218,7 +218,7 @@ def test_disk_is_little_more_than_the_arrays_in_single_precision(tmp_path):
             {},
             r"trajectory 1: expected an extent from 1e-30 to 1e\+30, got 1.8e-31; choose a unit",
         ),
-        (np.random.default_rng(0).normal(size=(2, 9, 3)), {}, r"expected movements of 2 dimensions .* got 3; select"),
+        (np.random.default_rng(0).normal(size=(2, 9, 3)), {}, r"expected movements of 2 dimensions .* got 3; choose"),
         (np.random.default_rng(0).normal(size=(2, 9, 2)), {"labels": ["a"]}, r"one label for each of the 2 .* got 1"),
         (np.random.default_rng(0).normal(size=(2, 9, 2)), {"places": ["a"]}, r"one place for each of the 2 .* got 1"),
         (

@@ -306,7 +306,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         with all demonstrations. They start and end at rests, at minima of speed and, where these are far apart, at even
         times. Chosen is the chain of windows that do not overlap with the largest summed score; a window scores its
         duration, less the more it differs from the class: in the averaged kernel, and in duration and size, given the
-        tempo and the size of the whole recording, which are estimated from what is found.
+        tempo and the size of the whole recording, which are estimated from what is found. Its class is that of the
+        nearest demonstration, to this window or to one that begins and ends nearly there.
 
         Parameters
         ----------
@@ -321,9 +322,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Returns
         -------
         list of Spotted
-            ``(start, end, label, confidence)`` in order of time; label None is motion of no known class. Rests are left
-            out. Without time stamps in fit, movements are looked for between a quarter of the typical stretch between
-            rests and four times it.
+            ``(start, end, label, confidence, p_known)`` in order of time; label None is motion of no known class.
+            `confidence` and `p_known` are those of an `Answer`. Rests are left out. Without time stamps in fit,
+            movements are looked for between a quarter of the typical stretch between rests and four times it.
         """
         from kineme.recognition.spotting import spot
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +20,20 @@ from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
+from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import Calibration, check_error_rate
 from kineme.recognition.window_scores import (
     Manner,
     ScoredWindows,
     Templates,
+    closest_classes,
     compare_windows,
     durations_of,
     expected,
+    far,
     manner_of,
     score_windows,
+    weighted_by_rarity,
 )
 from kineme.validation import Array, check_count
 
@@ -38,7 +43,7 @@ _LEAST_UNKNOWN = 0.1  # in shortest demonstrated durations: what is left over an
 
 
 class Spotted(NamedTuple):
-    """One stretch of motion: from when to when, what it is (None: unknown), and how sure.
+    """One stretch of motion: from when to when, what it is (None: unknown), how sure, and how usual.
 
     Attributes
     ----------
@@ -46,14 +51,18 @@ class Spotted(NamedTuple):
         Time stamps [s].
     label : label or None
     confidence : float
-        1 minus the largest p-value of what was not answered: of the other classes, or, for None, of all. Not the
-        probability that `Answer.confidence` is.
+        As `Answer.confidence`: the probability that the label is right if the stretch is a movement of a known class;
+        for None, 1 minus `p_known`.
+    p_known : float
+        As `Answer.p_known`: share of movements of known classes that would be as novel or more. It may be below the
+        error rate: a movement in a recording is cut by the search itself, which makes it somewhat more novel.
     """
 
     start: float
     end: float
     label: Label | None
     confidence: float
+    p_known: float = math.nan  # of records that were stored without
 
 
 def spot(
@@ -85,13 +94,14 @@ def spot(
     if not len(rows):
         return []
     (logs,) = score(comparison, references, pieces_of(whole, rows), nearest)
-    p = calibration.p_values(logs, error_rate)
-    p[np.arange(len(best)), best] = 0.0
+    p_known = calibration.known_p_values(logs, error_rate)
+    confidence = 1.0 - p_known
+    confidence[: len(best)] = class_probabilities(logs)[np.arange(len(best)), best]
     classes = references.classes.tolist()
     labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
     t = whole.times
     return [
-        Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], 1.0 - float(p[i].max()))
+        Spotted(float(t[rows[i, 0]]), float(t[rows[i, 1] - 1]), labels[i], float(confidence[i]), float(p_known[i]))
         for i in np.argsort(rows[:, 0], kind="stable").tolist()
     ]
 
@@ -114,16 +124,19 @@ def _chosen(known: Templates, windows: Windows, error_rate: float) -> tuple[Rows
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
     motion, typical = windows.motion, expected(known.references)
     compared = compare_windows(known, motion, windows.rows)
+    distances = compared.scores * known.calibration.scales
+    compared = weighted_by_rarity(compared, distances)
     around = surroundings(motion, windows.bouts, compared.rows)
     manner = Manner()
     for _ in range(_PASSES - 1):
         scored = score_windows(compared, typical, around, manner, error_rate)
         chosen = _best_windows(compared.rows, scored)
         manner = manner_of(compared, typical, chosen, scored.best)
-    scored = score_windows(compared, typical, around, manner, error_rate)
-    chosen = _best_windows(compared.rows, scored)
+    chosen = _best_windows(compared.rows, score_windows(compared, typical, around, manner, error_rate))
     rows = compared.rows[chosen]
-    return np.column_stack((rows[:, 0], rows[:, 1] + 1)), scored.best[chosen]
+    distances /= far(error_rate) * np.exp(np.log(known.calibration.scales).mean())
+    classes = closest_classes(compared, distances, typical, manner, motion.times[compared.rows], chosen)
+    return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
 
 
 def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:

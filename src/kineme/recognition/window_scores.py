@@ -18,6 +18,7 @@ from kineme.movements.segmentation.motion import Motion
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.candidate_windows import N_POINTS, Surroundings, resampled
 from kineme.recognition.conformal import Calibration
+from kineme.recognition.left_out import LEAST
 from kineme.validation import Array
 
 _TILE = 4096  # windows described at a time
@@ -28,6 +29,10 @@ _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a 
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
 _SLOW = 0.2  # share of the mean speed of a window below which it rests
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
+_COMMON = 0.2  # share of the windows of a recording whose distance to a class, or less, is common
+_RARITY = 0.3  # power with which distances count in common ones
+_ALIKE = 0.9  # intersection over union from which two windows are about one movement
+_MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
 
 
 class Templates(NamedTuple):
@@ -132,6 +137,75 @@ def compare_windows(known: Templates, motion: Motion, rows: Rows) -> ComparedWin
     return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 
+def weighted_by_rarity(compared: ComparedWindows, distances: Array) -> ComparedWindows:
+    """Scores of windows, larger for classes that much of the recording is near to.
+
+    Simple shapes are part of many movements: of a sphere drawn in space, a half is a circle. Scores of class c are
+    divided by ``m_c^0.3``, with m_c the distance that a fifth of the windows is within, over the geometric mean of all
+    classes.
+    """
+    common = np.log(np.maximum(np.quantile(distances, _COMMON, axis=0), LEAST))
+    return replace(compared, scores=compared.scores * np.exp(_RARITY * (common.mean() - common)))
+
+
+def closest_classes(
+    compared: ComparedWindows,
+    distances: Array,
+    typical: Expected,
+    manner: Manner,
+    spans: Array,
+    chosen: list[int],
+) -> NDArray[np.intp]:
+    """Class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
+
+    Which window is chosen depends on its duration, its size, and what surrounds it; these differ between people. The
+    class is that of the nearest demonstration, as in `Recognizer.recognize`, wherever exactly the movement starts and
+    ends: the distance, not over the scale of the class, and a quarter of the costs of duration and size.
+
+    Parameters
+    ----------
+    compared : ComparedWindows
+        n windows, sorted by starts.
+    distances : ndarray of shape (n, C)
+        To the nearest demonstration of each class, in that at which a window counts as far.
+    typical : Expected
+    manner : Manner
+    spans : ndarray of shape (n, 2)
+        Start and end of each window [s].
+    chosen : list of int
+        Windows.
+    """
+    costs = distances + _MANNER * _manner_costs(compared, typical, manner)
+    found = np.empty(len(chosen), dtype=np.intp)
+    for k, i in enumerate(chosen):
+        start, end = spans[i]
+        reach = (1.0 / _ALIKE - 1.0) * (end - start)
+        near = slice(*np.searchsorted(spans[:, 0], (start - reach, start + reach), side="right"))
+        shared = np.minimum(spans[near, 1], end) - np.maximum(spans[near, 0], start)
+        union = np.maximum(spans[near, 1], end) - np.minimum(spans[near, 0], start)
+        found[k] = costs[near][shared >= _ALIKE * union].min(axis=0).argmin()
+    return found
+
+
+def far(error_rate: float) -> float:
+    """Nonconformity at which a window counts as far."""
+    return _REACH * math.sqrt(-4.0 / math.pi * math.log(error_rate))
+
+
+def _manner_costs(compared: ComparedWindows, typical: Expected, manner: Manner) -> Array:
+    """Costs (n, C) of another duration, and another size, than those of the class in this recording."""
+    costs = np.zeros(compared.scores.shape)
+    if typical.log_durations is not None:
+        ratio = compared.log_durations[:, None] - typical.log_durations
+        if manner.tempo is None:
+            costs += 0.5 * _TEMPO * np.maximum(np.abs(ratio) - _DEAD, 0.0) ** 2
+        else:
+            costs += _TEMPO * (ratio - manner.tempo) ** 2
+    if manner.size is not None:
+        costs += _SIZE * (compared.log_sizes[:, None] - typical.log_sizes - manner.size) ** 2
+    return costs
+
+
 def score_windows(
     compared: ComparedWindows, typical: Expected, around: Surroundings, manner: Manner, error_rate: float
 ) -> ScoredWindows:
@@ -142,19 +216,10 @@ def score_windows(
     inside. The score is ``(1 - cost) * duration / typical duration`` where positive, less a cost per movement: so that
     a whole movement is preferred to its parts, and no part of it is a movement by chance.
     """
-    reach = _REACH * math.sqrt(-4.0 / math.pi * math.log(error_rate))
-    costs = compared.scores / reach
+    costs = compared.scores / far(error_rate) + _manner_costs(compared, typical, manner)
     lasting = compared.log_durations
     usual = float(np.median(lasting)) if typical.log_durations is None else float(np.median(typical.log_durations))
-    if typical.log_durations is not None:
-        ratio = lasting[:, None] - typical.log_durations
-        if manner.tempo is None:
-            costs += 0.5 * _TEMPO * np.maximum(np.abs(ratio) - _DEAD, 0.0) ** 2
-        else:
-            costs += _TEMPO * (ratio - manner.tempo) ** 2
-            usual += manner.tempo
-    if manner.size is not None:
-        costs += _SIZE * (compared.log_sizes[:, None] - typical.log_sizes - manner.size) ** 2
+    usual += manner.tempo or 0.0
     costs += _REST_INSIDE * np.maximum(compared.slowness[:, None] - typical.slowness, 0.0)
     best = costs.argmin(axis=1)
     closeness = 1.0 - costs[np.arange(len(best)), best]

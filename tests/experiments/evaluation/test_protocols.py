@@ -10,13 +10,14 @@ from kineme.experiments.evaluation import person_protocols
 from kineme.experiments.evaluation import score_split as scoring
 from kineme.experiments.evaluation.conditions import STRENGTHS, TOGETHER, robustness_conditions
 from kineme.experiments.evaluation.data import DataSet
-from kineme.experiments.evaluation.methods import METHODS, Method, Options
+from kineme.experiments.evaluation.methods import METHODS, DefaultRecognizer, Method, Options
 from kineme.experiments.evaluation.protocols import PROTOCOLS, usable_shots
 from kineme.experiments.evaluation.score_split import does, score_split
 from kineme.experiments.evaluation.spotting import Stretch, concatenate_all
 from kineme.experiments.evaluation.trials import TASKS, Settings
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.recognition.early.early import cut
+from kineme.recognition.recognizer import Recognizer
 
 SETTINGS = Settings(splits=2, seed=3, shots=(1, 2))
 AVAILABLE = [name for name, one in METHODS.items() if not one.unavailable()]
@@ -102,6 +103,23 @@ def test_recordings_with_rests_and_without_are_spotted(of_people, monkeypatch):
         "own, with rests", "own, without rests", "others, with rests", "others, without rests",
     ]  # fmt: skip
     assert all(bool(one.transits) is rests for rests, several in made for one in several)
+
+
+def test_who_made_the_templates_is_told_where_others_did(of_people, monkeypatch):
+    """Without, repetitions by one of the others understate how much people differ."""
+    told = []
+    method = Method("one", lambda options: told.append(options.people) or Recording([]))
+    monkeypatch.setattr(scoring, "METHODS", {"one": method})
+    score_split(of_people, "spotting", "one", 0, SETTINGS)
+    train = [trial.split.train for trial in PROTOCOLS["spotting"].trials(of_people, SETTINGS, 0)]
+    *own, one, other = told  # of each trial by oneself, and before, when asked whether it can spot
+    assert own == [None] * 3
+    np.testing.assert_array_equal(one, of_people.people[train[2]])
+    np.testing.assert_array_equal(other, of_people.people[train[3]])
+    fitted = DefaultRecognizer(None, of_people.people)
+    fitted.fit(of_people.demonstrations)
+    expected = Recognizer().fit(of_people.demonstrations, groups=of_people.people).calibration()
+    np.testing.assert_array_equal(fitted.recognizer.calibration().scales, expected.scales)
 
 
 def test_movements_of_unknown_classes_must_not_be_found(of_people, monkeypatch):

@@ -36,10 +36,14 @@ class Contender(Protocol):
 
 
 class Options(NamedTuple):
-    """What a protocol passes to every method; a method ignores what it cannot use."""
+    """What a protocol passes to every method; a method ignores what it cannot use.
+
+    `people` (n,) made the training movements, where that is told.
+    """
 
     max_angle: float | None = None
     seed: int = 0
+    people: NDArray[Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -98,12 +102,13 @@ class LearnsBeginnings:
 class DefaultRecognizer:
     """`Recognizer` with its defaults; the familiarity is its `novelty`, negated."""
 
-    def __init__(self, max_angle: float | None) -> None:
+    def __init__(self, max_angle: float | None, people: NDArray[Any] | None = None) -> None:
         self.recognizer = Recognizer(max_angle=max_angle)
+        self.people = people
 
     def fit(self, demonstrations: Demonstrations) -> None:
         """Learn from labeled movements."""
-        self.recognizer.fit(demonstrations)
+        self.recognizer.fit(demonstrations, groups=self.people)
 
     def classify(self, demonstrations: Demonstrations) -> tuple[NDArray[Any], Array]:
         """Class and familiarity of each movement."""
@@ -127,7 +132,7 @@ _SHARES = np.arange(3, 11) / 10  # of the path, of the beginnings that are learn
 
 #: The paper's configuration is 1-NN on the shape-attractor of the original, or on f of the bio-inspired formulation.
 METHODS: dict[str, Method] = {
-    OURS: Method("kineme, defaults", lambda options: DefaultRecognizer(options.max_angle)),
+    OURS: Method("kineme, defaults", lambda options: DefaultRecognizer(options.max_angle, options.people)),
     "paper": Method("paper, original form", lambda _: PaperFeatures("original", "shape-attractor")),
     "paper-bio": Method("paper, bio-inspired form", lambda _: PaperFeatures("bio-inspired", "forcing")),
     "euclidean": Method("Euclidean 1-NN", lambda _: EuclideanNeighbor(), learns_beginnings=True),

@@ -81,10 +81,11 @@ def _early(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
 def _spotting(data: DataSet, settings: Settings, index: int) -> Iterator[Trial]:
     for own in (True, False):
         split = _split(data, max(settings.shots or _SOME_SHOTS), settings.seed, index, own=own)
+        people = None if own or data.people is None else data.people[split.train]
         for k, (rests, label) in enumerate(_RESTS):
             if _usable(data, split):
                 condition = Condition(f"spotting {own}", k, f"{'own' if own else 'others'}, {label}")
-                yield Trial(condition, data.demonstrations, split, "spot", rests=rests)
+                yield Trial(condition, data.demonstrations, split, "spot", rests=rests, people=people)
 
 
 def _anchoring(data: DataSet, _: Settings, index: int) -> Iterator[Trial]:
@@ -131,7 +132,8 @@ PERSON_PROTOCOLS: dict[str, Protocol] = {
         "Spotting", "The test movements of one person in random order, in recordings of up to twenty, with rests and "
         "straight transits between them, or linked without a stop; templates by the same person (own) or by the "
         "others: the most of each class that are asked for, 4 by default and 3 with --quick. A movement is found if "
-        "its class is right and the stretch overlaps it by half of their union or more.",
+        "its class is right and the stretch overlaps it by half of their union or more. Methods are told which of the "
+        "others made each template.",
         _spotting, _n_splits, "spot", person=_person, by_person=True,
     ),
     "anchoring": Protocol(

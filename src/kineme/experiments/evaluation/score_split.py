@@ -34,7 +34,7 @@ def score_split(data: DataSet, protocol: str, method: str, index: int, settings:
     if not does(method, PROTOCOLS[protocol].task):
         return scores
     for trial in PROTOCOLS[protocol].trials(data, settings, index):
-        contender = METHODS[method].contender(Options(trial.max_angle, settings.seed), trial.task)
+        contender = METHODS[method].contender(Options(trial.max_angle, settings.seed, trial.people), trial.task)
         if trial.task == "spot":
             scores += _spot(contender, trial, [settings.seed, index])
         else:

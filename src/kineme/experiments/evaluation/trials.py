@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.experiments.evaluation.conditions import Condition
 from kineme.experiments.evaluation.data import DataSet
@@ -54,6 +55,8 @@ class Trial:
         The shares of the test movements' paths that are classified, for "classify partial".
     rests : bool
         Whether there are rests between the concatenated test movements, for "spot".
+    people : ndarray, optional
+        Who made each training movement, for methods that take groups.
     """
 
     condition: Condition
@@ -63,6 +66,7 @@ class Trial:
     max_angle: float | None = None
     fractions: tuple[float, ...] = ()
     rests: bool = True
+    people: NDArray[Any] | None = None
 
 
 Trials = Callable[[DataSet, Settings, int], Iterator[Trial]]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kineme.library.learning.deduplicate import Batch, Stored, find_stored
 from kineme.library.learning.serialize import evenly_sampled, serialize
+from kineme.library.storage.channels import channels_to_text
 from kineme.library.storage.read import people_of
 from kineme.library.storage.rows import Row, among, as_text, listed, next_key
 from kineme.library.storage.source import Source
@@ -100,6 +101,8 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
     assert serialized is not None
     if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
+        if demos.channels is not None:
+            change.insert("meta", [("channels", channels_to_text(demos.channels))])
     lengths, durations = demos.lengths.tolist(), demos.durations.tolist()
     starts = np.zeros(len(demos)) if demos.movements.times is None else demos.times[demos.offsets[:-1]]
     t0, names = starts.tolist(), demos.names or (None,) * len(demos)
@@ -114,6 +117,8 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
     change.insert("raw", [(key, *serialized.raw[k]) for key, k in rows])
     change.insert("primitive", [(key, *serialized.primitives[k]) for key, k in rows])
     change.insert("feature", [(key, serialized.features[k]) for key, k in rows])
+    if serialized.recorded:
+        change.insert("recorded", [(key, serialized.recorded[k]) for key, k in rows])
 
 
 def _without_symbol(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:

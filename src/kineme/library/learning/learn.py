@@ -18,6 +18,7 @@ from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
+from kineme.movements.channels.channel import Channels, is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -136,6 +137,9 @@ def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
             None if whole.times is None else whole.times[first:last],
             None,
             None if whole.names is None else whole.names[start:stop],
+            whole.dimensions,
+            whole.channels,
+            None if whole.recorded is None else whole.recorded[first:last],
         )
     )
 
@@ -145,8 +149,19 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
     if n_dims is not None and n_dims != demos.n_dims:
         raise TrajectoryError(
             f"expected movements of {n_dims} dimensions as all others of the library in {store.folder}, "
-            f"got {demos.n_dims}; select the dimensions, or make another library"
+            f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
         )
+    ours = store.channels
+    if n_dims is None or ours == demos.channels or all(is_plain(one or ()) for one in (ours, demos.channels)):
+        return
+    raise TrajectoryError(
+        f"expected movements recorded as {_kinds(ours)}, as all others of the library in {store.folder}, got "
+        f"{_kinds(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
+    )
+
+
+def _kinds(channels: Channels | None) -> str:
+    return "plain coordinates" if channels is None else ", ".join(f"{one.name} ({one.kind})" for one in channels)
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:

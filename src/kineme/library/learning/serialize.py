@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from kineme.comparison.describe import feature_rows
 from kineme.errors import TrajectoryError
+from kineme.library.storage.channels import to_bytes
 from kineme.library.storage.specification import Specification
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.discrete.encode import check_movement
@@ -32,6 +33,7 @@ class SerializedRows:
     raw: list[tuple[bytes, bytes, bytes | None]]  # start, positions, times
     primitives: list[tuple[bytes, bytes]]  # boundary, weights
     features: list[bytes]
+    recorded: list[bytes]  # columns that positions do not say; empty where they say all
 
 
 def check(demos: Demonstrations) -> None:
@@ -68,17 +70,21 @@ def evenly_sampled(demos: Demonstrations) -> NDArray[np.bool_]:
 
 
 def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """BLAKE2b of each movement's positions and times from its start, as 64-bit numbers; without labels and names.
+    """BLAKE2b of each movement's positions, other columns and times from its start, as 64-bit numbers; without names.
 
     The probability that any two of a million different movements have the same digest is 3e-8.
     """
     positions, row = np.ascontiguousarray(demos.positions).data.cast("B"), 8 * demos.n_dims
+    recorded = demos.movements.recorded
+    others = None if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
     relative = None if even.all() else _relative_times(demos).data.cast("B")
     durations, offsets = demos.durations.tobytes(), demos.offsets.tolist()
     parts = []
     for i, (a, b) in enumerate(pairwise(offsets)):
         digest = hashlib.blake2b(positions[a * row : b * row], digest_size=8)
         digest.update(durations[8 * i : 8 * i + 8] if relative is None or even[i] else relative[8 * a : 8 * b])
+        if others is not None:
+            digest.update(others[i])
         parts.append(digest.digest())
     return np.frombuffer(b"".join(parts), np.int64).tolist()
 
@@ -95,7 +101,9 @@ def serialize(demos: Demonstrations, even: NDArray[np.bool_], specification: Spe
     TrajectoryError
         Weights so large that single precision cannot hold them.
     """
-    return SerializedRows(_raw(demos, even), _primitives(demos, specification), _features(demos, specification))
+    recorded = demos.movements.recorded
+    others = [] if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
+    return SerializedRows(_raw(demos, even), _primitives(demos, specification), _features(demos, specification), others)
 
 
 def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, bytes, bytes | None]]:

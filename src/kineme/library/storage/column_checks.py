@@ -130,6 +130,7 @@ CHECKS: dict[str, dict[str, Check]] = {
         "how": Check("how IN ('label', 'anchored', 'recognized')", "how a movement came to its symbol"),
         **_ALIVE,
     },
+    "recorded": {"movement": _whole("movement"), "columns": _bytes("columns")},
     "shown_by": {"movement": _whole("movement"), "person": _name("person"), **_ADDED},
 }
 

@@ -128,7 +128,7 @@ def checked_meta(connection: sqlite3.Connection, path: Path) -> dict[str, str]:
     """The rows of the table `meta`, after a check that the definitions of the tables are undamaged."""
     try:
         meta: dict[str, str] = dict(select(connection, "meta"))
-        if meta.keys() >= META - {"n_dims"} and meta["schema"] == schema_seal(connection):
+        if meta.keys() >= META and meta["schema"] == schema_seal(connection):
             return meta
     except sqlite3.OperationalError as error:
         if "no such" not in str(error):  # table or column

@@ -81,6 +81,7 @@ CONTENTS: dict[str, Callable[[Sequence[Row]], Strange]] = {
     "symbol_state": _symbol_state,
     "primitive": _primitive,
     "feature": _feature,
+    "recorded": _feature,
 }
 
 

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
+from kineme.library.storage.channels import with_channels
 from kineme.library.storage.rows import ALIVE, Row, among, damage, damaged, has_table, listed, select, strange
 from kineme.library.storage.schema import COLUMNS
 from kineme.library.storage.store import Store
+from kineme.movements.channels.channel import is_plain
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
@@ -120,6 +122,9 @@ def movements(store: Store, ids: Ids, labels: Sequence[str | None] | None = None
     times = _times(stamps, offsets, t0, durations) if stamps or t0.any() else None
     _check_increasing(times, offsets, wanted)
     stored = Movements(positions, offsets, durations, times, None, _names(about))
+    if channels := store.channels:
+        chunks = () if is_plain(channels) else _chunks(store, "recorded", "movement", wanted)
+        stored = with_channels(stored, channels, [row for chunk in chunks for row in chunk])
     if not np.array_equal(wanted, ids):
         stored = stored.take(order)
     return Demonstrations.of_movements(replace(stored, labels=_labels(labels)))

@@ -10,7 +10,7 @@ from typing import Any
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage.column_checks import GOOD
-from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT, SINCE
+from kineme.library.storage.schema import BLOBS, COLUMNS, MAX_TEXT, OPTIONAL_BLOBS, SINCE
 
 Row = tuple[Any, ...]
 
@@ -22,7 +22,7 @@ ALIVE = "added <= :v AND (removed IS NULL OR removed > :v)"
 
 def seal(table: str, row: Row) -> int:
     """CRC-32 over all columns of a row, its key first."""
-    if table in BLOBS:
+    if table in (*BLOBS, *OPTIONAL_BLOBS):
         return _seal_blobs(row)
     return zlib.crc32(repr(row).encode())
 
@@ -132,7 +132,12 @@ def damage(expected: str, got: str) -> DataError:
 
 def row_name(table: str, key: Any) -> str:
     """The name of a row in messages."""
-    of_movement = {"raw": "the samples", "primitive": "the primitive", "feature": "the features"}
+    of_movement = {
+        "raw": "the samples",
+        "primitive": "the primitive",
+        "feature": "the features",
+        "recorded": "the recorded columns",
+    }
     return f"{of_movement[table]} of movement {key}" if table in of_movement else f"row {key} of table {table}"
 
 

@@ -30,16 +30,21 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     ),
     "member": ("id", "movement", "symbol", "how", "added", "removed"),
     "shown_by": ("movement", "person", "added"),
+    "recorded": ("movement", "columns"),
 }  # fmt: skip
 
-#: Keys of the table `meta`; the last one is written with the first movement.
-META = frozenset({"id", "recognizer", "dmp", "schema", "n_dims"})
+#: Keys of the table `meta`; those of the second are written with the first movement, "channels" if they are known.
+META = frozenset({"id", "recognizer", "dmp", "schema"})
+LATER_META = frozenset({"n_dims", "channels"})
 
 #: Table -> the schema version that added it, if not the first.
-SINCE = {"shown_by": 2}
+SINCE = {"shown_by": 2, "recorded": 2}
 
 #: Tables of a key and bytes, one row per movement.
 BLOBS = ("raw", "primitive", "feature")
+
+#: As `BLOBS`, for movements with channels that their positions do not say.
+OPTIONAL_BLOBS = ("recorded",)
 
 #: Tables whose rows are alive or removed; each version stores the number of alive rows, in columns of these names.
 COUNTED = {"movement": "movements", "member": "members", "symbol_state": "symbols"}
@@ -92,5 +97,7 @@ MIGRATIONS: dict[int, tuple[str, ...]] = {
         """CREATE TABLE shown_by (
         movement INTEGER PRIMARY KEY REFERENCES movement, person TEXT NOT NULL,
         added INTEGER NOT NULL REFERENCES version, crc INTEGER NOT NULL)""",
+        """CREATE TABLE recorded (
+        movement INTEGER PRIMARY KEY REFERENCES movement, columns BLOB NOT NULL, crc INTEGER NOT NULL)""",
     ),
 }

@@ -15,6 +15,7 @@ from typing import Any
 
 from kineme.errors import DataError, SpecificationError
 from kineme.library.storage import fork_safety
+from kineme.library.storage.channels import channels_of_text
 from kineme.library.storage.connection import check_kind, checked_meta, connect, create, migrate, transaction
 from kineme.library.storage.defense import size_of
 from kineme.library.storage.rows import insert, parsed_column, select
@@ -22,6 +23,7 @@ from kineme.library.storage.schema import COUNTED, LARGEST_ID, READABLE, SCHEMA_
 from kineme.library.storage.specification import Specification, as_n_dims
 from kineme.library.storage.sqlite_errors import in_plain_words
 from kineme.library.storage.versions import Change, Moment, Version, moment_at
+from kineme.movements.channels.channel import Channels
 
 NOW = LARGEST_ID  # later than every version: the current state
 
@@ -154,6 +156,13 @@ class Store:
         with self.reading() as connection:
             rows = select(connection, "meta", "key = 'n_dims'")
         return as_n_dims(rows[0][1], self.path) if rows else None
+
+    @property
+    def channels(self) -> Channels | None:
+        """What the movements were recorded as; None before the first one, and where that is not known."""
+        with self.reading() as connection:
+            rows = select(connection, "meta", "key = 'channels'")
+        return channels_of_text(rows[0][1], self.n_dims or 0, self.path) if rows else None
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:

@@ -8,13 +8,14 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
+from kineme.library.storage.channels import other_columns
 from kineme.library.storage.column_checks import ALL_GOOD, CHECKS
 from kineme.library.storage.connection import connect
 from kineme.library.storage.content_checks import CONTENTS, samples
 from kineme.library.storage.defense import limited
 from kineme.library.storage.lifetimes import lives
 from kineme.library.storage.rows import Row, has_table, row_name, sealed
-from kineme.library.storage.schema import BLOBS, COLUMNS, META
+from kineme.library.storage.schema import BLOBS, COLUMNS, LATER_META, META
 from kineme.library.storage.store import Store
 
 _SHOWN = 100  # messages per check
@@ -162,8 +163,10 @@ def _completeness(connection: sqlite3.Connection) -> Iterator[Problem]:
         if last != n:
             yield Problem(table, None, f"table {table}: expected {last} rows, numbered from 1, got {n}")
     keys = {key for (key,) in connection.execute("SELECT key FROM meta").fetchall()}
-    if strange := keys - META:
-        yield Problem("meta", min(strange), f"table meta: expected nothing but {sorted(META)}, got {min(strange)!r}")
+    if strange := keys - META - LATER_META:
+        yield Problem(
+            "meta", min(strange), f"table meta: expected nothing but {sorted(META | LATER_META)}, got {min(strange)!r}"
+        )
     if n and "n_dims" not in keys:
         yield Problem("meta", "n_dims", "row n_dims of table meta: not there")
 
@@ -182,8 +185,13 @@ def _sizes(store: Store) -> Check:
         "feature": f"length(rows) = {4 * n_features}",
     }
 
+    if channels := store.channels:
+        expected["recorded"] = f"length(columns) = {4 * len(other_columns(channels))} * n_samples"
+
     def check(connection: sqlite3.Connection) -> Iterator[Problem]:
         for table, fits in expected.items():
+            if not has_table(connection, table):
+                continue
             query = f"SELECT id FROM {table} JOIN movement ON id = movement WHERE NOT ({fits}) LIMIT {_SHOWN}"
             for (key,) in connection.execute(query):
                 yield Problem(table, key, f"{row_name(table, key)}: of the wrong size")

@@ -19,7 +19,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
 from kineme.primitives.discrete.dmp import Primitives
-from kineme.primitives.generation.learned import Learned
+from kineme.primitives.generation.learned import Learned, has_orientation, learn_one
 from kineme.sampling import evenly_spaced
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
@@ -39,9 +39,12 @@ def primitive_of(store: Store, who: str) -> Primitives:
 
 
 def learned_of(store: Store, who: str) -> Learned:
-    """The primitive of the prototype of a symbol with its recording."""
+    """The primitive of the prototype of a symbol with its recording; of one with an orientation it is learned anew."""
     ids = np.array([prototype_of(store, symbol(store, who))])
-    return Learned(_primitives(store, ids), read.movements(store, ids)[0])
+    recording = read.movements(store, ids)[0]
+    if has_orientation(recording):
+        return learn_one(recording, store.specification.dmp)
+    return Learned(_primitives(store, ids), recording)
 
 
 def ground_symbol(

@@ -16,6 +16,7 @@ from kineme.primitives.generation.learned import Learned, largest_deviation
 from kineme.primitives.rollout_figure import set_equal_scales
 from kineme.validation import Array
 
+_LONGEST = 14  # characters of a name beside its axes
 _ROWS = 8  # columns of the movement below each other, before a second column of axes begins
 _RECORDED: dict[str, Any] = {"color": GRAY, "linewidth": 4, "alpha": 0.45}
 _FITTED: dict[str, Any] = {"color": GREEN, "linestyle": "--", "linewidth": 1.2}
@@ -42,13 +43,12 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
             axes.plot(learned.demonstration.times - learned.demonstration.times[0], learned.recorded[:, k], **_RECORDED)
         axes.plot(fitted["times"], fitted["positions"][:, k], **_FITTED)
         axes.plot(made["times"], made["positions"][:, k], **_MADE)
-        axes.set_ylabel(drawable(_short(names[k])))
+        axes.set_ylabel(drawable(_short(names[k])), fontsize=8)
     for axes in grid[len(names) :]:
         axes.set_visible(False)
     for axes in (grid[n_rows - 1], grid[len(names) - 1]):
         axes.set_xlabel("time [s]")
-    if not isinstance(over_time, Figure):
-        over_time.align_ylabels()
+    over_time.align_ylabels()
     key = _key(learned, bool(path), obstacles is not None)
     figure.legend(handles=key, loc="outside lower center", ncols=3)
     return figure
@@ -103,5 +103,7 @@ def _key(learned: Learned, has_path: bool, has_obstacles: bool) -> list[Any]:
 
 
 def _short(name: str) -> str:
-    """The last part of a long name, which tells the columns of one recording apart."""
-    return name if len(name) <= 12 else "…" + name[-11:]
+    """The last parts of a long name, which tell the columns of one recording apart."""
+    while len(name) > _LONGEST and "." in name:
+        name = name.partition(".")[2]
+    return name if len(name) <= _LONGEST else "…" + name[1 - _LONGEST :]

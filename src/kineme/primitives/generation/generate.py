@@ -11,6 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.files.write_movement import ColumnNames, Columns
 from kineme.movements.channels.channel import is_plain
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
+from kineme.movements.rotations.quaternions import continuous
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.discrete.dmp import Primitives
@@ -107,13 +108,18 @@ def _as_recorded(made: Columns, demonstration: Trajectory, duration: float) -> A
     moved, parts = 0, []
     for one, columns in zip(channels, columns_of(channels), strict=True):
         if one.kind == "orientation":
-            parts.append(from_wxyz(made["positions"][:, -4:], one))
+            parts.append(_signed(from_wxyz(continuous(made["positions"][:, -4:]), one), recorded[0, columns]))
         elif one.kind == "discrete":
             parts.append(recorded[now, columns])
         else:
             parts.append(made["positions"][:, moved : moved + 1])
             moved += 1
     return np.concatenate(parts, axis=1)
+
+
+def _signed(q: Array, start: Array) -> Array:
+    """Quaternions along time with the sign of the recorded start: q and -q are one orientation, but not one column."""
+    return -q if q[0] @ start < 0 else q
 
 
 def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:

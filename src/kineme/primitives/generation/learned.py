@@ -66,9 +66,12 @@ def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:
     TrajectoryError
         An orientation beside anything but three positions, or a movement that cannot be learned.
     """
-    channels = demonstration.channels or ()
-    turns = any(one.kind == "orientation" for one in channels)
-    return Learned((PoseDMP(dmp) if turns else dmp).learn([demonstration]), demonstration)
+    return Learned((PoseDMP(dmp) if has_orientation(demonstration) else dmp).learn([demonstration]), demonstration)
+
+
+def has_orientation(demonstration: Trajectory) -> bool:
+    """Whether a channel of the recording is an orientation."""
+    return any(one.kind == "orientation" for one in demonstration.channels or ())
 
 
 def load_saved(path: Path) -> Primitives | PosePrimitives:

@@ -1,0 +1,97 @@
+"""The channels of a library's movements as text, and their columns that positions do not say as bytes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.errors import DataError
+from kineme.library.storage.rows import Row, strange
+from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels, is_plain, learned_names
+from kineme.movements.channels.coordinates import canonical, columns_of
+from kineme.movements.trajectories.movements import Movements
+from kineme.validation import Array
+
+
+def channels_to_text(channels: Channels) -> str:
+    """JSON: a list of objects with the fields of `Channel`."""
+    return json.dumps([one._asdict() for one in channels], ensure_ascii=True)
+
+
+def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
+    """The inverse, for the library at `path`; refused unless it is channels of so many dimensions."""
+    try:
+        channels = tuple(_channel(one) for one in json.loads(text))
+        good = sum(len(one.coordinates) for one in channels) == n_dims
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        good = False
+    if not good:
+        raise DataError(
+            f"expected {path} to say what the {n_dims} dimensions of its movements were recorded as, got "
+            f"{text[:40]!r}; take the file from a backup or an export that you trust"
+        )
+    return channels
+
+
+def _channel(one: dict[str, Any]) -> Channel:
+    columns, unit = tuple(one["columns"]), one["unit"]
+    channel = Channel(one["name"], one["kind"], columns, unit, one["order"])
+    texts = [channel.name, *columns, *([] if unit is None else [unit])]
+    sized = len(columns) == (4 if channel.kind == "orientation" else 1)
+    ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
+    if channel.kind not in KINDS or not sized or not ordered or not all(isinstance(text, str) for text in texts):
+        raise ValueError("no channel")
+    return channel
+
+
+def other_columns(channels: Channels) -> list[int]:
+    """The columns that are stored beside the positions: of orientations and discrete channels."""
+    return [
+        k
+        for one, columns in zip(channels, columns_of(channels), strict=True)
+        if one.kind in ("orientation", "discrete")
+        for k in range(columns.start, columns.stop)
+    ]
+
+
+def to_bytes(recorded: Array, offsets: NDArray[np.intp], channels: Channels) -> list[bytes]:
+    """The other columns of each movement in single precision."""
+    others = recorded[:, other_columns(channels)].astype(np.float32)
+    row, blob, ends = others.shape[1] * others.itemsize, others.tobytes(), offsets.tolist()
+    return [blob[row * first : row * stop] for first, stop in pairwise(ends)]
+
+
+def with_channels(stored: Movements, channels: Channels, rows: Sequence[Row]) -> Movements:
+    """Stored movements with their channels; rows of the table "recorded" for those that positions do not say.
+
+    Raises
+    ------
+    DataError
+        A row of another size.
+    """
+    known = replace(stored, channels=channels, dimensions=learned_names(channels))
+    if is_plain(channels):
+        return known
+    size = 4 * len(other_columns(channels))
+    for row, n in zip(rows, np.diff(stored.offsets).tolist(), strict=True):
+        if len(row[1]) != size * n:
+            raise strange("recorded", row)
+    return replace(known, recorded=_from_bytes([row[1] for row in rows], stored.positions, stored.offsets, channels))
+
+
+def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
+    """What was recorded (total, columns): the stored columns, and the positions where they say it."""
+    others = other_columns(channels)
+    recorded = np.empty((len(positions), sum(len(one.columns) for one in channels)))
+    recorded[:, others] = np.frombuffer(b"".join(blobs), np.float32).reshape(-1, len(others))
+    plain = [k for k in range(recorded.shape[1]) if k not in others]
+    learned = [one.kind != "orientation" for one in channels for _ in one.coordinates]
+    recorded[:, plain] = positions[:, learned]
+    return canonical(recorded, offsets, channels)

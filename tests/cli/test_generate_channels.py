@@ -1,0 +1,115 @@
+"""``kineme generate`` keeps what a recording means, writes over nothing unasked, and says where the fit is bad."""
+
+import commands
+import numpy as np
+import pytest
+
+import kineme
+from kineme.files.write_movement import write_movement
+from kineme.orientation import exp, product
+
+HEADS = "t,tool.x,tool.y,tool.z,tool.qx,tool.qy,tool.qz,tool.qw,gripper"
+N = 80
+
+
+def run(*arguments, **options):
+    return commands.run("generate", *arguments, **options)
+
+
+@pytest.fixture
+def pose(tmp_path):
+    u = np.linspace(0, 1, N)
+    s = u**3 * (10 - 15 * u + 6 * u**2)
+    q = -product(exp(np.outer(s, [0.3, 1, 2.5])), [0.0, 1.0, 0.0, 0.0])[:, [1, 2, 3, 0]]
+    table = np.column_stack([2 * u, s, s**2, 0.5 * np.sin(3 * s), q, u > 0.5])
+    np.savetxt(tmp_path / "pose.csv", table, delimiter=",", header=HEADS, comments="")
+    return tmp_path / "pose.csv"
+
+
+@pytest.mark.parametrize("ending", [".csv", ".npz", ".json"])
+def test_a_pose_keeps_its_columns_and_is_read_again_as_what_it_was(pose, tmp_path, ending):
+    goal = "1,0.5,0.2,0,1,0,0"
+    out = tmp_path / f"new{ending}"
+    done = run(pose, "--goal", goal, "--settle", 0.001, "-o", out, "--plot", tmp_path / "new.png")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    made, was = kineme.read_recording(out), kineme.read_recording(pose)
+    assert made.channels == was.channels
+    np.testing.assert_allclose(np.linalg.norm(made.recorded[:, 3:7], axis=1), 1)
+    np.testing.assert_allclose(np.abs(made.recorded[-1, 3:7] @ [0, 1, 0, 0]), 1, atol=1e-4)
+    np.testing.assert_allclose(made.recorded[0, 3:7], was.recorded[0, 3:7], atol=1e-6)  # with its sign
+    np.testing.assert_allclose(made.recorded[-1, :3], [1, 0.5, 0.2], atol=0.001)
+
+
+def test_a_gripper_steps_when_it_did_whatever_the_tempo(pose, tmp_path):
+    assert run(pose, "--duration", 5, "-o", tmp_path / "slow.csv").returncode == 0
+    slow = kineme.read_recording(tmp_path / "slow.csv")
+    gripper = slow.recorded[:, -1]
+    assert set(gripper) == {0.0, 1.0}
+    np.testing.assert_allclose(slow.times[np.argmax(gripper)], 2.5 * (1 + 1 / (N - 1)), atol=0.02)
+
+
+def test_a_saved_pose_is_a_pose_again(pose, tmp_path):
+    assert run(pose, "--save", tmp_path / "p.kineme", "-o", tmp_path / "a.csv").returncode == 0
+    done = run(tmp_path / "p.kineme")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("time,x,y,z,qw,qx,qy,qz,v_x,v_y,v_z,v_q.rx")
+
+
+def test_a_goal_of_other_columns_is_refused_with_their_names(pose):
+    done = run(pose, "--goal", "1,2")
+    assert done.returncode == 1
+    assert "expected 7 numbers, tool.x, tool.y, tool.z, tool.qx, tool.qy, tool.qz, tool.qw, got 2" in done.stderr
+
+
+def test_obstacles_lie_where_the_position_moves(pose, tmp_path):
+    middle = "0.5,0.25,0.49"
+    done = run(pose, "--obstacle", middle, "--settle", 0.05, "-o", tmp_path / "around.csv")
+    assert done.returncode == 0, done.stderr
+    assert "expected obstacles in the 3 dimensions" in run(pose, "--obstacle", "1,2").stderr
+
+
+def test_reading_options_are_those_of_the_other_commands(pose, tmp_path):
+    done = run(pose, "--columns", "tool.x,tool.y,gripper", "--kind", "gripper=position", "-o", tmp_path / "xy.csv")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "xy.csv").read_text().startswith("time,tool.x,tool.y,gripper,v_tool.x,v_tool.y,v_gripper")
+    done = run("-", "--columns", "tool.x", input=pose.read_text())
+    assert done.stdout.startswith("time,tool.x,v_tool.x")
+
+
+def test_one_of_several_movements_is_chosen(tmp_path):
+    times, paths = np.linspace(0, 1, 50), np.cumsum(np.random.default_rng(0).normal(size=(2, 50, 2)), axis=1)
+    np.savez(tmp_path / "two.npz", positions=paths, times=times)
+    done = run(tmp_path / "two.npz")
+    assert done.returncode == 2
+    assert "holds 2; choose with --index" in done.stderr
+    assert run(tmp_path / "two.npz", "--index", 1).returncode == 0
+
+
+def test_no_file_is_written_over_unasked_and_the_input_never(pose, tmp_path):
+    out = tmp_path / "new.csv"
+    out.write_text("precious")
+    for option in ("-o", "--save"):
+        done = run(pose, option, out)
+        assert done.returncode == 2
+        assert "new.csv is there; write over it with --force" in done.stderr
+    assert out.read_text() == "precious"
+    assert run(pose, "-o", out, "--force").returncode == 0
+    assert out.read_text() != "precious"
+    before = pose.read_bytes()
+    (tmp_path / "link.csv").hardlink_to(pose)
+    for path in (pose, tmp_path / "link.csv"):
+        done = run(pose, "-o", path, "--force")
+        assert done.returncode == 2
+        assert "expected another file to write than the input" in done.stderr
+    assert pose.read_bytes() == before
+
+
+def test_a_bad_fit_is_said(tmp_path):
+    times = np.linspace(0, 1, 300)
+    wild = np.column_stack([np.sin(60 * times), np.cos(47 * times)])
+    path = write_movement(tmp_path / "wild.csv", {"times": times, "positions": wild})
+    done = run(path, "--n-basis", 5, "-o", tmp_path / "new.csv")
+    assert done.returncode == 0
+    assert "warning: the fit is off the recording by up to" in done.stderr
+    assert run(path, "--n-basis", 150, "-o", tmp_path / "good.csv").stderr == ""

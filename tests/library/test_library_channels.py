@@ -1,0 +1,122 @@
+"""A library keeps what was recorded: names, quaternions and grippers come back, and are generated."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme import ActionLibrary, Demonstrations
+from kineme.errors import DataError, TrajectoryError
+from kineme.library.storage.folder import FILE
+from kineme.library.storage.read import movements
+from kineme.library.symbols.grounding import learned_of
+from kineme.movements.channels.channel import Channel
+from kineme.movements.trajectories.channels import of_channels
+from kineme.orientation import exp, product
+from kineme.primitives.generation.generate import MovementOptions, generate
+
+CHANNELS = (
+    Channel("gripper", "discrete", ("gripper",)),
+    *(Channel(f"tool.{axis}", "position", (f"tool.{axis}",), "m") for axis in "xyz"),
+    Channel("tool.q", "orientation", ("tool.qx", "tool.qy", "tool.qz", "tool.qw"), None, "xyzw"),
+)
+
+
+def poses(n=6, channels=CHANNELS, seed=0):
+    """Movements of two kinds, of unequal length, with a tool that turns and a gripper that opens."""
+    random, blocks, labels = np.random.default_rng(seed), [], []
+    for i in range(n):
+        u = np.linspace(0, 1, 40 + i)
+        s = u**3 * (10 - 15 * u + 6 * u**2)
+        q = product(exp(np.outer(s, random.normal(size=3) + np.array([0, 0, 3 * (i % 2)]))), exp(random.normal(size=3)))
+        xyz = np.outer(s, random.normal(size=3) + 5 * (i % 2)) + np.outer(np.sin(np.pi * u), random.normal(size=3))
+        blocks.append(np.column_stack([u > 0.3 + 0.1 * (i % 3), xyz, q[:, [1, 2, 3, 0]]]))
+        labels.append("ab"[i % 2])
+    plain = Demonstrations.from_arrays(blocks, labels, [np.linspace(0, 2, len(block)) for block in blocks])
+    return Demonstrations.of_movements(of_channels(plain.movements, channels))
+
+
+@pytest.fixture
+def library(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as made:
+        made.learn(poses())
+        yield made
+
+
+def test_what_was_recorded_comes_back_in_any_order(library, tmp_path):
+    demos = poses()
+    stored = movements(library.store, np.array([4, 1, 6]))
+    chosen = demos[[3, 0, 5]]
+    assert stored.channels == CHANNELS
+    assert stored.dimensions == demos.dimensions
+    np.testing.assert_allclose(stored.recorded, chosen.recorded, atol=1e-6)
+    assert set(stored.recorded[:, 0]) == {0.0, 1.0}
+    np.testing.assert_allclose(np.linalg.norm(stored.recorded[:, 4:], axis=1), 1, atol=1e-12)
+    assert library.verify() == []
+    with ActionLibrary.import_(library.export(tmp_path / "a.kineme-library"), tmp_path / "again") as again:
+        np.testing.assert_array_equal(movements(again.store, np.array([4, 1, 6])).recorded, stored.recorded)
+        assert again.verify() == []
+
+
+def test_movements_that_differ_in_a_gripper_or_in_where_the_tool_points_are_two(library):
+    same = poses()
+    assert library.learn(same).added == 0
+    columns = same.recorded.copy()
+    columns[:, 0] = 1 - columns[:, 0]
+    turned = replace(same.movements, recorded=columns)
+    assert library.learn(Demonstrations.of_movements(turned)).added == len(same)
+
+
+def test_a_symbol_generates_unit_quaternions_and_the_gripper_under_their_names(library):
+    options = MovementOptions(goal=np.array([1.0, 2, 3, 0, 0, 0, 1]), settle=0.01)
+    made = generate(learned_of(library.store, "a"), options)
+    assert made.names.positions == tuple(name for one in CHANNELS for name in one.columns)
+    np.testing.assert_allclose(np.linalg.norm(made.columns["positions"][:, 4:], axis=1), 1)
+    np.testing.assert_allclose(made.columns["positions"][-1, 1:4], [1, 2, 3], atol=0.05)
+    assert abs(made.columns["positions"][-1, 7]) > 0.99
+    steps = np.abs(np.diff(made.columns["positions"][:, 0]))
+    assert sorted(set(steps)) == [0.0, 1.0]
+    assert steps.sum() == 1
+
+
+def test_other_channels_are_refused_by_name(library):
+    other = tuple(one if one.kind != "discrete" else one._replace(name="claw") for one in CHANNELS)
+    with pytest.raises(TrajectoryError, match=r"claw \(discrete\), tool.x"):
+        library.learn(poses(channels=other))
+    with pytest.raises(TrajectoryError, match="got plain coordinates"):
+        library.learn(Demonstrations.from_arrays(np.cumsum(np.random.default_rng(0).normal(size=(2, 30, 6)), axis=1)))
+
+
+def test_names_of_plain_columns_bind_nobody(tmp_path):
+    paths = np.cumsum(np.random.default_rng(0).normal(size=(3, 30, 2)), axis=1)
+    channels = tuple(Channel(name, "position", (name,)) for name in ("a", "b"))
+    named = Demonstrations.of_movements(of_channels(Demonstrations.from_arrays(paths).movements, channels))
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(named[:2])
+        library.learn(paths[2:])
+        assert movements(library.store, np.array([1, 2, 3])).channels == channels
+        assert library.verify() == []
+
+
+@pytest.mark.parametrize("text", ["[]", "x", '[{"name": 1}]', "[" * 100_000])
+def test_channels_that_are_none_are_refused(library, text):
+    folder = library.store.folder
+    library.close()
+    with closing(sqlite3.connect(folder / FILE)) as connection, connection:
+        from kineme.library.storage.rows import seal
+
+        row = ("channels", text)
+        connection.execute("UPDATE meta SET value = ?, crc = ? WHERE key = 'channels'", (text, seal("meta", row)))
+    with ActionLibrary(folder, read_only=True) as damaged, pytest.raises(DataError, match="recorded as"):
+        movements(damaged.store, np.array([1]))
+
+
+def test_recognition_and_prediction_are_those_of_the_recognizer(library):
+    asked = poses(seed=3)
+    expected = kineme.Recognizer().fit(poses()).predict(asked)
+    assert [answer.ranked[0] for answer in library.recognize(asked)] == expected.tolist()
