@@ -1,8 +1,8 @@
 """TRC: tracked markers over time, as Cortex of Motion Analysis writes them, and OpenSim, OptiTrack and others after it.
 
 Source: OpenSim, "Marker (.trc) Files". A line ``PathFileType  4  (X/Y/Z)  name.trc``, a row of keys and one of their
-values (``DataRate``, ``Units``, ...), a row with ``Frame#``, ``Time`` and the name above the first column of each marker,
-a row of axes ``X1  Y1  Z1``, mostly an empty line, and the samples; all separated by tabs.
+values (``DataRate``, ``Units``, ...), a row with ``Frame#``, ``Time`` and the name above the first column of each
+marker, a row of axes ``X1  Y1  Z1``, mostly an empty line, and the samples; all separated by tabs.
 """
 
 from __future__ import annotations
