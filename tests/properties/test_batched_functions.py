@@ -23,6 +23,7 @@ TILES = {
     "kineme.recognition.early.early._TILE": 5000,
     "kineme.kernels.procrustes._PAIRS": 300,
     "kineme.kernels.pair_distances._TILE_PAIRS": 500,
+    "kineme.kernels.pair_distances._TILE_BOUNDS": 500,
     "kineme.primitives.pose.tangent._TILE_SAMPLES": 400,
     "kineme.primitives.rhythmic.encode._TILE_SAMPLES": 700,
 }

@@ -17,6 +17,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, earliness
 from kineme.recognition.early.early import partial_shares as shares_of
+from kineme.recognition.early.ending import ending
 from kineme.recognition.early.hypotheses import Early, beginning_procrustes, hypotheses
 from kineme.recognition.early.prefixes import N_PREFIX, beginnings, describe_prefixes, smooth_paths, smoother
 
@@ -87,6 +88,7 @@ def test_a_straight_line_at_even_speed():
     seen = beginnings(paths, np.array([0.25, 0.5]))
     np.testing.assert_allclose(seen.lengths, [0.5, 1.0])
     np.testing.assert_allclose(seen.elapsed, [0.25, 0.5])
+    np.testing.assert_allclose(seen.end_speeds, 0.0, atol=1e-9)
     np.testing.assert_allclose(seen.timing * np.sqrt(N_PREFIX), np.tile(np.linspace(0, 1, N_PREFIX), (2, 1)), atol=1e-9)
 
 
@@ -171,8 +173,32 @@ def test_a_beginning_is_answered_alone_as_among_others():
     np.testing.assert_allclose(alone, together, atol=1e-6)
 
 
-def test_a_movement_that_is_over_is_also_compared_as_a_whole(monkeypatch):
-    recognizer, test = _fitted_in_space()
+def _settling(demos):
+    """The same movements, slower and slower towards their end."""
+    times = [one.times[-1] * (1.0 - np.sqrt(1.0 - np.linspace(0.0, 1.0, len(one.times)))) for one in demos]
+    return Demonstrations.from_arrays([one.positions for one in demos], demos.labels, times)
+
+
+def test_speed_tells_that_a_movement_is_over():
+    speeds = smooth_paths(_settling(_spirals(2)), 10.0)
+    movements = beginnings(speeds, np.arange(1, 11) / 10).end_speeds.reshape(-1, 10)
+    known = ending(movements)
+    odds = known.log_odds(movements)
+    assert odds[:, -1].min() > 0.0
+    assert np.median(odds[:, :-1]) < -3.0
+    assert (np.diff(known.log_odds(np.linspace(-9.0, 9.0, 50))) <= 0.0).all()  # the slower, the rather
+    assert known.log_odds(np.array([-50.0, 50.0])) == pytest.approx([7.0, -13.0])
+
+
+def test_speed_tells_nothing_where_movements_were_recorded_at_full_speed_until_their_end():
+    rng = np.random.default_rng(0)
+    known = ending(rng.normal(0.0, 0.5, (30, 20)))
+    np.testing.assert_allclose(known.log_odds(np.linspace(-0.5, 0.5, 9)), -3.0, atol=1.0)
+
+
+def test_a_movement_that_is_over_is_recognized_as_a_whole(monkeypatch):
+    train, test = (_settling(part) for part in _split(_spirals(3, per_class=6, n_classes=5), per_class=6))
+    recognizer = kineme.Recognizer().fit(train)
 
     def log_odds(fraction):
         """Of the own class against the unknown."""
@@ -181,9 +207,23 @@ def test_a_movement_that_is_over_is_also_compared_as_a_whole(monkeypatch):
         return np.log(shares[np.arange(len(parts)), np.searchsorted(recognizer.classes_, parts.labels)] / shares[:, -1])
 
     over, half = log_odds(1.0), log_odds(0.5)
-    monkeypatch.setattr(evidence, "_NARROWED", 1e-3)  # nothing is similar as a whole
-    assert np.median(over - log_odds(1.0)) > 0.1
+    monkeypatch.setattr(evidence, "_NEGLIGIBLE", -np.inf)  # nothing is compared as a whole
+    assert np.median(over - log_odds(1.0)) > 0.5
     assert np.abs(half - log_odds(0.5)).max() < 0.05
+
+
+def test_at_the_end_the_answer_is_that_of_the_recognizer():
+    """Also where size and duration, which it leaves out, speak for another class."""
+    train, test = (_settling(part) for part in _split(_spirals(2, per_class=6, n_classes=6), per_class=6))
+    recognizer = kineme.Recognizer().fit(train)
+    rng = np.random.default_rng(1)
+    for factor in (0.4, 1.0, 2.5):
+        other = Demonstrations.from_arrays(
+            [factor * one.positions + 0.15 * np.cumsum(rng.normal(size=one.positions.shape), axis=0) for one in test],
+            test.labels,
+            [factor * one.times for one in test],
+        )
+        np.testing.assert_array_equal(recognizer.predict_partial(other), recognizer.predict(other))
 
 
 def test_few_hypotheses_compared_in_full_say_what_all_of_them_say(monkeypatch):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +12,14 @@ from sklearn.utils import Bunch
 
 import kineme
 from kineme.comparison.widths import SHARE
+from kineme.experiments.evaluation.data import load_data
+from kineme.experiments.evaluation.splits import one_person_out
+from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, partial_shares
+from kineme.recognition.early.ending import Ending
 from kineme.recognition.early.hypotheses import Early, Hypotheses, hypotheses
+
+FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
 
 def log_classes(*movements):
@@ -62,3 +70,40 @@ def test_most_labels_are_decided_before_the_end_and_are_right():
     decided = shares.max(axis=1) >= 0.9
     assert decided.mean() > 0.7
     np.testing.assert_array_equal(recognizer.classes_[shares.argmax(axis=1)][decided], test.labels[decided])
+
+
+def test_before_its_speed_is_known_a_movement_is_over_at_odds_of_one_to_twenty():
+    assert Ending((0.0, 1.0), (0.0, 1.0)).log_odds(np.zeros(1)) == pytest.approx(-3.0)
+    assert math.exp(-3.0) == pytest.approx(1 / 20, abs=0.001)
+
+
+def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
+    assert evidence._POWER == 3.0
+
+
+@pytest.fixture(scope="module")
+def digits():
+    """Digits that five people drew in the air, and who."""
+    path = FOLDER / "gestures3d.npz"
+    if not path.is_file():
+        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
+    data = load_data(str(path))
+    chosen = np.flatnonzero(np.char.isdigit(np.asarray(data.demonstrations.labels, dtype=str)))
+    return data.demonstrations[chosen], np.asarray(data.people)[chosen]
+
+
+def test_digits_of_other_people_are_known_at_the_end_as_whole_movements_are(digits):
+    demos, people = digits
+    labels = np.asarray(demos.labels)
+    found = []
+    for person in np.unique(people):
+        split = one_person_out(labels, people == person, 3, 0, 0)
+        recognizer = kineme.Recognizer().fit(demos[split.train])
+        test = demos[split.test[::2]]
+        parts = [cut(test, fraction) for fraction in (0.5, 0.9, 1.0)]
+        answers = [*map(recognizer.predict_partial, parts), recognizer.predict(test)]
+        found.append([np.mean(answer == np.asarray(test.labels)) for answer in answers])
+    half, most, end, whole = np.mean(found, axis=0)
+    assert half >= 0.66
+    assert most >= 0.88
+    assert end >= whole - 0.015

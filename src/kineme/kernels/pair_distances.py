@@ -28,6 +28,7 @@ Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]  # indices into A and into B
 Filler = Callable[[Shapes, Shapes, Tile, Floats, Floats], None]
 
 _TILE_ROWS, _TILE_PAIRS = 32, 4096  # the columns are packed once for so many rows; a tile takes about a millisecond
+_TILE_BOUNDS = 32_768
 _LANES = 16  # pairs that the compiled loops compare at once
 _LISTED = 1.2  # time of 16 pairs taken from a list, by that of 16 of one movement with others
 _TWIN_PAIRS = 1000
@@ -56,7 +57,7 @@ def pair_distances(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) 
     SpecificationError
         Dimensions, specifications or the shape of the rotations do not fit.
     """
-    return _grid(A, B, rotations, _fill_compiled, _fill_plain)
+    return _grid(A, B, rotations, (_fill_compiled, _fill_plain), _TILE_PAIRS)
 
 
 def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> Floats:
@@ -65,7 +66,7 @@ def pair_bounds(A: Shapes, B: Shapes, rotations: NDArray[Any] | None = None) -> 
     For 16 movements of A or more they take a seventh of its time. See `kineme.kernels.elastic.elastic_bounds`; that of
     the point cloud is 0.
     """
-    return _grid(A, B, rotations, _bound_compiled, _bound_plain)
+    return _grid(A, B, rotations, (_bound_compiled, _bound_plain), _TILE_BOUNDS)
 
 
 def listed_distances(
@@ -91,17 +92,19 @@ def listed_distances(
     return squares
 
 
-def _grid(A: Shapes, B: Shapes, rotations: NDArray[Any] | None, fill_compiled: Filler, fill_plain: Filler) -> Floats:
-    """What a filler writes of all pairs, tile by tile, in threads."""
+def _grid(
+    A: Shapes, B: Shapes, rotations: NDArray[Any] | None, fillers: tuple[Filler, Filler], tile_pairs: int
+) -> Floats:
+    """What a filler, compiled or plain, writes of all pairs, tile by tile, in threads."""
     _check(A, B)
     n, m, d = len(A), len(B), A.n_dims
     squares = np.empty((3, n, m), np.float32)
     if n == 0 or m == 0:
         return squares
     compiled = use_compiled(n * m * _PAIR_OPERATIONS)
-    fill = fill_compiled if compiled else fill_plain
-    rows = min(n, max(_TILE_ROWS, _TILE_PAIRS // m // _LANES * _LANES))
-    columns = m if rows * m <= _TILE_PAIRS else max(_LANES, _TILE_PAIRS // rows // _LANES * _LANES)
+    fill = fillers[0] if compiled else fillers[1]
+    rows = min(n, max(_TILE_ROWS, tile_pairs // m // _LANES * _LANES))
+    columns = m if rows * m <= tile_pairs else max(_LANES, tile_pairs // rows // _LANES * _LANES)
     tiles = [
         (slice(i, min(i + rows, n)), slice(j, min(j + columns, m)))
         for i in range(0, n, rows)

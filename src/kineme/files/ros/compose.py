@@ -11,7 +11,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.ros.bags import Bag
 from kineme.files.ros.frames import Edge, Step, chain, connected_graph, edge_of, transform_topics, transforms_in
-from kineme.files.ros.merge_streams import SECOND, clock_of, stamps_of, values_at
+from kineme.files.ros.merge_streams import SECOND, clock_of, in_order, stamps_of, values_at
 from kineme.files.ros.message_types import POSE, nanoseconds_of, transform_row
 from kineme.files.ros.rotations import are_rotations, conjugate, continuous, product, turned, unit
 from kineme.files.ros.streams import Samples, Stamps, Stream, check_kept, stream_of
@@ -55,18 +55,26 @@ def read_transforms(bag: Bag, wanted: Sequence[Edge], skip: str) -> tuple[list[S
 def _collect(bag: Bag, needed: set[Edge], bad: list[str]) -> tuple[dict[Edge, Samples], dict[str, Counter[str]]]:
     """The needed transforms, and for their children how often each parent occurs."""
     found = {edge: Samples.empty() for edge in needed}
-    parents: dict[str, Counter[str]] = {child: Counter() for _, child in needed}
+    children = {child for _, child in needed}
+    counts: Counter[Edge] = Counter()  # by names as they are in messages, of which there are few
+    samples_of: dict[Edge, Samples | None] = {}
     for n, (_, recorded, transform) in enumerate(transforms_in(bag, transform_topics(bag), bad)):
-        edge = edge_of(transform)
-        if edge[1] in parents:
-            parents[edge[1]][edge[0]] += 1
-        if edge in found:
-            samples = found[edge]
+        header = transform.header
+        names = header.frame_id, transform.child_frame_id
+        counts[names] += 1
+        if names not in samples_of:
+            samples_of[names] = found.get(edge_of(transform))
+        if (samples := samples_of[names]) is not None:
             samples.values.extend(transform_row(transform.transform))
             samples.recorded.append(recorded)
-            samples.stamped.append(nanoseconds_of(transform.header.stamp))
+            samples.stamped.append(nanoseconds_of(header.stamp))
         if not n % _CHECKED:
             check_kept(list(found.values()))
+    parents: dict[str, Counter[str]] = {child: Counter() for child in children}
+    for names, n in counts.items():
+        parent, child = (name.removeprefix("/") for name in names)
+        if child in children:
+            parents[child][parent] += n
     return found, parents
 
 
@@ -84,6 +92,8 @@ def _usable(edge: Edge, samples: Samples, left_out: list[str]) -> Stream:
             raise DataError(left_out[-1])
     kept = np.flatnonzero(good)
     kept = kept[np.diff(stream.stamped[kept], prepend=stream.stamped[kept[0]] - 1) != 0]
+    if len(kept) == len(good):
+        return stream
     return replace(stream, values=stream.values[kept], recorded=stream.recorded[kept], stamped=stream.stamped[kept])
 
 
@@ -123,8 +133,8 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
     """A transform at the common stamps, (n, 7)."""
     if _is_fixed(stream):
         return np.repeat(stream.values[:1], len(seconds), axis=0)
-    stamps, where = np.unique(stamps_of(stream, of_headers), return_index=True)
-    return values_at(seconds, (stamps - start) / SECOND, stream, stream.values[where])
+    stamps, values = in_order(stream, of_headers)
+    return values_at(seconds, (stamps - start) / SECOND, stream, values)
 
 
 def _then(p: Array, q: Array, transform: Array, forward: bool) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +13,17 @@ from kineme.comparison.described import Described
 from kineme.comparison.log_averages import LOG_MEANS
 from kineme.kernels.pair_distances import pair_distances
 from kineme.kernels.procrustes import Procrustes
-from kineme.recognition.early.hypotheses import Hypotheses, positive
+from kineme.recognition.early.hypotheses import EXPLAINING, Hypotheses, positive
 from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes
 from kineme.validation import Array
 
 _COMPARED = 200  # hypotheses compared pair by pair, and the best one of each class
 _WIDENED = 2.0  # widths of positions where they choose those
 _ROTATION = 10.0  # weight of the rotation prior, whose unit is the inner product of two equal paths
-_NARROWED = 0.5  # widths of whole movements, for hypotheses compared with those of beginnings
-_NEGLIGIBLE = 5.0  # whole movements with less than exp(-5) of the largest evidence are not compared
+_SPEED_SPREAD = 0.5  # of the logarithm of the speed at the end
+_PROGRESS = 0.25  # exponent of the density of progress
+_POWER = 3.0  # of the similarity of whole movements, beside the evidence for beginnings
+_NEGLIGIBLE = 5.0  # whole movements are not compared if they have less than exp(-5) of the largest evidence
 
 _WHOLE = np.ones(1)
 
@@ -46,27 +49,28 @@ def log_evidence(stored: Hypotheses, begun: Begun) -> Array:
 
     ``log mean_r exp(-d_r^2 / (2 sigma_r^2))`` over elastic path and point cloud, after the rotation that brings the
     positions closest, plus the logarithms of the density of that rotation, of a normal density of log size and log
-    duration ratio, and of a Cauchy density of timing, all up to constants. A hypothesis that the movement is over has
-    also the evidence for it as a whole movement.
+    duration ratio, of Cauchy densities of timing and of the speed at the end, and of the progress, all up to constants.
+    Short beginnings are alike, so that much fits them by chance: longer ones are a little likelier. And the movement is
+    not over, which its speed tells, see `Ending`; if it is, the recognizer's similarity of whole movements counts.
 
     The positions' own distances, which are much cheaper, choose the hypotheses for which it is computed: the 200 best
     and the best one of each class.
     """
     priors = _log_priors(stored, begun)
+    odds = stored.ending.log_odds(begun.prefixes.end_speeds)
     squares = stored.procrustes.squared_distances(begun.described.blocks[0], stored.described.blocks[0])
     rough = priors - squares / (2.0 * (_WIDENED * stored.widths[0]) ** 2)
     evidence = np.full(rough.shape, -np.inf)
     for i in range(len(rough)):
         chosen = _choose(stored, rough[i])
         one = begun.described.take(slice(i, i + 1))
-        near, turned = _near(stored, one, chosen)
-        evidence[i, chosen] = near + turned + priors[i, chosen]
-        _add_whole(stored, begun.paths[i : i + 1], evidence[i], chosen, near)
+        evidence[i, chosen] = _near(stored, one, chosen) + priors[i, chosen] - np.logaddexp(0.0, odds[i])
+        _add_over(stored, begun.paths[i : i + 1], evidence[i], priors[i] - np.logaddexp(0.0, -odds[i]))
     return evidence
 
 
 def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
-    """Logarithms of the densities of size, duration and timing."""
+    """Logarithms of the densities of size, duration, timing, speed at the end, and progress."""
     sizes = np.log(positive(begun.prefixes.lengths))[:, None] - stored.log_lengths
     longer = np.log(positive(begun.durations))[:, None] - stored.log_durations
     timing = begun.prefixes.timing
@@ -74,7 +78,10 @@ def _log_priors(stored: Hypotheses, begun: Begun) -> Array:
     late = np.maximum(norms - 2.0 * (timing @ stored.prefixes.timing.T), 0.0)
     early = stored.early
     normal = 0.5 * (sizes / early.size_spread) ** 2 + 0.5 * (longer / early.duration_spread) ** 2
-    return np.asarray(-normal - np.log1p(late / (2.0 * early.timing_spread**2)))
+    faster = (begun.prefixes.end_speeds[:, None] - stored.prefixes.end_speeds) / _SPEED_SPREAD
+    cauchy = (1.0 + late / (2.0 * early.timing_spread**2)) * (1.0 + 0.5 * faster**2)
+    progress = np.tile(_PROGRESS * np.log(stored.progress), len(stored.durations))
+    return np.asarray(progress - normal - np.log(cauchy))
 
 
 def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
@@ -87,15 +94,15 @@ def _choose(stored: Hypotheses, rough: Array) -> NDArray[np.intp]:
     return np.flatnonzero((rough >= least) | (rough >= best))
 
 
-def _near(stored: Hypotheses, one: Described, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Logarithms of the averaged kernel of elastic path and point cloud, and of the density of the rotation."""
+def _near(stored: Hypotheses, one: Described, chosen: NDArray[np.intp]) -> Array:
+    """Logarithm of the averaged kernel of elastic path and point cloud, times the density of the rotation."""
     others = stored.described.take(chosen)
     assert one.pairs is not None
     assert others.pairs is not None
     _, rotations = stored.procrustes.align(one.pairs.positions, others.pairs.positions)
     squares = pair_distances(one.pairs.shapes, others.pairs.shapes, rotations)[list(one.pairs.measures), 0]
     logs = squares.astype(float) / (-2.0 * stored.widths[1:, None] ** 2)
-    return LOG_MEANS["arithmetic"](logs), _log_rotations(stored.procrustes, rotations)
+    return LOG_MEANS["arithmetic"](logs) + _log_rotations(stored.procrustes, rotations)
 
 
 def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None) -> Array:
@@ -108,19 +115,24 @@ def _log_rotations(procrustes: Procrustes, rotations: NDArray[np.float32] | None
     return np.asarray(_ROTATION * (product - np.trace(F)))
 
 
-def _add_whole(stored: Hypotheses, path: Array, evidence: Array, chosen: NDArray[np.intp], near: Array) -> None:
-    """Add the evidence for the hypotheses among the chosen that the movement is over, in place.
+def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -> None:
+    """Add the evidence that the movement is over, in place, given the other densities (m * G,) if it is.
 
-    It is the geometric mean of that for a beginning and the recognizer's similarity, which is at most 1, of the whole.
+    It is the recognizer's similarity, which is at most 1, to the power of 3, averaged over each class, and summed over
+    classes. If the movement is over, its class is what the recognizer says: each class gets a share of that sum in
+    proportion to its largest similarity to the power of 3, whatever its size and duration.
     """
-    G = len(stored.progress)
-    last = np.flatnonzero(chosen % G == G - 1)
-    most = evidence[chosen[last]] - 0.5 * near[last]
-    matters = most > evidence.max() - _NEGLIGIBLE
-    last, most = last[matters], most[matters]
-    if len(last):
-        others = stored.references.described.take(chosen[last] // G)
-        whole = describe_paths(path, stored.comparison, stored.comparison.procrustes)
-        similar = stored.comparison.similarity.widened(_NARROWED).log_average(whole, others)[0]
-        at = chosen[last]
-        evidence[at] = np.logaddexp(evidence[at], most + 0.5 * similar)
+    G, counts = len(stored.progress), np.diff(stored.first, append=len(stored.durations))
+    most = priors[G - 1 :: G]
+    if most.max() < evidence.max() - _NEGLIGIBLE:
+        return
+    rotations = stored.comparison if stored.early.max_angle is None else stored
+    whole = describe_paths(path, stored.comparison, rotations.procrustes)
+    similar = _POWER * stored.comparison.similarity.log_average(whole, stored.references.described)[0]
+    log_counts = np.log(counts)
+    over = np.logaddexp.reduce(most + similar - np.repeat(log_counts, counts))
+    parts = np.split(similar, stored.first[1:])
+    best = stored.first + np.array([part.argmax() for part in parts])
+    shares = similar[best] - np.logaddexp.reduce(similar[best])
+    at = best * G + G - 1
+    evidence[at] = np.logaddexp(evidence[at], over + shares + log_counts + math.log(G / EXPLAINING))

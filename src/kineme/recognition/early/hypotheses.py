@@ -15,6 +15,7 @@ from kineme.comparison.references import References
 from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from kineme.recognition.early.ending import Ending, ending
 from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes, smooth_paths
 from kineme.validation import Array, check_count, check_number
 
@@ -25,7 +26,8 @@ _LOG_UNKNOWN = -0.5 * (1.5 / SHARE) ** 2 - 1.5
 #: Exponent of the shares. Elastic paths, point clouds, size, duration and timing are not independent: with 1, labels
 #: with a share of 0.9 are right less often than that for people without demonstrations.
 _TEMPER = 0.8
-_EXPLAINING = 20  # a movement that explains a beginning perfectly does so at about one in 20 values of progress
+#: A movement that explains a beginning perfectly does so at about one in 20 values of progress.
+EXPLAINING = 20
 _MOST_PROGRESS = 1000  # beginnings of one movement
 _CONCENTRATION = 0.1  # of the rotation prior, where none is given
 _KNOWN_SIZE = 0.1  # spread where the recognizer leaves sizes as they are
@@ -101,6 +103,8 @@ class Hypotheses(NamedTuple):
         Of the stored beginnings.
     timing_squares : ndarray of shape (m * G,)
         Squared norms of the rows of `prefixes.timing`.
+    ending : Ending
+        How fast the movements are at their end, and before it.
     first : ndarray of shape (C,)
         Index of the first stored movement of each class.
     """
@@ -118,6 +122,7 @@ class Hypotheses(NamedTuple):
     log_lengths: Array
     log_durations: Array
     timing_squares: Array
+    ending: Ending
     first: NDArray[np.intp]
 
     def log_classes(self, evidence: Array) -> Array:
@@ -129,7 +134,7 @@ class Hypotheses(NamedTuple):
         G = len(self.progress)
         top = evidence.max(axis=1, keepdims=True)
         sums = np.add.reduceat(np.exp(evidence - top), self.first * G, axis=1)
-        counts = np.diff(self.first, append=len(self.durations)) * (G / _EXPLAINING)
+        counts = np.diff(self.first, append=len(self.durations)) * (G / EXPLAINING)
         with np.errstate(divide="ignore"):
             known = np.log(sums / counts) + top
         return np.column_stack((known, np.full(len(evidence), _LOG_UNKNOWN)))
@@ -165,6 +170,7 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
         np.log(positive(prefixes.lengths)),
         np.log(positive(np.repeat(demos.durations, len(progress)) * prefixes.elapsed)),
         (prefixes.timing**2).sum(axis=1),
+        ending(prefixes.end_speeds.reshape(len(demos), -1)),
         references.first,
     )
 

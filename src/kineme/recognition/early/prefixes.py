@@ -19,6 +19,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
 N_PREFIX = ElasticSpec().n_segments + 1  # samples along the arc length of a beginning: the ends of segments
+_LAST = 0.02  # share of a beginning's time in which the speed at its end is measured
+_LEAST_SPEED = 0.01  # of the mean speed
 #: What beginnings are compared by pair by pair.
 _PAIRS = tuple(PAIR_QUANTITIES.index(quantity) for quantity in ("elastic", "cloud"))
 
@@ -36,6 +38,8 @@ class Prefixes(NamedTuple):
         Root mean square distance from the mean, and length of the path, in the unit of the data.
     elapsed : ndarray of shape (n * G,)
         Time that the beginning takes, as a share of the movement's.
+    end_speeds : ndarray of shape (n * G,)
+        Logarithm of the speed at the end by the mean speed.
     """
 
     positions: Array
@@ -43,6 +47,7 @@ class Prefixes(NamedTuple):
     sizes: Array
     lengths: Array
     elapsed: Array
+    end_speeds: Array
 
 
 def smooth_paths(movements: Demonstrations, cutoff: float | None) -> Array:
@@ -83,7 +88,18 @@ def beginnings(paths: Array, progress: Array) -> Prefixes:
         sizes,
         chords.sum(axis=1),
         elapsed[:, -1],
+        _end_speeds(phase, elapsed[:, -1].reshape(n, -1), progress),
     )
+
+
+def _end_speeds(phase: Array, elapsed: Array, progress: Array) -> Array:
+    """Logarithms (n * G,) of the speed over the last 2 % of the time by the mean speed of each beginning.
+
+    Of movements with a `phase` (n, T) of arc length, whose beginnings end at `elapsed` (n, G) of their time.
+    """
+    even = np.linspace(0.0, 1.0, phase.shape[1])
+    before = np.stack([np.interp((1.0 - _LAST) * ends, even, one) for ends, one in zip(elapsed, phase, strict=True)])
+    return np.asarray(np.log(np.maximum((1.0 - before / progress) / _LAST, _LEAST_SPEED)).ravel())
 
 
 def describe_prefixes(prefixes: Prefixes, procrustes: Procrustes) -> Described:
