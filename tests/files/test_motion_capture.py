@@ -71,6 +71,16 @@ def qualisys_bodies():
     return "\n".join(lines)
 
 
+def trc(rate="100.00"):
+    """After OpenSim, "Marker (.trc) Files"."""
+    lines = ["PathFileType\t4\t(X/Y/Z)\twalk.trc"]
+    lines += ["DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"]
+    lines += [f"{rate}\t100.00\t{N}\t2\tmm\t100.00\t1\t{N}", "Frame#\tTime\tLASI\t\t\tRASI\t\t\t"]
+    lines += ["\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t", ""]
+    lines += [f"{k + 1}\t{k / 100:.5f}\t{k}\t{k * k}\t3\t4\t{k / 2}\t6\t" for k in range(N)]
+    return "\r\n".join(lines)
+
+
 BVH = """HIERARCHY
 ROOT Hips
 {
@@ -172,6 +182,23 @@ def test_qualisys_bodies_are_positions_and_angles():
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]
     assert list(recorded_names(found.demonstrations.channels)) == names
     assert found.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
+
+
+def test_trc_markers_have_names_units_and_times():
+    found = read(trc(), "walk.trc")
+    assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
+    assert set(found.detected[0][0].measured_in) == {"mm"}
+    np.testing.assert_array_equal(found.demonstrations.times, np.arange(N) / 100)
+    with pytest.raises(DataError, match="expected the heads 'Frame#', 'Time'"):
+        read(trc().replace("Frame#", "Row"), "walk.trc")
+
+
+def test_times_that_are_rounded_are_those_of_the_frames_at_the_rate():
+    exact = np.arange(N) / 120
+    assert np.abs(np.round(exact, 6) - exact).max() > 1e-8
+    np.testing.assert_allclose(read(motive()).demonstrations.times, exact, atol=1e-12)
+    other = read(motive().replace("Export Frame Rate,120.000000", "Export Frame Rate,60.000000"))
+    np.testing.assert_allclose(other.demonstrations.times, np.round(exact, 6), atol=1e-12)  # the column wins
 
 
 @pytest.mark.parametrize(

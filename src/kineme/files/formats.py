@@ -121,6 +121,7 @@ FORMATS: dict[str, Format] = {
     ".hdf5": Format(read_path=hdf5_movements),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
+    ".trc": Format(_read_text),
     ".bag": _BAG,
     ".db3": _BAG,
     ".mcap": _BAG,
