@@ -25,7 +25,7 @@ from bench.rows import Row
 from kineme.comparison.describe import feature_rows, prepare
 from kineme.comparison.described import Described
 from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, score
+from kineme.comparison.scores import nearest, nearest_each, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.experiments.evaluation.conditions import TOGETHER
 from kineme.movements.preparation.perturbations import Perturbation
@@ -68,10 +68,10 @@ class Split(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What was found of the movements of one split: log similarities (n, C) of known and unknown, and verdicts."""
+    """What was found of the movements of one split: log similarities (n, C) of the known ones, and verdicts."""
 
-    right: NDArray[np.bool_]  # whether the nearest is of the class of each known movement
-    nearest: NDArray[np.float64]
+    right: NDArray[np.bool_]  # whether the most similar class is that of each known movement
+    similar: NDArray[np.float64]
     truth: NDArray[np.intp]
     novelty: tuple[NDArray[np.float64], NDArray[np.float64]]
     rejected: tuple[float, float]
@@ -137,9 +137,10 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
     truth = np.searchsorted(references.classes, one.labels[split.known])
     logs, novelty, rejected = [], [], []
     for asked in (split.known, split.unknown):
-        found = score(recognizer.comparison, recognizer.references, one.described.take(asked), nearest)[0]
+        compared = recognizer.comparison, recognizer.references, one.described.take(asked)
+        found, similar = score(*compared, nearest, nearest_each)
         p = recognizer.calibration.known_p_values(found, ERROR_RATE)
-        logs.append(found)
+        logs.append(similar)
         novelty.append(recognizer.calibration.scores(found).min(axis=1))
         rejected.append(float(np.mean(p <= ERROR_RATE)) if len(p) else math.nan)
     return Asked(logs[0].argmax(axis=1) == truth, logs[0], truth, (novelty[0], novelty[1]), (rejected[0], rejected[1]))
@@ -173,7 +174,7 @@ def reliability_rows(draws: int) -> list[Row]:
     for one in sets:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
             found = [ask(one, s, others) for n in (1, 2, 4) for s in splits(one, n, others, draws, 1.0)]
-            logs, right = [one.nearest for one in found], np.concatenate([one.right for one in found])
+            logs, right = [one.similar for one in found], np.concatenate([one.right for one in found])
             confidence = np.concatenate([class_probabilities(each).max(axis=1) for each in logs])
             fitted.append(exponent(found))
             details = reliability(confidence, right) | {"accuracy": float(right.mean()), "exponent": fitted[-1]}
@@ -195,7 +196,7 @@ def reliability(confidence: NDArray[np.float64], right: NDArray[np.bool_]) -> di
 
 def exponent(asked: list[Asked]) -> float:
     """The exponent at which the right classes are most likely."""
-    logs = [np.log(np.maximum(distances(one.nearest), LEAST)) for one in asked]
+    logs = [np.log(np.maximum(distances(one.similar), LEAST)) for one in asked]
 
     def loss(m: float) -> float:
         total = 0.0

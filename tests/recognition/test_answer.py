@@ -96,13 +96,13 @@ def test_a_stranger_is_unknown_and_the_answer_says_what_it_is_most_like():
     assert "label=None" in repr(answer)
 
 
+@pytest.mark.parametrize("classifier", ["nearest", "auto"])
 @any_seed
-def test_confidence_is_the_share_of_the_class_by_distances_to_the_power_of_fifteen(seed):
+def test_confidence_is_the_share_of_the_class_by_distances_to_the_power_of_fifteen(seed, classifier):
     demos, asked = draw_shapes([4] * 6, seed=seed), draw_shapes([1] * 6, seed=seed, spread=0.4)[2]
-    recognizer = Recognizer(classifier="nearest").fit(demos)
+    recognizer = Recognizer(classifier=classifier).fit(demos)
     answer = recognizer.recognize(asked, error_rate=0.04)
-    nearest = recognizer.log_similarity([asked])[0].reshape(6, 4).max(axis=1)
-    shares = np.sqrt(-2 * nearest) ** -15.0
+    shares = np.sqrt(-2 * recognizer.decision_function([asked])[0]) ** -15.0
     if answer.label is not None:
         expected = shares[list(answer.p_values).index(answer.label)] / shares.sum()
         assert answer.confidence == pytest.approx(expected, abs=1.1e-4)

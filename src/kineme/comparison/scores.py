@@ -84,6 +84,11 @@ def nearest(compared: Compared) -> Array:
     return compared.nearest
 
 
+def nearest_each(compared: Compared) -> Array:
+    """Log similarity to each class, in each representation to its own nearest reference of the class, (n, C)."""
+    return compared.nearest_each
+
+
 def score(
     comparison: Comparison, references: References, movements: Demonstrations | Described, *scores: Score
 ) -> tuple[Array, ...]:

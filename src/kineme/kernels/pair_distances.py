@@ -32,7 +32,9 @@ _TILE_BOUNDS = 32_768
 _LANES = 16  # pairs that the compiled loops compare at once
 _LISTED = 1.2  # time of 16 pairs taken from a list, by that of 16 of one movement with others
 _TWIN_PAIRS = 1000
-_BOUND_EVERY = 3  # of how many segments one is compared for a bound: of handwriting, that leaves one pair in 25
+_BOUND_EVERY = (
+    3  # of how many segments one is compared for a bound: of handwriting as recorded, that leaves one pair in ten
+)
 _PAIR_OPERATIONS = 10_000  # elementary operations of the plain twins per pair
 
 

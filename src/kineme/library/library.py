@@ -241,9 +241,10 @@ class ActionLibrary:
 
         With up to 1000 movements of symbols, all are compared as in `kineme.Recognizer`. With more, some hundreds are,
         which are chosen by bounds from the reduced features of all, and p-values are given for the 64 nearest symbols.
-        The label is that of comparing all if no representation compares pairs; else nearly always, as the bounds say
-        nothing of those, see `kineme.recognition.two_stage_search.TwoStageSearch`. The first answer after a change
-        takes longer; what it prepares is cached beside the database unless `read_only`.
+        The label is then that of the single nearest movement, as with ``classifier="nearest"``, whichever the library
+        was created with. It is the one of comparing all if no representation compares pairs; else nearly always, as the
+        bounds say nothing of those, see `kineme.recognition.two_stage_search.TwoStageSearch`. The first answer after a
+        change takes longer; what it prepares is cached beside the database unless `read_only`.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.recognition.classifiers import Classifier
+from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import RULES, Calibration
 from kineme.recognition.transform import Transform, map_onto
@@ -203,7 +203,8 @@ def verdicts_of(
     share = compared.shares(np.array([near[0].index for near in like], dtype=np.intp))
     names = [one.name for one in compared.comparison.representations]
     known = np.array([label is not None for label in labels])
-    right = class_probabilities(compared.nearest)[np.arange(len(shown)), shown]
+    similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
+    right = class_probabilities(similar)[np.arange(len(shown)), shown]
     confidence = np.where(known, right, 1.0 - p_known).tolist()
     return [
         Verdict(

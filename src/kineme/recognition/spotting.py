@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, score
+from kineme.comparison.scores import nearest, nearest_each, score
 from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
 from kineme.movements.segmentation.segment import as_recording
@@ -93,10 +93,10 @@ def spot(
     rows = np.concatenate((known, unknown))
     if not len(rows):
         return []
-    (logs,) = score(comparison, references, pieces_of(whole, rows), nearest)
+    logs, similar = score(comparison, references, pieces_of(whole, rows), nearest, nearest_each)
     p_known = calibration.known_p_values(logs, error_rate)
     confidence = 1.0 - p_known
-    confidence[: len(best)] = class_probabilities(logs)[np.arange(len(best)), best]
+    confidence[: len(best)] = class_probabilities(similar)[np.arange(len(best)), best]
     classes = references.classes.tolist()
     labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
     t = whole.times

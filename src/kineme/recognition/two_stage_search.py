@@ -34,7 +34,7 @@ _BOUNDS = 1_000_000  # bounds at a time, where that is more than the least
 
 @dataclass(frozen=True, eq=False)
 class TwoStageSearch:
-    """Recognition where only the reduced features of the references are in memory.
+    """Recognition by the nearest reference where only the reduced features of the references are in memory.
 
     Without representations that are compared pair by pair, the best-ranked class is that of an exhaustive search as
     long as no more than 4096 movements are in doubt, their bound above the similarity to the nearest one known. With

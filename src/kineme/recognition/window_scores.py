@@ -159,8 +159,8 @@ def closest_classes(
     """Class of each chosen window: the closest to it, or to a window that has nine tenths of the union with it.
 
     Which window is chosen depends on its duration, its size, and what surrounds it; these differ between people. The
-    class is that of the nearest demonstration, as in `Recognizer.recognize`, wherever exactly the movement starts and
-    ends: the distance, not over the scale of the class, and a quarter of the costs of duration and size.
+    class is that of the nearest demonstration, wherever exactly the movement starts and ends: the distance, not over
+    the scale of the class, and a quarter of the costs of duration and size.
 
     Parameters
     ----------

@@ -119,8 +119,9 @@ def _add_over(stored: Hypotheses, path: Array, evidence: Array, priors: Array) -
     """Add the evidence that the movement is over, in place, given the other densities (m * G,) if it is.
 
     It is the recognizer's similarity, which is at most 1, to the power of 3, averaged over each class, and summed over
-    classes. If the movement is over, its class is what the recognizer says: each class gets a share of that sum in
-    proportion to its largest similarity to the power of 3, whatever its size and duration.
+    classes. If the movement is over, its class is that of the most similar one, nearly always what the recognizer says:
+    each class gets a share of that sum in proportion to its largest similarity to the power of 3, whatever its size and
+    duration.
     """
     G, counts = len(stored.progress), np.diff(stored.first, append=len(stored.durations))
     most = priors[G - 1 :: G]
