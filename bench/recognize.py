@@ -53,7 +53,7 @@ def _fit_and_predict(lasa: Any, where: str, target: float, quick: bool) -> tuple
             "smooth": lambda: kineme.preprocess(demos, [kineme.Smooth(10.0)]),
             "look": lambda: recognizer.describe(demos),
             "look without smoothing": lambda: recognizer.__class__(cutoff=None).fit(lasa[train]).describe(smoothed),
-            "compare": lambda: recognizer.classifier_.scores(replace(compared)),
+            "compare": lambda: recognizer.classifier_.best(replace(compared)),
             "DTW": lambda: dtw_nearest(asked, stored, N_POINTS // 10),
         },
         repeats,

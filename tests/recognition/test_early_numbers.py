@@ -18,6 +18,7 @@ from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, partial_shares
 from kineme.recognition.early.ending import Ending
 from kineme.recognition.early.hypotheses import Early, Hypotheses, hypotheses
+from kineme.recognition.early.prefixes import smooth_paths
 
 FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
@@ -75,6 +76,24 @@ def test_most_labels_are_decided_before_the_end_and_are_right():
 def test_before_its_speed_is_known_a_movement_is_over_at_odds_of_one_to_twenty():
     assert Ending((0.0, 1.0), (0.0, 1.0)).log_odds(np.zeros(1)) == pytest.approx(-3.0)
     assert math.exp(-3.0) == pytest.approx(1 / 20, abs=0.001)
+
+
+def test_speed_at_the_end_and_progress_count_among_the_other_densities(monkeypatch):
+    demos = kineme.load_lasa(["CShape", "NShape"])
+    recognizer = kineme.Recognizer().fit(demos[::7])
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    paths = smooth_paths(demos[1:2], recognizer.comparison_.cutoff)
+    begun = evidence.describe_begun(stored, paths, demos[1].positions[:1], demos[1:2].durations)
+
+    def priors(speed):
+        return evidence._log_priors(stored, begun._replace(prefixes=begun.prefixes._replace(end_speeds=speed)))[0]
+
+    own = stored.prefixes.end_speeds[5]
+    same, faster = priors(np.array([own])), priors(np.array([own + 0.5]))
+    assert same[5] - faster[5] == pytest.approx(math.log(1.5))
+    monkeypatch.setattr(evidence, "_PROGRESS", 0.0)
+    counted = same - priors(np.array([own]))
+    np.testing.assert_allclose(counted, np.tile(0.25 * np.log(stored.progress), 2))
 
 
 def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
