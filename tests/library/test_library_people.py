@@ -15,10 +15,13 @@ from library_samples import draw_movements
 
 import kineme
 from kineme import ActionLibrary, Recognizer
+from kineme.anchoring.proposals.propose import propose as propose_clusters
 from kineme.errors import TrajectoryError
 from kineme.files.people import each_person
 from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.library.storage.folder import FILE
+from kineme.library.symbols import proposals
+from kineme.library.symbols.recognized import known_symbols
 
 PEOPLE = ["anna", "ben", "cleo"]
 
@@ -182,3 +185,29 @@ def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(t
             unknown[told].append(np.mean([one.label is None for one in answers]))
     assert np.mean(unknown[True]) < 0.08
     assert np.mean(unknown[False]) > 0.1
+
+
+def test_what_symbols_are_proposed_by_knows_the_people_too(tmp_path):
+    paths, labels, groups = _shown()
+    with _library(tmp_path, paths, labels, groups) as library:
+        known = known_symbols(library.store)
+    recognizer = Recognizer().fit(paths, labels, groups=groups)
+    logs = np.log(np.linspace(0.01, 0.99, 40).reshape(10, 4))
+    expected = recognizer.calibration().known_p_values(logs, 0.05)
+    np.testing.assert_allclose(known.calibration.known_p_values(logs, 0.05), expected, rtol=1e-3)
+    plain = Recognizer().fit(paths, labels).calibration().known_p_values(logs, 0.05)
+    assert np.abs(plain - expected).max() > 0.1
+
+
+def test_proposals_are_clustered_with_the_people_who_were_named(tmp_path, monkeypatch):
+    paths, _, groups = _shown()
+    told = []
+
+    def propose(*given, groups=None, **options):
+        told.append(groups)
+        return propose_clusters(*given, groups=groups, **options)
+
+    monkeypatch.setattr(proposals, "propose_clusters", propose)
+    with _library(tmp_path, paths, None, groups) as library:
+        library.propose()
+    np.testing.assert_array_equal(told, [np.unique(groups, return_inverse=True)[1]])

@@ -96,6 +96,17 @@ def test_speed_at_the_end_and_progress_count_among_the_other_densities(monkeypat
     np.testing.assert_allclose(counted, np.tile(0.25 * np.log(stored.progress), 2))
 
 
+def test_a_class_of_what_is_over_counts_by_its_most_similar_movement_whatever_its_number():
+    demos = kineme.load_lasa(["CShape", "NShape"])
+    recognizer = kineme.Recognizer().fit(demos[[0, 1, 2, 7]])
+    stored = hypotheses(recognizer.comparison_, recognizer.references_, Early())
+    found = np.full(4 * len(stored.progress), -np.inf)
+    evidence._add_over(stored, smooth_paths(demos[3:4], recognizer.comparison_.cutoff), found, np.zeros(len(found)))
+    first, second, _ = stored.log_classes(found[None])[0]
+    similar = recognizer.log_similarity(demos[3:4])[0]
+    assert first - second == pytest.approx(3.0 * (similar[:3].max() - similar[3]), rel=1e-3)
+
+
 def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
     assert evidence._POWER == 3.0
 
