@@ -233,3 +233,15 @@ def test_the_page_shows_what_was_measured():
             assert cell[0] is None or cell[0] <= (8.0 if k else 15.0)
     errors = [measured[f"{name}: expected calibration error"] for name in (*list(TABLE)[2:], "LASA, severely")]
     assert "expected calibration error is {:.3f}, {:.3f} and {:.3f}".format(*errors) in page
+
+
+def test_an_error_rate_does_not_depend_on_the_one_that_was_asked_for_before():
+    demos, asked = draw_shapes([4] * 6), draw_shapes([3] * 6, seed=1, spread=0.3)
+    recognizer = Recognizer().fit(demos)
+    logs = recognizer.log_similarity(asked).reshape(18, 6, 4).max(axis=2)
+    asked_twice, fresh = recognizer.calibration(), Recognizer().fit(demos).calibration()
+    before = asked_twice.p_values(logs, 0.05), asked_twice.rules(logs, 0.05)
+    np.testing.assert_array_equal(asked_twice.p_values(logs, 0.3), fresh.p_values(logs, 0.3))
+    assert asked_twice.rules(logs, 0.3) == fresh.rules(logs, 0.3) == ["class"] * 18
+    assert before[1] == ["pooled"] * 18
+    assert (before[0] != fresh.p_values(logs, 0.3)).any()
