@@ -6,9 +6,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, store, write_bag
 
 import kineme
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, store, write_bag
 from kineme.files.ros.add_topic import copy_with_topic
 
 pytest.importorskip("rosbags")
