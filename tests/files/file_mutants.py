@@ -116,6 +116,11 @@ def _qualisys():
     return (head + "\n".join(f"{k}\t1\t2\t{k * k}\t0.5\t0" for k in range(N_SAMPLES))).encode()
 
 
+def _trc():
+    head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n100\tmm\nFrame#\tTime\tone\t\t\n\t\tX1\tY1\tZ1\n\n"
+    return (head + "\n".join(f"{k}\t{k / 100}\t{k}\t{k * k}\t1" for k in range(N_SAMPLES))).encode()
+
+
 def _hdf5():
     import h5py
 
@@ -233,6 +238,7 @@ def samples():
         "vicon.csv": _vicon(),
         "motive.csv": _motive(),
         "qualisys.tsv": _qualisys(),
+        "markers.trc": _trc(),
         "units.csv": b"time,x\nms,mm\n" + b"".join(b"%d,%d\n" % (10 * k, k * k) for k in range(N_SAMPLES)),
         **_optional(("robomimic.hdf5", _hdf5), ("points.c3d", _c3d)),
         "vectors.parquet": _vectors(),
