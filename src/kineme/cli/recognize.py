@@ -26,7 +26,9 @@ _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fe
 @click.option("--top", type=whole(1), default=3, show_default=True, help="Symbols listed per movement.")
 @layout_options
 @json_option
-def recognize(recordings: tuple[Path, ...], folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:
+def recognize(
+    recordings: tuple[Path, ...], folder: Path, error_rate: float, top: int, as_json: bool, **options: Any
+) -> None:
     """Recognize the movements in RECORDINGS: files, folders, patterns of them, or - for CSV from the standard input.
 
     A movement that is like no symbol is unknown. What cannot be read is listed.
