@@ -52,7 +52,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
     parsed = read(recordings, options)
-    root = root_of([path for path in recordings if str(path) != "-"])
+    root = root_of(*(path for path in recordings if str(path) != "-"))
     people = _people(root, parsed, person, by_person)
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with ActionLibrary(folder, create=True) as library:

@@ -72,7 +72,7 @@ def is_alone(paths: Sequence[Path]) -> bool:
     return len(paths) == 1 and expanded(paths[0]) == [paths[0]]
 
 
-def root_of(paths: Sequence[Path]) -> Path:
+def root_of(*paths: Path) -> Path:
     """The folder that the names of sources are relative to: a folder of files itself, else the one around a file.
 
     Of several paths it is the working folder: their names are as they were given.
