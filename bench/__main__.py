@@ -24,6 +24,7 @@ SUBJECTS = (
     "defaults",
     "library",
     "lerobot",
+    "bags",
     "binning",
     "anchoring",
     "by_person",

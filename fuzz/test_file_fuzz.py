@@ -10,7 +10,7 @@ from file_mutants import mutant, samples
 
 from limited_child import MIB, LimitedChild
 
-MODULES = ("kineme", "file_mutants", "scipy.io", "pyarrow.parquet")
+MODULES = ("kineme", "file_mutants", "scipy.io", "pyarrow.parquet", "rosbags.rosbag1", "rosbags.rosbag2")
 
 
 @pytest.mark.parametrize("name", samples())

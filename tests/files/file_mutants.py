@@ -116,6 +116,11 @@ def _qualisys():
     return (head + "\n".join(f"{k}\t1\t2\t{k * k}\t0.5\t0" for k in range(N_SAMPLES))).encode()
 
 
+def _trc():
+    head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n100\tmm\nFrame#\tTime\tone\t\t\n\t\tX1\tY1\tZ1\n\n"
+    return (head + "\n".join(f"{k}\t{k / 100}\t{k}\t{k * k}\t1" for k in range(N_SAMPLES))).encode()
+
+
 def _hdf5():
     import h5py
 
@@ -185,6 +190,22 @@ _SAVED = {"primitives.kineme": kineme.Primitives, "rhythm.kineme": RhythmicPrimi
 
 
 @functools.cache
+def _bag(kind, compress=False):
+    """One file with joints, poses and transforms, of which the joints and the transforms are not read by themselves."""
+    from bag_files import Maker, stamps, write_bag
+
+    m, messages = Maker(kind), []
+    for k, ns in enumerate(stamps(N_SAMPLES)):
+        row = [0.1 * k, 0.0, 0.0, 0.0, 0.0, np.sin(k / 9), np.cos(k / 9)]
+        messages.append(("/tool", ns, m.pose_stamped(ns, row)))
+        messages.append(("/chat", ns, m.string("wave")))
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_bag(folder, kind, messages, compress=compress)
+        files = [path] if path.is_file() else [one for one in path.iterdir() if one.name != "metadata.yaml"]
+        return files[0].read_bytes()
+
+
+@functools.cache
 def samples():
     """File name -> bytes: at least one of every format and every kind of saved primitives."""
     (t, x), (t2, x2) = _movement(), _movement(1)
@@ -217,6 +238,7 @@ def samples():
         "vicon.csv": _vicon(),
         "motive.csv": _motive(),
         "qualisys.tsv": _qualisys(),
+        "markers.trc": _trc(),
         "units.csv": b"time,x\nms,mm\n" + b"".join(b"%d,%d\n" % (10 * k, k * k) for k in range(N_SAMPLES)),
         **_optional(("robomimic.hdf5", _hdf5), ("points.c3d", _c3d)),
         "vectors.parquet": _vectors(),
@@ -230,6 +252,11 @@ def samples():
             False, demos=_demos(), cells=[[1, "a"], [np.eye(2) * 1j, {"b": [True]}]], dt=np.int8([1, 2])
         ),
         "others_compressed.mat": _mat(True, demos=_demos(), s={"a": {"b": {"c": "deep"}}}, text=["ab", "cd"]),
+        "run.bag": _bag("ros1"),
+        "compressed.bag": _bag("ros1", compress=True),
+        "run.db3": _bag("sqlite3"),
+        "run.mcap": _bag("mcap"),
+        "compressed.mcap": _bag("mcap", compress=True),
         **{name: _saved(cls) for name, cls in _SAVED.items()},
     }
 

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from scipy.spatial.transform import Rotation, Slerp
 
 import kineme
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.files.recordings import read_recordings
 
 EVERY = pytest.mark.parametrize("kind", KINDS)
@@ -78,7 +78,7 @@ def test_transforms_at_other_rates_are_interpolated_on_the_sphere(tmp_path, kind
             messages.append(tf(m, ns, ("arm", "hand", slow[k])))
             messages.append(tf(m, ns, ("arm", "hand", slow[k]), late=1))  # repeated, as some nodes do
     movement, _, problems = only(write_bag(tmp_path, kind, messages), "base:hand")
-    assert problems == []
+    assert problems == ["frames base:hand: 1 stamp of transform base:arm, at which others are not known"]
     np.testing.assert_allclose(matrices(movement.recorded), (matrices(arm) @ matrices(slow))[1:], atol=1e-9)
 
 
@@ -188,3 +188,16 @@ def test_a_bag_without_transforms_is_named(tmp_path):
     path = write_bag(tmp_path, "mcap", [("/chat", START, Maker("mcap").string("x"))])
     with pytest.raises(kineme.DataError, match=r"expected a topic of transforms, such as /tf, got none"):
         read_recordings(path, frame="a:b")
+
+
+def test_frames_of_two_robots_are_told_apart_by_their_topics(tmp_path):
+    m, rows = Maker("mcap"), {"/left": pose_rows(50, 1), "/right": pose_rows(50, 2)}
+    tool = pose_rows(1, 3)
+    messages = [tf(m, START, ("hand", "tool", tool[0]), topic=f"{robot}/tf_static") for robot in rows]
+    for k, ns in enumerate(stamps()):
+        messages += [tf(m, ns, ("base", "hand", rows[robot][k]), topic=f"{robot}/tf") for robot in rows]
+    path = write_bag(tmp_path, "mcap", messages)
+    for robot, poses in rows.items():
+        movement, _, problems = only(path, "base:tool", topic=f"{robot}/tf")
+        np.testing.assert_allclose(matrices(movement.recorded), matrices(poses) @ matrices(tool), atol=1e-12)
+        assert problems == []

@@ -1,13 +1,15 @@
-"""Bags that other programs wrote: ROS 1 itself, where this machine has it, and the package mcap."""
+"""Bags that other programs wrote: ROS 1 and ROS 2 themselves, where they are installed, and the package mcap."""
 
+import os
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
-from bag_files import Maker, pose_rows, stamps, store
 
 import kineme
+from bag_files import Maker, pose_rows, stamps, store
 from kineme.files.recordings import read_recordings
 
 _ROS_1 = """
@@ -167,3 +169,56 @@ def test_an_mcap_with_an_encoding_that_rosbags_does_not_know_names_it(tmp_path):
     path = write_mcap(tmp_path / "a.mcap", poses(), encoding="jsonschema")
     with pytest.raises(kineme.DataError, match=r"a\.mcap: expected .*, got: 'jsonschema', which rosbags does not know"):
         read_recordings(path)
+
+
+_ROS_2 = """
+import math
+from rclpy.serialization import serialize_message
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+def show(topic, message):
+    name = type(message).__module__.split(".")[0] + "/msg/" + type(message).__name__
+    print(topic, name, serialize_message(message).hex())
+
+plan = JointTrajectory(joint_names=["a", "longer_name"])
+for k in range(100):
+    pose, state = PoseStamped(), JointState(name=["a", "longer_name"], position=[math.sin(k / 20), k / 100])
+    for one in (pose, state):
+        one.header.stamp.sec, one.header.stamp.nanosec, one.header.frame_id = 1700000000, k * 10**7, "base"
+    pose.pose.position.x, pose.pose.orientation.z, pose.pose.orientation.w = k / 10, math.sin(k / 99), math.cos(k / 99)
+    show("/pose", pose)
+    show("/joint_states", state)
+    point = JointTrajectoryPoint(positions=[float(k), -float(k)])
+    point.time_from_start.nanosec = k * 10**7
+    plan.points.append(point)
+show("/plan", plan)
+"""
+
+
+@pytest.fixture(scope="module")
+def ros_2(tmp_path_factory):
+    """Messages that ROS 2 serialized, in an MCAP file; of this Python, or of the one that ROS2_PYTHON names."""
+    for python in filter(None, (os.environ.get("ROS2_PYTHON"), sys.executable)):
+        done = subprocess.run([python, "-c", _ROS_2], capture_output=True, check=False, text=True)
+        if not done.returncode:
+            break
+    else:
+        pytest.skip("no ROS 2: pip install ros-rclpy ros-geometry-msgs ros-sensor-msgs ros-trajectory-msgs")
+    rows = [line.split() for line in done.stdout.splitlines()]
+    messages = [(topic, name, 17 * 10**17 + k, bytes.fromhex(raw)) for k, (topic, name, raw) in enumerate(rows)]
+    return write_mcap(tmp_path_factory.mktemp("ros2") / "session.mcap", messages)
+
+
+def test_messages_of_ros_2(ros_2):
+    k = np.arange(100)
+    (joints,) = read_recordings(ros_2, topic="/joint_states").demonstrations
+    np.testing.assert_allclose(joints.recorded, np.column_stack((np.sin(k / 20), k / 100)), atol=1e-15)
+    np.testing.assert_allclose(joints.times, 1.7e9 + k / 100, rtol=0, atol=5e-7)
+    (pose,) = read_recordings(ros_2, topic="/pose").demonstrations
+    zero = np.zeros(100)
+    expected = np.column_stack((k / 10, zero, zero, zero, zero, np.sin(k / 99), np.cos(k / 99)))
+    np.testing.assert_allclose(pose.recorded, expected, atol=1e-15)
+    (plan,) = read_recordings(ros_2, topic="/plan").demonstrations
+    np.testing.assert_array_equal(plan.recorded, k[:, None] * [1, -1])

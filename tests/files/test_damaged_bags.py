@@ -6,9 +6,9 @@ import struct
 
 import numpy as np
 import pytest
-from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 
 import kineme
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.files.recordings import read_recordings
 from kineme.files.write_movement import write_movement
 
@@ -136,10 +136,21 @@ def test_a_missing_file_of_a_bag_is_named(tmp_path, make_movement):
 
 def test_metadata_that_is_none_is_named(tmp_path, make_movement):
     path = a_bag(tmp_path, "mcap")
-    for text in ("", "a: [", "rosbag2_bagfile_information: 5", "- 1", "\0"):
-        (path / "metadata.yaml").write_text(text)
+    for text in ("[", ": 5", ":\n  version: 99", "\0"):
+        (path / "metadata.yaml").write_text(f"rosbag2_bagfile_information{text}")
         (problem,) = beside(tmp_path, make_movement)
         assert problem.startswith("run: expected a bag of ROS that can be opened, got: "), text
+
+
+@pytest.mark.parametrize("text", ["", "title: my recordings\n", None])
+def test_a_folder_whose_metadata_are_of_another_program_is_one_of_files(tmp_path, text):
+    path = a_bag(tmp_path, "mcap")
+    (path / "metadata.yaml").unlink()
+    if text is not None:
+        (path / "metadata.yaml").write_text(text)
+    read = read_recordings(path)
+    assert [one.path for one in read.sources] == ["run.mcap"]
+    assert [one.file for one in read.problems] == ([] if text is None else ["metadata.yaml"])
 
 
 def test_file_names_in_metadata_that_are_paths_lead_nowhere(tmp_path):

@@ -71,6 +71,16 @@ def qualisys_bodies():
     return "\n".join(lines)
 
 
+def trc(rate="100.00"):
+    """After OpenSim, "Marker (.trc) Files"."""
+    lines = ["PathFileType\t4\t(X/Y/Z)\twalk.trc"]
+    lines += ["DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"]
+    lines += [f"{rate}\t100.00\t{N}\t2\tmm\t100.00\t1\t{N}", "Frame#\tTime\tLASI\t\t\tRASI\t\t\t"]
+    lines += ["\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t", ""]
+    lines += [f"{k + 1}\t{k / 100:.5f}\t{k}\t{k * k}\t3\t4\t{k / 2}\t6\t" for k in range(N)]
+    return "\r\n".join(lines)
+
+
 BVH = """HIERARCHY
 ROOT Hips
 {
@@ -174,6 +184,23 @@ def test_qualisys_bodies_are_positions_and_angles():
     assert found.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
 
 
+def test_trc_markers_have_names_units_and_times():
+    found = read(trc(), "walk.trc")
+    assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
+    assert set(found.detected[0][0].measured_in) == {"mm"}
+    np.testing.assert_array_equal(found.demonstrations.times, np.arange(N) / 100)
+    with pytest.raises(DataError, match="expected the heads 'Frame#', 'Time'"):
+        read(trc().replace("Frame#", "Row"), "walk.trc")
+
+
+def test_times_that_are_rounded_are_those_of_the_frames_at_the_rate():
+    exact = np.arange(N) / 120
+    assert np.abs(np.round(exact, 6) - exact).max() > 1e-8
+    np.testing.assert_allclose(read(motive()).demonstrations.times, exact, atol=1e-12)
+    other = read(motive().replace("Export Frame Rate,120.000000", "Export Frame Rate,60.000000"))
+    np.testing.assert_allclose(other.demonstrations.times, np.round(exact, 6), atol=1e-12)  # the column wins
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -204,7 +231,8 @@ def test_a_row_of_units_below_the_heads_is_not_a_sample(units):
 def test_names_and_gaps_below_the_heads_are_not_units():
     rows = "".join(f"w,{k / 10},{k},{k * k}\n" for k in range(N))
     with pytest.raises(DataError, match="got nothing"):
-        read(f"label,time,x,y\nm,0,,\n{rows}".replace("m,0", "w,-1"))
+        read(f"label,time,x,y\nw,-1,,\n{rows}")
+    assert "got nothing" in read(f"label,time,x,y\nmm,,,\n{rows}").problems[0].reason
 
 
 def test_bvh_channels_are_named_by_their_joints():
@@ -233,7 +261,7 @@ def test_a_damaged_bvh_file_says_where(content, words):
 
 @pytest.fixture(scope="module")
 def c3d_bytes(tmp_path_factory):
-    """A file by ezc3d: two markers at 100 Hz, one of them lost once, and an analog channel at 1000 Hz."""
+    """A file by ezc3d: two markers at 100 Hz, each lost once, and an analog channel at 1000 Hz."""
     pytest.importorskip("c3d", reason="the package c3d reads C3D")
     ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes the file")
     content = ezc3d.c3d()
@@ -244,6 +272,9 @@ def c3d_bytes(tmp_path_factory):
     points[0] = np.arange(2 * N).reshape(2, N)
     points[:3, 1, 5] = np.nan
     content["data"]["points"] = points
+    residuals = np.zeros((1, 2, N))
+    residuals[0, 0, 7] = -1  # computed, not found, though it has a position
+    content["data"]["meta_points"] = {"residuals": residuals, "camera_masks": np.zeros((7, 2, N), bool)}
     content["parameters"]["ANALOG"]["RATE"]["value"] = [1000]
     content["parameters"]["ANALOG"]["LABELS"]["value"] = ("force",)
     content["data"]["analogs"] = np.zeros((1, 1, 10 * N))
@@ -255,11 +286,11 @@ def c3d_bytes(tmp_path_factory):
 def test_c3d_points_are_named_and_lost_ones_are_gaps(c3d_bytes):
     found = read(c3d_bytes, "a.c3d", skip="sample")
     assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
-    np.testing.assert_allclose(found.demonstrations.positions[:, 0], np.delete(np.arange(N), 5))
-    np.testing.assert_allclose(found.demonstrations.times, np.delete(np.arange(N), 5) / 100)
+    np.testing.assert_allclose(found.demonstrations.positions[:, 0], np.delete(np.arange(N), [5, 7]))
+    np.testing.assert_allclose(found.demonstrations.times, np.delete(np.arange(N), [5, 7]) / 100)
     assert set(found.detected[0][0].measured_in) == {"mm"}
     assert "expected a point for 'RASI.x'" in found.problems[0].reason
-    assert read(c3d_bytes, "a.c3d", columns="LASI").demonstrations.lengths.tolist() == [N]
+    assert read(c3d_bytes, "a.c3d", columns="LASI", skip="sample").demonstrations.lengths.tolist() == [N - 1]
 
 
 def test_a_damaged_c3d_file_says_so(c3d_bytes):

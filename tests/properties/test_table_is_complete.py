@@ -38,6 +38,9 @@ OTHER_PARTS = {
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
     "movements.trajectories.demonstrations.Demonstrations.dimensions": "of columns",
+    "movements.channels.channel.Channel.coordinates": "names of columns",
+    "movements.channels.coordinates.as_wxyz": "another order of columns",
+    "movements.channels.coordinates.from_wxyz": "another order of columns",
     "movements.trajectories.demonstrations.Demonstrations.from_dataframe": "reads tables; from_arrays does the rest",
     "primitives.batch.Batch.join": "the former name of concatenate",
     "primitives.base_rollout.BaseRollout.axis_names": "of columns",
@@ -65,6 +68,7 @@ EXEMPT = {
     "kernels.shapes.Shapes.put": "writes rows that are described already; see test_two_stage_search.py",
     "comparison.stored_references.HeldReferences.described": "reads stored rows",
     "comparison.stored_references.StoredReferences.described": "reads stored rows",
+    "comparison.most_similar.most_similar": "what predict asks, see test_most_similar.py",
     "comparison.similarity.similarities": "of pairs of the batch",
     "recognition.early.early.PredictsPartial.predict_partial": "a protocol; the recognizer is in the table",
     "recognition.candidate_windows.surroundings": "windows of one recording by contract",

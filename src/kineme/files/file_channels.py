@@ -12,9 +12,8 @@ from kineme.files.check_block import movement_of, take_movements
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels, is_plain
-from kineme.movements.channels.coordinates import columns_of
+from kineme.movements.channels.coordinates import off_norm
 from kineme.movements.channels.detect import Given, find_channels
-from kineme.movements.rotations.quaternions import NORM_TOLERANCE
 from kineme.movements.tables.parsed import Block
 
 _HINT = "check the order of the columns, or divide the quaternions by their norms"
@@ -56,11 +55,8 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
 def _check_orientations(one: FileRead, channels: Channels) -> tuple[FileRead, list[Problem]]:
     """A file without the movements in which a quaternion is not of norm 1."""
     block, problems = _block(one), []
-    for channel, columns in zip(channels, columns_of(channels), strict=True):
-        if channel.kind != "orientation":
-            continue
-        norms = np.linalg.norm(block.positions[:, columns], axis=1)
-        odd = np.flatnonzero(np.abs(norms - 1.0) > NORM_TOLERANCE)
+    good = np.ones(len(block.labels), dtype=bool)
+    for channel, odd, norms in off_norm(block.positions, channels):
         owners, firsts = np.unique(np.searchsorted(block.offsets, odd, side="right") - 1, return_index=True)
         for i, k in zip(owners.tolist(), odd[firsts].tolist(), strict=True):
             reason = (
@@ -68,10 +64,8 @@ def _check_orientations(one: FileRead, channels: Channels) -> tuple[FileRead, li
                 f"{norms[k]:.6g} at sample {k - block.offsets[i]}; {_HINT}"
             )
             problems.append(Problem(one.path, block.line_of(block.row(k)), reason, TrajectoryError))
-        good = np.ones(len(block.labels), dtype=bool)
         good[owners] = False
-        block = take_movements(block, good)
-    return one._replace(block=block), problems
+    return one._replace(block=take_movements(block, good)), problems
 
 
 def _block(one: FileRead) -> Block:

@@ -60,12 +60,15 @@ class DataSet(NamedTuple):
         Patterns of the files that are read; their bytes identify the source.
     format : Format
         It reads the path of the folder.
+    says : bytes
+        What is among the first bytes of the marker, where other programs write files of that name.
     """
 
     marker: str
     beside: tuple[str, ...]
     parts: tuple[str, ...]
     format: Format
+    says: bytes = b""
 
     def files(self, folder: Path) -> list[Path]:
         """The files that are read, sorted; hidden ones are passed over."""
@@ -118,10 +121,13 @@ FORMATS: dict[str, Format] = {
     ".hdf5": Format(read_path=hdf5_movements),
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
+    ".trc": Format(_read_text),
     ".bag": _BAG,
     ".db3": _BAG,
     ".mcap": _BAG,
 }
+
+_HEAD = 4096  # bytes of a marker that are read to know it
 
 #: Folders that are one source.
 DATA_SETS: tuple[DataSet, ...] = (
@@ -131,7 +137,7 @@ DATA_SETS: tuple[DataSet, ...] = (
         ("meta/*.jsonl", "meta/*.parquet", "meta/episodes/*/*.parquet", "data/*/*.parquet"),
         Format(read_path=lerobot_movements),
     ),
-    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG),
+    DataSet("metadata.yaml", ("*.db3*", "*.mcap*"), ("*.db3*", "*.mcap*"), _BAG, b"rosbag2_bagfile_information"),
 )
 
 
@@ -142,7 +148,11 @@ def data_set_of(folder: Path) -> DataSet | None:
 
 def _is_marked(folder: Path, data_set: DataSet) -> bool:
     try:
-        return (folder / data_set.marker).is_file() and (not data_set.beside or any(_matches(folder, data_set.beside)))
+        marker = folder / data_set.marker
+        if not marker.is_file() or not (not data_set.beside or any(_matches(folder, data_set.beside))):
+            return False
+        with marker.open("rb") as file:
+            return data_set.says in file.read(_HEAD)
     except OSError:
         return False
 

@@ -39,8 +39,8 @@ class Frames(NamedTuple):
     faults: dict[int, str]
 
 
-def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> Frames:
-    """The frames of a shard.
+def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int) -> list[Frames]:
+    """The frames of a shard, in parts.
 
     Parameters
     ----------
@@ -76,14 +76,11 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
                 check_expanded(taken + 8 * width * n_rows, "a data set")
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"expected the shard {shard} to be a Parquet file, got a damaged one ({error})") from error
-    return joined(parts, sum(features.values()))
+    return parts
 
 
-def joined(parts: list[Frames], width: int) -> Frames:
+def joined(parts: list[Frames]) -> Frames:
     """Consecutive frames as one."""
-    if not parts:
-        none = np.empty(0, np.int64)
-        return Frames(np.empty((0, width)), none, none, none, np.empty(0), {})
     starts = np.concatenate(([0], np.cumsum([len(part.values) for part in parts]))).tolist()
     faults = {
         start + row: reason for start, part in zip(starts, parts, strict=False) for row, reason in part.faults.items()

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+STAMP = "time [s]"  # head of the times
+
 
 class ExportHead(NamedTuple):
     """What stands above the samples of an export.
@@ -23,7 +25,7 @@ class ExportHead(NamedTuple):
     end : int or None
         Line after the last sample; None: the samples reach to the end of the file.
     rate : float or None
-        Samples per second, where no column has the times.
+        Samples per second, where the head says it.
     zeros_are_gaps : bool
         Whether three zeros in place of a marker mean that it was not found.
     """
@@ -36,6 +38,11 @@ class ExportHead(NamedTuple):
     end: int | None = None
     rate: float | None = None
     zeros_are_gaps: bool = False
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether a column has the times."""
+        return STAMP in self.heads
 
 
 def filled(cells: Iterable[str]) -> Iterator[str]:

@@ -53,4 +53,4 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     timed = len(rows[at]) > 1 and rows[at][1].lower().startswith("time")
     if not timed:
         heads[1] = ""
-    return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, None if timed else rate)
+    return ExportHead("OptiTrack", ",", tuple(heads[:n]), tuple(units[:n]), at + 1, None, rate)

@@ -46,9 +46,7 @@ def qualisys_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]
     if rate is None and not before:
         raise DataError(f"expected a FREQUENCY in hertz or a column of times, got {said.get('FREQUENCY')}")
     measured_in = (*("" for _ in before), *units)
-    return ExportHead(
-        "Qualisys", "\t", (*before, *heads), measured_in, at, None, None if before else rate, zeros_are_gaps=True
-    )
+    return ExportHead("Qualisys", "\t", (*before, *heads), measured_in, at, None, rate, zeros_are_gaps=True)
 
 
 def _columns(names: Sequence[str], bodies: bool) -> tuple[list[str], list[str]]:

@@ -19,10 +19,11 @@ FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
 
 
 class Choice(NamedTuple):
-    """Topics in the order that was asked for, and pairs of frames, which come first."""
+    """Topics in the order that was asked for, and pairs of frames, which come first, with the topics they are from."""
 
     topics: tuple[Topic, ...]
-    frames: tuple[Edge, ...]
+    frames: tuple[Edge, ...] = ()
+    transforms: tuple[Topic, ...] = ()
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
@@ -35,21 +36,18 @@ def choose(bag: Bag, layout: Layout) -> Choice:
         The message lists the topics.
     """
     frames = tuple(pair_of(one) for one in layout.frames)
-    topics: list[Topic] = []
-    for name in layout.topics:
-        topic = _named(bag, name)
-        if topic.type in TRANSFORMS:
-            frames = frames or (_only_frames(bag),)
-        else:
-            topics.append(topic)
+    named = [_named(bag, name) for name in layout.topics]
+    topics = tuple(one for one in named if one.type not in TRANSFORMS)
+    transforms = _transforms(bag, {one.name for one in named if one.type in TRANSFORMS})
+    if not frames and len(topics) < len(named):
+        frames = (_only_frames(bag, transforms),)
     if topics or frames:
-        return Choice(tuple(topics), frames)
+        return Choice(topics, frames, transforms)
     candidates = [one for one in bag.topics if can_be_read(one)]
-    transforms = transform_topics(bag)
     if len(candidates) == 1 and not transforms:
-        return Choice((candidates[0],), ())
+        return Choice((candidates[0],))
     if transforms and not candidates:
-        return Choice((), (_only_frames(bag),))
+        return Choice((), (_only_frames(bag, transforms),), transforms)
     if candidates:
         frame = "; the pose of one frame in another with --frame parent:child" if transforms else ""
         raise DataError(
@@ -101,8 +99,14 @@ def _named(bag: Bag, name: str) -> Topic:
     return max(full, key=lambda one: one.n_messages)
 
 
-def _only_frames(bag: Bag) -> Edge:
-    edges = connected_graph(bag, (), FRAMES_LOOKED_AT).edges
+def _transforms(bag: Bag, named: set[str]) -> tuple[Topic, ...]:
+    """The topics of transforms: all, or those that are named, each with that of its transforms that never change."""
+    known = transform_topics(bag)
+    return tuple(one for one in known if not named or one.name in named or one.name.removesuffix("_static") in named)
+
+
+def _only_frames(bag: Bag, transforms: Sequence[Topic]) -> Edge:
+    edges = connected_graph(bag, transforms, (), FRAMES_LOOKED_AT).edges
     if len(edges) == 1:
         return edges[0]
     pairs = ", ".join(f"{parent}:{child}" for parent, child in edges[:_SHOWN])

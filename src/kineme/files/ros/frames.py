@@ -56,13 +56,13 @@ def edge_of(transform: Any) -> Edge:
     return transform.header.frame_id.removeprefix("/"), transform.child_frame_id.removeprefix("/")
 
 
-def connected_graph(bag: Bag, wanted: Sequence[Edge], most: int | None = None) -> Graph:
+def connected_graph(bag: Bag, topics: Sequence[Topic], wanted: Sequence[Edge], most: int | None = None) -> Graph:
     """The frames, read until all wanted pairs are connected, or `most` transforms, or to the end."""
     graph = Graph({})
     open_pairs = list(wanted)
     known: set[Edge] = set()
     try:
-        for n, (_, _, transform) in enumerate(transforms_in(bag, transform_topics(bag), [])):
+        for n, (_, _, transform) in enumerate(transforms_in(bag, topics, [])):
             edge = edge_of(transform)
             graph.parents.setdefault(edge[1], Counter())[edge[0]] += 1
             if edge not in known:

@@ -50,7 +50,7 @@ def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
     streams: list[Stream] = []
     left_out: list[str] = []
     if choice.frames:
-        streams, left_out = read_transforms(bag, choice.frames, layout.skip)
+        streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
     if choice.topics:
         others, lost = read_streams(bag, choice.topics, layout.skip)
         streams, left_out = [*streams, *others], [*left_out, *lost]

@@ -10,9 +10,10 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
-from kineme.files.motion_capture.export_heads import ExportHead
+from kineme.files.motion_capture.export_heads import STAMP, ExportHead
 from kineme.files.motion_capture.optitrack import optitrack_head
 from kineme.files.motion_capture.qualisys import qualisys_head
+from kineme.files.motion_capture.trc import trc_head
 from kineme.files.motion_capture.vicon import vicon_head
 from kineme.files.tables.dialect import COMMA_NUMBER, Dialect, split
 from kineme.movements.tables.columns import Roles
@@ -20,13 +21,14 @@ from kineme.movements.tables.table import Table
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
+_MAKERS = {"OptiTrack": optitrack_head, "Vicon": vicon_head, "Qualisys": qualisys_head, "TRC": trc_head}
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
-_STAMP = "time [s]"
+_ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
 
 
 def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect] | None:
-    """The head of an export of OptiTrack, Vicon or Qualisys and how its samples are written; None for other tables."""
+    """The head of an export of `_MAKERS` and how its samples are written; None for other tables."""
     lines = iter(lines)
     some = list(islice(lines, _FIRST))
     if (known := _head(some, probe=True)) is None:
@@ -50,7 +52,7 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
 
 def _head(lines: Sequence[str], probe: bool = False) -> Any:
     """The head of an export, or None; with `probe` the name of its maker from the first lines alone."""
-    for maker, find in (("OptiTrack", optitrack_head), ("Vicon", vicon_head), ("Qualisys", qualisys_head)):
+    for maker, find in _MAKERS.items():
         try:
             found = find(lines, split)
         except DataError:
@@ -64,9 +66,9 @@ def _head(lines: Sequence[str], probe: bool = False) -> Any:
 
 def with_times(head: ExportHead, dialect: Dialect) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Heads, kinds and units of the columns, and of one more for the times that follow from the rate."""
-    more = head.rate is not None
+    more = head.rate is not None and not head.is_timed
     return (
-        (*dialect.heads, *[_STAMP] * more),
+        (*dialect.heads, *[STAMP] * more),
         (*dialect.kinds, *["number"] * more),
         (*dialect.measured_in, *["s"] * more),
     )
@@ -75,8 +77,12 @@ def with_times(head: ExportHead, dialect: Dialect) -> tuple[tuple[str, ...], tup
 def export_table(head: ExportHead, table: Table, roles: Roles, chosen: bool) -> tuple[Table, Roles]:
     """A table with times, gaps as faults, and without the columns that hold nothing, unless they were `chosen`."""
     columns = list(table.columns)
-    if head.rate is not None:
+    if head.rate is not None and not head.is_timed:
         columns.append(_stamps(table, columns, head.rate))
+    elif head.rate is not None and "frame" in head.heads:
+        k, frames = head.heads.index(STAMP), columns[head.heads.index("frame")]
+        even = columns[k][0] + (frames - frames[0]) / head.rate
+        columns[k] = np.where(np.abs(columns[k] - even) <= _ROUNDED, even, columns[k])
     if head.zeros_are_gaps:
         _mark_zeros(table.heads, columns)
     missing = {k: np.isnan(columns[k]) for k in roles.positions}

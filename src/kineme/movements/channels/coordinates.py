@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.wraps import period_of, without_wraps
-from kineme.movements.rotations.quaternions import conjugate, product
+from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, product
 from kineme.movements.rotations.rotation_vectors import log
 from kineme.validation import Array
 
@@ -18,6 +20,15 @@ def columns_of(channels: Channels) -> list[slice]:
     """The columns of each channel."""
     ends = np.cumsum([len(one.columns) for one in channels]).tolist()
     return [slice(end - len(one.columns), end) for end, one in zip(ends, channels, strict=True)]
+
+
+def off_norm(columns: Array, channels: Channels) -> Iterator[tuple[Channel, NDArray[np.intp], Array]]:
+    """Each orientation with the rows where it is no unit quaternion, if there are any, and all norms (total,)."""
+    for one, some in zip(channels, columns_of(channels), strict=True):
+        if one.kind == "orientation":
+            norms = np.linalg.norm(columns[:, some], axis=1)
+            if len(rows := np.flatnonzero(~(np.abs(norms - 1.0) <= NORM_TOLERANCE))):
+                yield one, rows, norms
 
 
 def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -88,7 +88,7 @@ class Demonstrations(Sequence[Trajectory]):
         return cls.of_movements(collect_arrays(arrays, labels, times, names, copy))
 
     @classmethod
-    def from_dataframe(
+    def from_dataframe(  # noqa: PLR0913 - one parameter per question that columns may leave open
         cls,
         frames: Any,
         *,
@@ -97,6 +97,7 @@ class Demonstrations(Sequence[Trajectory]):
         movement: Column | Sequence[Column] | None = None,
         label: Column | None = None,
         units: str | float | None = None,
+        kinds: Mapping[str, str] | None = None,
     ) -> Demonstrations:
         """Collect the movements of data frames of pandas or polars, by the names of their columns, as in files.
 
@@ -116,6 +117,8 @@ class Demonstrations(Sequence[Trajectory]):
         units : {"s", "ms", "us", "ns"} or float, optional
             Unit of the time stamps, or its length in seconds; by default told by the name or by the stamps' size. As a
             number it is also the step between samples of frames without time stamps.
+        kinds : mapping, optional
+            What columns are, see `read_recordings`: an orientation is learned as its rotation.
 
         Raises
         ------
@@ -126,7 +129,8 @@ class Demonstrations(Sequence[Trajectory]):
         from kineme.movements.tables.layout import Layout
 
         several = frames_of(frames) or list(frames)
-        return cls.of_movements(collect_data_frames(several, Layout(time, columns, movement, label, units)))
+        layout = Layout(time, columns, movement, label, units, kinds=kinds)
+        return cls.of_movements(collect_data_frames(several, layout))
 
     @classmethod
     def of(cls, movements: MovementsLike) -> Demonstrations:

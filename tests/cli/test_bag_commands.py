@@ -1,0 +1,81 @@
+"""Bags of ROS in the shell: what is there, what would be read, and what is learned."""
+
+import sqlite3
+from contextlib import closing
+
+import numpy as np
+import pytest
+from commands import answer, run
+
+from bag_files import KINDS, START, Maker, pose_rows, stamps, write_bag
+
+
+@pytest.fixture(params=KINDS)
+def bag(request, tmp_path):
+    m, rows = Maker(request.param), pose_rows()
+    messages = [("/camera/info", START, m.string("x")), ("/plan", START, m.joint_trajectory("a", [0], [[1]]))]
+    messages.append(("/tf_static", START, m.tf(m.transform_stamped(START, "hand", "tool", rows[0]))))
+    for k, (ns, row) in enumerate(zip(stamps(), rows, strict=True)):
+        messages.append(("/tf", ns, m.tf(m.transform_stamped(ns, "base", "hand", row))))
+        messages.append(("/joint_states", ns, m.joint_state(ns, ["a", "b"], [np.sin(k / 9), k / 9])))
+    return write_bag(tmp_path, request.param, messages, "session")
+
+
+def test_inspect_lists_topics_and_frames_and_what_to_say(bag):
+    done = run("inspect", bag)
+    assert done.returncode == 0
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["/camera/info", "std_msgs/msg/String", "1", "nothing:", "not", "a", "type", "of", "movements"] in lines
+    assert ["/joint_states", "sensor_msgs/msg/JointState", "50", "a", "movement"] in lines
+    assert ["/plan", "trajectory_msgs/msg/JointTrajectory", "1", "a", "movement", "for", "each", "message"] in lines
+    assert ["base", "hand", "50", "moves"] in lines
+    assert ["hand", "tool", "1", "is", "fixed"] in lines
+    assert "--topic /joint_states" in done.stdout
+    assert "--frame parent:child" in done.stdout
+
+
+def test_inspect_as_data(bag):
+    data = answer("inspect", bag)
+    assert data["movements"] == 0
+    assert data["contents"]["frames"][0] == {"parent": "base", "child": "hand", "transforms": 50, "the child": "moves"}
+    assert [one["topic"] for one in data["contents"]["topics"]] == sorted(
+        one["topic"] for one in data["contents"]["topics"]
+    )
+    data = answer("inspect", bag, "--topic", "/joint_states")
+    assert (data["movements"], data["dimensions"]) == (1, 2)
+    assert data["detected"][0]["columns"] == ["a", "b"]
+
+
+def test_what_is_read_is_said(bag):
+    done = run("inspect", bag, "--frame", "base:tool")
+    assert "frames base:tool: time 'header.stamp' in s (stamps of headers)" in done.stdout
+
+
+def test_topics_and_frames_are_learned(bag, tmp_path):
+    library = tmp_path / "library"
+    one = answer("learn", bag, "--topic", "/joint_states", "--label", "wave", "--library", library)
+    assert (one["added"], one["symbols"], one["problems"]) == (1, ["wave"], [])
+    assert answer("learn", bag, "--topic", "/joint_states", "--label", "wave", "--library", library)["known"] == 1
+    with closing(sqlite3.connect(library / "library.sqlite")) as opened:
+        (path, sha256, options), *others = opened.execute("SELECT path, sha256, options FROM source").fetchall()
+    assert path == str(bag)
+    assert len(sha256) == 64
+    assert "/joint_states" in options
+    assert not others
+
+
+def test_options_that_are_not_given_are_not_stored(tmp_path):
+    """A source is known by its bytes and options: new options of the shell must not make old sources new."""
+    (tmp_path / "a.csv").write_text("t,x\n" + "".join(f"{k},{k * k}\n" for k in range(5)))
+    answer("learn", tmp_path / "a.csv", "--label", "wave", "--library", tmp_path / "library")
+    with closing(sqlite3.connect(tmp_path / "library" / "library.sqlite")) as opened:
+        ((options,),) = opened.execute("SELECT options FROM source").fetchall()
+    assert "topic" not in options
+    assert "frame" not in options
+
+
+def test_a_damaged_bag_fails_with_its_name(tmp_path):
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    done = run("inspect", tmp_path / "a.mcap")
+    assert done.returncode == 1
+    assert "a.mcap: expected a bag of ROS that can be opened" in done.stderr
