@@ -47,7 +47,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     time, label : str or int, optional
         Columns of a table, by head or counted from 0. By default they are found by their heads.
     columns, movement : str or int or sequence of them, optional
-        Columns of the coordinates, and of what tells movements apart.
+        Columns of the coordinates, and of what tells movements apart. What several heads begin with, before a dot,
+        stands for all of them: ``"wrist"`` for ``wrist.x`` and ``wrist.y``.
     units : {"s", "ms", "us", "ns"} or float, optional
         Unit of the time stamps, or its length in seconds. By default told by the head or by the stamps' size. As a
         number it is also the step between samples of files without time stamps.
