@@ -22,6 +22,10 @@ _SHOWN = 10  # problems that are listed
 @library_option
 @click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")
 @click.option("--no-labels", is_flag=True, help="Store movements without labels, for kineme anchor.")
+@click.option(
+    "--labels", "table", type=click.Path(dir_okay=False, path_type=Path),
+    help="Table with columns start, end and label, which cuts a long recording; also of ELAN or Audacity.",
+)  # fmt: skip
 @click.option("--person", help="Name of who showed all movements, where others will be recognized.")
 @click.option(
     "--by-person",
@@ -40,6 +44,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Where several people show movements and others will be recognized, say who showed what, with --person or
     --by-person: kineme recognize then knows how much people differ, and calls fewer movements of new ones unknown.
 
+    A long recording is cut by a table of what happens when, with --labels: CSV, JSON, a document of ELAN or its
+    tab-delimited export, or labels of Audacity. Stretches without label are stored without.
+
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.files.recordings import root_of
@@ -51,7 +58,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         raise click.UsageError("expected --label or --no-labels, not both")
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
-    parsed, problems = _read_all(recordings, options)
+    parsed, problems = _read_all(recordings, options, options.pop("table"))
     people = [_people(path, one, person, by_person) for path, one in parsed]
     with ActionLibrary(folder, create=True) as library:
         before = library.version
@@ -80,7 +87,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     say(as_json, data, lambda: _text(data))
 
 
-def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
+def _read_all(
+    paths: tuple[Path, ...], options: dict[str, Any], table: Path | None
+) -> tuple[list[tuple[Path, Any]], list[str]]:
     """Recordings with their paths, and problems; an error if nothing could be read."""
     from kineme.errors import DataError
 
@@ -89,7 +98,7 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     first: DataError | None = None
     for path in paths:
         try:
-            one = read(path, options)
+            one = _labeled(read(path, options), table)
             parsed.append((path, one))
             problems += map(str, one.problems)
         except DataError as error:
@@ -98,6 +107,16 @@ def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tu
     if not parsed and first is not None:
         raise first
     return parsed, problems
+
+
+def _labeled(recordings: Any, table: Path | None) -> Any:
+    """The stretches that a table labels, where there is one."""
+    if table is None:
+        return recordings
+    from kineme.files.annotations.labeled_pieces import labeled_pieces
+    from kineme.files.annotations.read_labels import read_labels
+
+    return labeled_pieces(recordings, read_labels(table))
 
 
 def _people(path: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
