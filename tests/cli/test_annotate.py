@@ -111,7 +111,9 @@ def test_nothing_is_written_over(recording, library, tmp_path):
         before = out.read_bytes()
         assert run("annotate", recording, "-l", library, "-o", out).returncode == 2
         assert out.read_bytes() == before
-    assert run("annotate", recording, "-l", library, "-o", recording, "--force").returncode == 2
+    for given in (recording, tmp_path, tmp_path / "*.csv"):
+        assert run("annotate", given, "-l", library, "-o", recording, "--force").returncode == 2
+    assert recording.read_bytes() == before
     assert run("annotate", recording, "-l", library, "-o", tmp_path / "labels.csv", "--force").returncode == 0
     assert (tmp_path / "labels.csv").read_text().startswith("recording,place,start")
 

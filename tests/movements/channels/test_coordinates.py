@@ -112,3 +112,8 @@ def test_channels_that_are_no_pose_are_refused_by_name():
     two = replace(both.movements, channels=(*XYZ[:2], Q, GRIPPER), positions=both.positions[:, 1:])
     with pytest.raises(kineme.TrajectoryError, match=r"x \(position\), y \(position\), q \(orientation\)"):
         PoseDMP().learn(Demonstrations.of_movements(two))
+
+
+def test_discrete_channels_alone_are_refused():
+    with pytest.raises(kineme.SpecificationError, match="a channel that moves, got gripper, all discrete"):
+        learned(np.zeros((8, 1)), np.array([0, 8]), (GRIPPER,))
