@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.anchor import anchor
+from kineme.cli.annotate import annotate
 from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
@@ -55,6 +56,7 @@ def main() -> None:
 
 
 main.add_command(anchor)
+main.add_command(annotate)
 main.add_command(evaluate)
 main.add_command(generate)
 main.add_command(inspect)

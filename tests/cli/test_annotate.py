@@ -1,0 +1,136 @@
+"""``kineme annotate`` on a long recording of real handwriting, with rests and unknown motion between the letters."""
+
+from __future__ import annotations
+
+import json
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas
+import pytest
+from commands import answer, run, start
+
+import kineme
+from kineme.files.write_movement import write_movement
+
+RATE = 100.0
+LETTERS = ["CShape", "GShape", "Sshape"]
+ORDER = ["GShape", "NShape", "CShape", "Sshape", "GShape", "CShape"]  # NShape is of no symbol
+
+
+@pytest.fixture(scope="module")
+def demos():
+    return kineme.load_lasa([*LETTERS, "NShape"])
+
+
+@pytest.fixture(scope="module")
+def library(demos, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("annotate") / "actions"
+    with kineme.ActionLibrary(folder, create=True) as actions:
+        actions.learn(demos[np.isin(demos.labels, LETTERS)])
+    return folder
+
+
+def _long(demos, start_time=0.0):
+    """Stamps, positions, and what is shown from when to when."""
+    at, parts, truth, n = np.zeros(2), [], [], 0
+    for k, letter in enumerate(ORDER):
+        one = demos[demos.labels == letter][k % 7]
+        times = np.arange(one.times[0], one.times[-1], 1.0 / RATE)
+        path = np.column_stack([np.interp(times, one.times, x) for x in one.positions.T])
+        path = at + path - path[0]
+        rest = np.repeat(path[-1:], 60, axis=0)
+        truth.append((start_time + n / RATE, start_time + (n + len(path)) / RATE, letter))
+        parts += [path, rest]
+        n += len(path) + len(rest)
+        at = path[-1]
+    positions = np.concatenate(parts)
+    return start_time + np.arange(len(positions)) / RATE, positions, truth
+
+
+@pytest.fixture(scope="module")
+def truth(demos):
+    return _long(demos, 50.0)[2]
+
+
+@pytest.fixture
+def recording(demos, tmp_path):
+    times, positions, _ = _long(demos, 50.0)
+    return write_movement(tmp_path / "long.csv", {"times": times, "positions": positions})
+
+
+def _right(truth, rows):
+    for begin, end, letter in truth:
+        middle = 0.5 * (begin + end)
+        here = [one for one in rows if one["start"] <= middle <= one["end"]]
+        assert [one["symbol"] for one in here] == [letter if letter in LETTERS else None]
+
+
+def test_pandas_reads_what_happens_when(recording, library, truth, tmp_path):
+    out = tmp_path / "labels.csv"
+    said = answer("annotate", recording, "-l", library, "-o", out)
+    assert said["written"] == [str(out)]
+    assert said["problems"] == []
+    _right(truth, said["annotations"])
+    table = pandas.read_csv(out, keep_default_na=False)
+    assert table["symbol"].tolist() == [one["symbol"] or "" for one in said["annotations"]]
+    np.testing.assert_allclose(table["start"], [one["start"] for one in said["annotations"]])
+    assert set(table["recording"]) == {"long.csv"}
+    assert table["unknown"].tolist() == [one["unknown"] for one in said["annotations"]]
+
+
+def test_elan_and_audacity_count_from_the_first_sample(recording, library, truth, tmp_path):
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.eaf")
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.txt")
+    values = [one.text for one in ElementTree.parse(tmp_path / "long.eaf").findall(".//TIER[@TIER_ID='symbol']//*")]
+    lines = [line.split("\t") for line in (tmp_path / "long.txt").read_text().splitlines()]
+    assert [text for *_, text in lines] == [one for one in values if one and one.strip()]
+    rows = [
+        {"start": 50 + float(a), "end": 50 + float(b), "symbol": t if t != "unknown" else None} for a, b, t in lines
+    ]
+    _right(truth, rows)
+
+
+def test_several_recordings_are_files_in_a_folder_or_one_table(recording, library, tmp_path):
+    other = recording.rename(tmp_path / "other.csv")
+    recording.write_bytes(other.read_bytes())
+    out = tmp_path / "named"
+    done = run("annotate", recording, other, "-l", library, "-o", out, "--format", "audacity")
+    assert done.returncode == 0, done.stderr
+    assert sorted(one.name[-9:] for one in out.iterdir()) == ["-long.txt", "other.txt"]
+    said = answer("annotate", recording, other, "-l", library)
+    assert {one["recording"] for one in said["annotations"]} == {recording.as_posix(), other.as_posix()}
+    refused = run("annotate", recording, other, "-l", library, "-o", tmp_path / "one.eaf")
+    assert refused.returncode == 1
+    assert "name a folder" in refused.stderr
+
+
+def test_nothing_is_written_over(recording, library, tmp_path):
+    (tmp_path / "labels.csv").write_text("mine")
+    for out in (tmp_path / "labels.csv", recording):
+        before = out.read_bytes()
+        assert run("annotate", recording, "-l", library, "-o", out).returncode == 2
+        assert out.read_bytes() == before
+    assert run("annotate", recording, "-l", library, "-o", recording, "--force").returncode == 2
+    assert run("annotate", recording, "-l", library, "-o", tmp_path / "labels.csv", "--force").returncode == 0
+    assert (tmp_path / "labels.csv").read_text().startswith("recording,place,start")
+
+
+def test_a_recording_without_motion_has_no_annotations(recording, library, tmp_path):
+    still = tmp_path / "still.csv"
+    still.write_text("t,x,y\n" + "".join(f"{k / 100},1,1\n" for k in range(300)))
+    said = answer("annotate", recording, still, "-l", library)
+    assert {one["recording"] for one in said["annotations"]} == {recording.as_posix()}
+    text = run("annotate", still, "-l", library)
+    assert text.returncode == 0
+    assert "0 movements of 0 symbols" in text.stdout
+
+
+def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tmp_path):
+    shown = start("annotate", recording, "-l", library)
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stderr == ""
+    assert all(word in shown.stdout for word in ("GShape", "unknown", "start [s]", "p-value"))
+    wrote = run("annotate", recording, "-l", library, "-o", tmp_path / "a.json")
+    assert f"written to {tmp_path / 'a.json'}" in wrote.stdout
+    assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"
