@@ -122,3 +122,8 @@ def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
     np.testing.assert_allclose(learned(columns, np.array([0, 30]), channels)[-1], [0, 0, 0, 2 * lever], atol=1e-9)
     joint = (Channel("x", "angle", ("x",), "rad"), Q)
     np.testing.assert_allclose(learned(columns, np.array([0, 30]), joint)[-1], [0, 0, 0, 2], atol=1e-9)
+
+
+def test_discrete_channels_alone_are_refused():
+    with pytest.raises(kineme.SpecificationError, match="a channel that moves, got gripper, all discrete"):
+        learned(np.zeros((8, 1)), np.array([0, 8]), (GRIPPER,))

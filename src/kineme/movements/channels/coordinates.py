@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.wraps import period_of, without_wraps
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, product
@@ -61,7 +62,17 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
     from one reference it has no limit of a full turn, and it does not depend on what came before a movement but for
     an offset. A tool that is mounted differently changes nothing; a scene that is turned turns it as it turns a path.
     Beside positions it is multiplied by `lever_of` them, so that all coordinates are lengths.
+
+    Raises
+    ------
+    SpecificationError
+        Discrete channels alone: nothing moves.
     """
+    if all(one.kind == "discrete" for one in channels):
+        raise SpecificationError(
+            f"expected a channel that moves, got {', '.join(one.name for one in channels)}, all discrete; "
+            "read other columns too, or say that one is a position"
+        )
     parts, lever = [], lever_of(channels)
     for one, rows in zip(channels, columns_of(channels), strict=True):
         if one.kind == "orientation":
