@@ -37,7 +37,8 @@ class Format(click.ParamType):  # type: ignore[type-arg]
 @library_option
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path),
-    help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, or a folder.  [default: show a table]",
+    help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
+    "LeRobot data set.  [default: show a table]",
 )  # fmt: skip
 @click.option("--format", "form", type=Format(), help="Format, where the ending does not say it: csv, elan, ...")
 @click.option(
