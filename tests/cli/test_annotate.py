@@ -111,7 +111,9 @@ def test_nothing_is_written_over(recording, library, tmp_path):
         before = out.read_bytes()
         assert run("annotate", recording, "-l", library, "-o", out).returncode == 2
         assert out.read_bytes() == before
-    assert run("annotate", recording, "-l", library, "-o", recording, "--force").returncode == 2
+    for given in (recording, tmp_path, tmp_path / "*.csv"):
+        assert run("annotate", given, "-l", library, "-o", recording, "--force").returncode == 2
+    assert recording.read_bytes() == before
     assert run("annotate", recording, "-l", library, "-o", tmp_path / "labels.csv", "--force").returncode == 0
     assert (tmp_path / "labels.csv").read_text().startswith("recording,place,start")
 
@@ -134,6 +136,27 @@ def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tm
     wrote = run("annotate", recording, "-l", library, "-o", tmp_path / "a.json")
     assert f"written to {tmp_path / 'a.json'}" in wrote.stdout
     assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"
+
+
+def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, tmp_path):
+    table = pandas.DataFrame(truth, columns=["start", "end", "label"])
+    table.to_csv(tmp_path / "labels.csv", index=False)
+    learned = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (learned["added"], sorted(learned["symbols"])) == (6, sorted(set(ORDER)))
+    again = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (again["added"], again["known"]) == (0, 6)
+    said = answer("annotate", recording, "-l", tmp_path / "actions")
+    middles = [0.5 * (start + end) for start, end, _ in truth]
+    found = [one["symbol"] for middle in middles for one in said["annotations"] if one["start"] < middle < one["end"]]
+    assert found == [letter for *_, letter in truth]
+
+
+def test_what_was_annotated_is_learned_with_the_unknown_left_without_symbol(recording, library, tmp_path):
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.eaf")
+    learned = answer("learn", recording, "--labels", tmp_path / "long.eaf", "-l", tmp_path / "actions")
+    assert sorted(learned["symbols"]) == LETTERS
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as actions:
+        assert 0 < len(actions.unlabeled()) < len(actions)
 
 
 def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
