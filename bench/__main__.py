@@ -27,6 +27,7 @@ SUBJECTS = (
     "bags",
     "binning",
     "anchoring",
+    "annotate",
     "by_person",
     "nested",
 )

@@ -84,3 +84,31 @@ def test_a_recognizer_takes_poses_as_they_are_read(tmp_path):
     demos = kineme.read_recordings(tmp_path, columns=HEADS.split(",")[4:]).demonstrations
     recognizer = kineme.Recognizer().fit(demos[::2])
     assert recognizer.predict(demos[1::2]).tolist() == demos.labels[1::2].tolist()
+
+
+def test_angles_of_files_with_other_heads_are_continuous_too(tmp_path):
+    t = np.linspace(0, 1, N)
+    wrapped = np.mod(2 + 3 * t + np.pi, 2 * np.pi) - np.pi
+    for name in ("yaw", "heading", "yaw [rad]"):
+        np.savetxt(
+            tmp_path / f"{name}.csv", np.column_stack([t, wrapped]), delimiter=",", header=f"t,{name}", comments=""
+        )
+    recordings = kineme.read_recordings(tmp_path)
+    assert (len(recordings), recordings.demonstrations.channels) == (3, None)
+    np.testing.assert_allclose(np.ptp(recordings.demonstrations.positions.reshape(3, N), axis=1), 3)
+    assert len(kineme.read_recordings(tmp_path, kinds={"heading": "position"})) == 3
+
+
+@pytest.mark.parametrize("before", ["field.", "/pose/", ""])
+def test_headers_of_messages_are_no_coordinates(tmp_path, before):
+    """As `rostopic echo -p`, PlotJuggler and bagpy write them."""
+    u = np.linspace(0, 1, N)
+    q = exp(np.outer(u, [0, 0.2, 2.0]))[:, [1, 2, 3, 0]]
+    heads = ["%time", *(f"{before}header.{one}" for one in ("seq", "stamp", "stamp.nsecs", "frame_id"))]
+    heads += [f"{before}pose.position.x", *(f"{before}pose.orientation.{part}" for part in "xyzw")]
+    table = np.column_stack([1.7e18 + 1e9 * u, np.arange(N), 1.7e18 + 1e9 * u, 1e9 * u, np.zeros(N), u**2, q])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=",".join(heads), comments="")
+    recordings = kineme.read_recordings(tmp_path)
+    assert [one.kind for one in recordings.demonstrations.channels] == ["position", "orientation"]
+    assert recordings.detected[0][0].ignored == tuple(heads[1:5])
+    assert recordings.demonstrations.durations[0] == pytest.approx(1)

@@ -129,6 +129,14 @@ def test_episodes_in_another_order_are_read_and_named(tmp_path):
     assert "expected its frames in one place, got them in" in found.problems[0].reason
 
 
+def test_an_episode_without_frames_in_a_shard_that_is_there_is_named(tmp_path):
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: frames[frames["episode_index"] == 0])
+    found = kineme.read_recordings(folder)
+    assert [source.place for source in found.sources] == ["episode 0", "episode 2"]
+    assert found.problems[0].reason == "episode 1: expected frames in data/chunk-000/file-000.parquet, got none"
+
+
 def test_a_vector_of_another_length_costs_its_episode_or_its_frame(tmp_path):
     folder = write_v3(tmp_path / "set", fixed=False)
 

@@ -231,7 +231,8 @@ def test_a_row_of_units_below_the_heads_is_not_a_sample(units):
 def test_names_and_gaps_below_the_heads_are_not_units():
     rows = "".join(f"w,{k / 10},{k},{k * k}\n" for k in range(N))
     with pytest.raises(DataError, match="got nothing"):
-        read(f"label,time,x,y\nm,0,,\n{rows}".replace("m,0", "w,-1"))
+        read(f"label,time,x,y\nw,-1,,\n{rows}")
+    assert "got nothing" in read(f"label,time,x,y\nmm,,,\n{rows}").problems[0].reason
 
 
 def test_bvh_channels_are_named_by_their_joints():
@@ -260,7 +261,7 @@ def test_a_damaged_bvh_file_says_where(content, words):
 
 @pytest.fixture(scope="module")
 def c3d_bytes(tmp_path_factory):
-    """A file by ezc3d: two markers at 100 Hz, one of them lost once, and an analog channel at 1000 Hz."""
+    """A file by ezc3d: two markers at 100 Hz, each lost once, and an analog channel at 1000 Hz."""
     pytest.importorskip("c3d", reason="the package c3d reads C3D")
     ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes the file")
     content = ezc3d.c3d()
@@ -271,6 +272,9 @@ def c3d_bytes(tmp_path_factory):
     points[0] = np.arange(2 * N).reshape(2, N)
     points[:3, 1, 5] = np.nan
     content["data"]["points"] = points
+    residuals = np.zeros((1, 2, N))
+    residuals[0, 0, 7] = -1  # computed, not found, though it has a position
+    content["data"]["meta_points"] = {"residuals": residuals, "camera_masks": np.zeros((7, 2, N), bool)}
     content["parameters"]["ANALOG"]["RATE"]["value"] = [1000]
     content["parameters"]["ANALOG"]["LABELS"]["value"] = ("force",)
     content["data"]["analogs"] = np.zeros((1, 1, 10 * N))
@@ -282,11 +286,11 @@ def c3d_bytes(tmp_path_factory):
 def test_c3d_points_are_named_and_lost_ones_are_gaps(c3d_bytes):
     found = read(c3d_bytes, "a.c3d", skip="sample")
     assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")
-    np.testing.assert_allclose(found.demonstrations.positions[:, 0], np.delete(np.arange(N), 5))
-    np.testing.assert_allclose(found.demonstrations.times, np.delete(np.arange(N), 5) / 100)
+    np.testing.assert_allclose(found.demonstrations.positions[:, 0], np.delete(np.arange(N), [5, 7]))
+    np.testing.assert_allclose(found.demonstrations.times, np.delete(np.arange(N), [5, 7]) / 100)
     assert set(found.detected[0][0].measured_in) == {"mm"}
     assert "expected a point for 'RASI.x'" in found.problems[0].reason
-    assert read(c3d_bytes, "a.c3d", columns="LASI").demonstrations.lengths.tolist() == [N]
+    assert read(c3d_bytes, "a.c3d", columns="LASI", skip="sample").demonstrations.lengths.tolist() == [N - 1]
 
 
 def test_a_damaged_c3d_file_says_so(c3d_bytes):

@@ -49,7 +49,8 @@ def test_any_number_in_any_notation_is_read_to_the_last_bit(values, style, separ
         rows = [["demo", "time", "a", "b"]] + [['"one, or two"', *row] for row in rows]
     else:
         rows = [["time", "a", "b"], *rows]
-    found = read(end.join(separator.join(row) for row in rows) + end, units="s").demonstrations
+    kinds = {"a": "position", "b": "position"}  # 0, 359, 0 could be an angle
+    found = read(end.join(separator.join(row) for row in rows) + end, units="s", kinds=kinds).demonstrations
     np.testing.assert_array_equal(found.positions, np.array(values))
     np.testing.assert_array_equal(found.times, np.arange(len(values)))
 

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.anchor import anchor
+from kineme.cli.annotate import annotate
 from kineme.cli.evaluate import evaluate
 from kineme.cli.generate import generate
 from kineme.cli.inspect import inspect
@@ -18,6 +19,7 @@ from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
+from kineme.cli.segment import segment
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -55,6 +57,7 @@ def main() -> None:
 
 
 main.add_command(anchor)
+main.add_command(annotate)
 main.add_command(evaluate)
 main.add_command(generate)
 main.add_command(inspect)
@@ -64,3 +67,4 @@ for command in (*MERGE_SPLIT, *MEANING):
     library.add_command(command)
 main.add_command(recognize)
 main.add_command(reproduce)
+main.add_command(segment)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from kineme.files.check_block import movement_of, take_movements
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels, is_plain
-from kineme.movements.channels.coordinates import off_norm
+from kineme.movements.channels.coordinates import canonical, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.parsed import Block
 
@@ -23,8 +24,8 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
     """The channels of files with equally many columns, the files that have them, and problems.
 
     Kinds are found for all files together: a gripper that no file opens is one still. Files of other heads are merged
-    by the order of their columns while all are positions or angles, and then nothing is known of the channels; else
-    they are problems.
+    by the order of their columns while all are positions or angles, without the wraps of angles, and then nothing is
+    known of the channels; else they are problems.
 
     Raises
     ------
@@ -33,16 +34,9 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
     """
     heads = Counter(one.detected.columns for one in files if one.detected).most_common(1)[0][0]
     same = [one for one in files if one.detected and one.detected.columns == heads]
-    blocks = [_block(one) for one in same]
-    channels = find_channels(
-        heads,
-        np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
-        np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks])))),
-        given,
-        next(one.detected.measured_in for one in same if one.detected),
-    )
+    channels = _channels_of(same, given)
     if len(same) < len(files) and is_plain(channels):
-        return list(files), None, []
+        return _without_wraps(files, given), None, []
     problems = [
         Problem(one.path, None, f"the columns {list(one.detected.columns)} where most files have {list(heads)}")
         for one in files
@@ -50,6 +44,41 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
     ]
     checked = [_check_orientations(one, channels) for one in same]
     return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]
+
+
+def _channels_of(files: Sequence[FileRead], given: Given) -> Channels:
+    """The channels of files that all have the same heads."""
+    blocks, detected = [_block(one) for one in files], files[0].detected
+    assert detected is not None
+    return find_channels(
+        detected.columns,
+        np.concatenate([block.positions for block in blocks]) if len(blocks) > 1 else blocks[0].positions,
+        np.concatenate(([0], np.cumsum(np.concatenate([np.diff(block.offsets) for block in blocks])))),
+        given,
+        detected.measured_in,
+    )
+
+
+def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
+    """Files of several heads, in the columns of each the angles continuous."""
+    groups: dict[tuple[str, ...], list[FileRead]] = {}
+    for one in files:
+        groups.setdefault(one.detected.columns if one.detected else (), []).append(one)
+    known = {}
+    for heads, group in groups.items():
+        here = {
+            key: kind
+            for key, kind in given.items()
+            if key in heads or {name.strip() for name in key.split(",")} <= {*heads}
+        }
+        known[heads] = _channels_of(group, here)
+    result = []
+    for one in files:
+        block, channels = _block(one), known[one.detected.columns if one.detected else ()]
+        if is_plain(channels):
+            block = replace(block, positions=canonical(block.positions, block.offsets, channels))
+        result.append(one._replace(block=block))
+    return result
 
 
 def _check_orientations(one: FileRead, channels: Channels) -> tuple[FileRead, list[Problem]]:

@@ -327,9 +327,9 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             movements are looked for between a quarter of the typical stretch between rests and four times it.
         """
         from kineme.recognition.spotting import spot
+        from kineme.recognition.window_scores import Templates
 
-        comparison, references = self._fitted
-        return spot(comparison, references, self.calibration(), recording, error_rate, max_pieces)
+        return spot(Templates(*self._fitted, self.calibration()), recording, error_rate, max_pieces)
 
     def predict_partial(self, X: MovementsLike, early: Early | None = None) -> NDArray[Any]:
         """The most likely class of each movement of which only the beginning is given, shape (n,).

@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
-from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, nearest_each, score
 from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
@@ -21,9 +19,10 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
 from kineme.recognition.confidence import class_probabilities
-from kineme.recognition.conformal import Calibration, check_error_rate
+from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.window_scores import (
     Manner,
+    Progress,
     ScoredWindows,
     Templates,
     closest_classes,
@@ -66,14 +65,17 @@ class Spotted(NamedTuple):
 
 
 def spot(
-    comparison: Comparison,
-    references: References,
-    calibration: Calibration,
+    known: Templates,
     recording: MovementsLike,
     error_rate: float,
     max_pieces: int,
+    progress: Progress | None = None,
 ) -> list[Spotted]:
-    """Find movements like the references in a recording; see `Recognizer.spot`."""
+    """Find movements like the references in a recording; see `Recognizer.spot`.
+
+    `progress` is called now and then with the share of the windows that is compared.
+    """
+    comparison, references, calibration = known
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
     lasting = durations_of(references)
@@ -87,10 +89,10 @@ def spot(
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
         return []
-    known, best = _chosen(Templates(comparison, references, calibration), windows, error_rate)
+    chosen, best = _chosen(known, windows, error_rate, progress)
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
-    unknown = _left_over(known, windows.bouts, whole.times, least)
-    rows = np.concatenate((known, unknown))
+    unknown = _left_over(chosen, windows.bouts, whole.times, least)
+    rows = np.concatenate((chosen, unknown))
     if not len(rows):
         return []
     logs, similar = score(comparison, references, pieces_of(whole, rows), nearest, nearest_each)
@@ -118,12 +120,14 @@ def _as_timed(recording: MovementsLike) -> Trajectory:
     return as_recording(recording)
 
 
-def _chosen(known: Templates, windows: Windows, error_rate: float) -> tuple[Rows, NDArray[np.intp]]:
+def _chosen(
+    known: Templates, windows: Windows, error_rate: float, progress: Progress | None
+) -> tuple[Rows, NDArray[np.intp]]:
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
     motion, typical = windows.motion, expected(known.references)
-    compared = compare_windows(known, motion, windows.rows)
+    compared = compare_windows(known, motion, windows.rows, progress)
     distances = compared.scores * known.calibration.scales
     compared = weighted_by_rarity(compared, distances)
     around = surroundings(motion, windows.bouts, compared.rows)

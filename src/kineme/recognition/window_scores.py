@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -33,6 +34,8 @@ _COMMON = 0.2  # share of the windows of a recording whose distance to a class, 
 _RARITY = 0.3  # power with which distances count in common ones
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 _MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
+
+Progress = Callable[[float], object]  # takes the share that is done
 
 
 class Templates(NamedTuple):
@@ -123,7 +126,7 @@ def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
     return np.log(np.maximum(size, np.finfo(float).tiny)), slow
 
 
-def compare_windows(known: Templates, motion: Motion, rows: Rows) -> ComparedWindows:
+def compare_windows(known: Templates, motion: Motion, rows: Rows, progress: Progress | None = None) -> ComparedWindows:
     """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
     start, end = motion.times[rows].T
     scores = np.empty((len(rows), len(known.references.classes)))
@@ -134,6 +137,8 @@ def compare_windows(known: Templates, motion: Motion, rows: Rows) -> ComparedWin
         paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
         sizes[tile], slowness[tile] = _size_and_slowness(paths)
         scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, nearest)[0])
+        if progress is not None:
+            progress(min(1.0, (first + len(demos)) / len(rows)))
     return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
 
 

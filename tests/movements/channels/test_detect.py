@@ -95,3 +95,76 @@ def test_a_kind_that_cannot_be_is_refused(given, words):
 @pytest.mark.parametrize(("head", "unit"), [("x [mm]", "mm"), ("elbow (deg)", "deg"), ("yaw_rad", "rad"), ("x", None)])
 def test_units_in_heads(head, unit):
     assert unit_of(head) == unit
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [("yaw [rad/s]", "rad/s"), ("gyro_deg_s", None), ("joint[0]", None), ("rail_joint [mm]", "mm")],
+)
+def test_what_is_no_unit_of_an_angle(head, unit):
+    assert unit_of(head) == unit
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "linear_joint [mm]",
+        "gyro_x [deg/s]",
+        "yaw_rate",
+        "joint1_torque",
+        "joint_1.effort",
+        "joint1.velocity",
+        "x_deg_s",
+    ],
+)
+def test_jumps_of_what_is_no_angle_are_kept(head):
+    assert [one.kind for one in found("x", head)] == ["position", "position"]
+
+
+@pytest.mark.parametrize(
+    "head", ["joint[0]", "joint_1_s", "yaw (filtered)", "current_yaw", "shoulder [°]", "hip [rad]"]
+)
+def test_angles_whatever_else_their_heads_say(head):
+    assert found("x", head)[1].kind == "angle"
+
+
+def quaternion(n_odd=0):
+    q = np.column_stack([np.sin(U), np.zeros((T, 2)), np.cos(U)])
+    q[:n_odd] *= 0.5
+    return q
+
+
+def test_a_few_samples_of_another_norm_do_not_hide_a_quaternion():
+    """They cost their movement, with a message; learned as four positions they would cost all movements, without."""
+    assert [one.kind for one in found("x", "y", "z", "w", columns=quaternion(2))] == ["orientation"]
+    assert {one.kind for one in found("x", "y", "z", "w", columns=quaternion(10))} == {"position"}
+
+
+@pytest.mark.parametrize("mark", [".1", "1", "_2"])
+def test_columns_of_quaternions_with_numbers_behind_them(mark):
+    heads = [f"q{part}" for part in "xyzw"]
+    channels = found(*heads, *(head + mark for head in heads), columns=np.tile(quaternion(), 2))
+    assert [(one.name, one.kind) for one in channels] == [("q", "orientation"), ("q" + mark, "orientation")]
+    mixed = found("qx", "qy1", "qz", "qw", columns=quaternion())
+    assert {one.kind for one in mixed} == {"position"}
+
+
+def test_a_quaternion_keeps_the_columns_of_the_file_however_the_caller_lists_them():
+    given = {"d,a,b,c": "wxyz"}
+    (one,) = find_channels(list("abcd"), quaternion(), np.array([0, T]), given)
+    assert (one.columns, one.order) == (("a", "b", "c", "d"), "xyzw")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"a,b,d,e": "wxyz"}, "side by side"),
+        ({"a,b,c,d": "wxyz", "b,c,d,e": "wxyz"}, "several of 'b'"),
+        ({"a,b,c,d": "wxyz", "c": "angle"}, "several of 'c'"),
+        ({"a,a,b,c": "wxyz"}, "several of 'a'"),
+        ({"b,a,c,d": "wxyz"}, "in the order wxyz or xyzw"),
+    ],
+)
+def test_quaternions_that_cannot_be_are_refused(given, words):
+    with pytest.raises(SpecificationError, match=words):
+        find_channels(list("abcde"), np.column_stack([U] * 5), np.array([0, T]), given)

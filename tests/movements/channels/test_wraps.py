@@ -42,6 +42,9 @@ def test_steps_below_three_quarters_of_a_period_are_motion():
         ([3.0, 3.1, 3.2, 3.3], None),
         ([-3.0, -1.0, 1.0, 3.0], None),
         ([0.0, 5.0, -700.0, 1.0], None),
+        ([0.0, 0.0, 325.0, 325.0], None),
+        ([0.0, 1.0, 340.0, 341.0], None),
+        ([0.0, 350.0, 170.0, 0.0], None),
     ],
 )
 def test_only_a_jump_through_the_whole_range_shows_a_period(angles, period):
@@ -54,7 +57,13 @@ def test_a_jump_from_one_movement_to_the_next_is_none():
 
 @pytest.mark.parametrize(
     ("largest", "unit", "period"),
-    [(3.0, None, 2 * np.pi), (90.0, None, 360.0), (3.0, "deg", 360.0), (9.0, "rad", 2 * np.pi)],
+    [(3.0, None, 2 * np.pi), (90.0, None, 360.0), (3.0, "deg", 360.0), (9.0, "rad", 2 * np.pi), (90.0, "turn", 360.0)],
 )
 def test_the_unit_or_the_values_tell_the_period(largest, unit, period):
     assert period_of(np.array([0.0, largest]), unit) == period
+
+
+def test_values_beyond_every_turn_do_not_wrap():
+    ticks = np.array([0.0, 4095.0, 10.0, 4000.0])
+    assert period_of(ticks, None) == np.inf
+    assert without_wraps(ticks, np.array([0, 4]), np.inf) is ticks

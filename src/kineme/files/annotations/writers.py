@@ -9,8 +9,10 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.files.annotations.annotation import Annotation
 from kineme.files.annotations.audacity import write_audacity
+from kineme.files.annotations.copies import check_bag, check_lerobot, is_bag, is_lerobot, write_bag, write_lerobot
 from kineme.files.annotations.elan import write_elan
 from kineme.files.annotations.tables import write_csv, write_json
+from kineme.files.file_names import Movement, distinct_stems
 
 #: It takes the path to write, the annotations in order of recordings and time, and the recording that they are of as
 #: the user named it, None where there are several. It writes a whole file or folder or nothing, and returns its path.
@@ -31,12 +33,15 @@ class Writer(NamedTuple):
     copies : callable, optional
         Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
         asks for the first writer that says so of the recording.
+    check : callable, optional
+        It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
     """
 
     write: Write
     endings: tuple[str, ...]
     several: bool = True
     copies: Callable[[Path], bool] | None = None
+    check: Callable[[Path, Path], None] | None = None
 
 
 #: Name -> format.
@@ -45,6 +50,8 @@ WRITERS: dict[str, Writer] = {
     "json": Writer(write_json, (".json",)),
     "elan": Writer(write_elan, (".eaf",), several=False),
     "audacity": Writer(write_audacity, (".txt",), several=False),
+    "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),
+    "lerobot": Writer(write_lerobot, (), copies=is_lerobot, check=check_lerobot),
 }
 
 
@@ -81,20 +88,53 @@ def _fits(writer: Writer, path: Path, sources: Sequence[Path]) -> bool:
     return not path.suffix and writer.copies is not None and len(sources) == 1 and writer.copies(sources[0])
 
 
-def write_annotations(
-    path: Path, annotations: Sequence[Annotation], sources: Sequence[Path], name: str | None = None
-) -> list[Path]:
-    """Write annotations of recordings in the format that the name, the ending or the recording asks for.
+def targets_of(
+    path: Path, sources: Sequence[Path], movements: Sequence[Movement], name: str | None = None
+) -> dict[Path, list[Movement]]:
+    """The files to write, and the movements whose annotations each of them holds.
 
     Parameters
     ----------
     path : Path
-        A file; a folder, which is created, where there is a file for each movement.
-    annotations : sequence of Annotation
+        A file; a folder where a format holds one movement in a file, and the format is named.
     sources : sequence of Path
         The recordings, as the user named them.
+    movements : sequence of Movement
+        All movements that are annotated.
     name : str, optional
         Key of `WRITERS`.
+
+    Raises
+    ------
+    DataError
+        See `writer_of`; several movements for one file of a format that holds one.
+    """
+    writer = writer_of(path, name, sources)
+    if writer.check is not None:
+        writer.check(path, sources[0])
+    if writer.several:
+        return {path: list(movements)}
+    if path.suffix.lower() in writer.endings:
+        if len(movements) > 1:
+            raise DataError(
+                f"expected one movement to annotate in {path.name}, got {len(movements)}; name a folder, and the format"
+            )
+        return {path: list(movements)}
+    stems = distinct_stems(movements)
+    return {path / f"{stem}{writer.endings[0]}": [key] for stem, key in zip(stems, movements, strict=True)}
+
+
+def write_annotations(
+    path: Path,
+    annotations: Sequence[Annotation],
+    sources: Sequence[Path],
+    name: str | None = None,
+    movements: Sequence[Movement] | None = None,
+) -> list[Path]:
+    """Write annotations of recordings in the format that the name, the ending or the recording asks for.
+
+    `path`, `sources`, `movements` and `name` are those of `targets_of`; by default the movements are those that have
+    annotations. A folder is created where there is a file for each movement.
 
     Returns
     -------
@@ -104,44 +144,15 @@ def write_annotations(
     Raises
     ------
     DataError
-        See `writer_of`; several movements for one file of a format that holds one.
+        See `targets_of`.
     OSError
         A file that cannot be written.
     """
-    writer = writer_of(path, name, sources)
-    if writer.several:
-        return [writer.write(path, annotations, sources[0] if len(sources) == 1 else None)]
-    groups = by_movement(annotations)
-    if path.suffix.lower() in writer.endings:
-        if len(groups) > 1:
-            raise DataError(
-                f"expected annotations of one movement for {path.name}, got those of {len(groups)}; name a folder, and "
-                "the format"
-            )
-        return [writer.write(path, annotations, sources[0])]
-    path.mkdir(parents=True, exist_ok=True)
-    return [writer.write(file, groups[key], None) for key, file in files_of(path, list(groups), writer).items()]
-
-
-def by_movement(annotations: Sequence[Annotation]) -> dict[tuple[str, str], list[Annotation]]:
-    """The annotations of each movement, by recording and place."""
-    groups: dict[tuple[str, str], list[Annotation]] = {}
+    groups: dict[Movement, list[Annotation]] = {key: [] for key in movements or ()}
     for one in annotations:
         groups.setdefault((one.recording, one.place), []).append(one)
-    return groups
-
-
-def files_of(folder: Path, keys: Sequence[tuple[str, str]], writer: Writer) -> dict[tuple[str, str], Path]:
-    """A file of its own for each movement, named like ``long.eaf``, ``session-3.eaf``."""
-    files: dict[tuple[str, str], Path] = {}
-    taken: set[str] = set()
-    for recording, place in keys:
-        stem = "-".join(filter(None, (*Path(recording).with_suffix("").parts, place)))
-        stem = "".join(mark if mark.isalnum() or mark in "-_." else "_" for mark in stem).strip(".") or "recording"
-        name, k = stem, 1
-        while name.lower() in taken:
-            k += 1
-            name = f"{stem}-{k}"
-        taken.add(name.lower())
-        files[recording, place] = folder / f"{name}{writer.endings[0]}"
-    return files
+    targets = targets_of(path, sources, list(groups), name)
+    if any(target.parent != path.parent for target in targets):
+        path.mkdir(parents=True, exist_ok=True)
+    write, source = writer_of(path, name, sources).write, sources[0] if len(sources) == 1 else None
+    return [write(target, [one for key in keys for one in groups[key]], source) for target, keys in targets.items()]

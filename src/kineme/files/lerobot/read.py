@@ -103,12 +103,14 @@ def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> t
     parts: list[Frames] = []
     unread: dict[str, str] = {}
     taken, width = 0, sum(features.values())
-    for shard in dict.fromkeys(declared.shards):
+    episodes_of: dict[str, list[int]] = {}
+    for k, shard in zip(declared.numbers.tolist(), declared.shards, strict=True):
+        episodes_of.setdefault(shard, []).append(k)
+    for shard, episodes in episodes_of.items():
         try:
             part = read_shard(folder, shard, features, taken)
         except DataError as error:
-            lost = [int(k) for k, one in zip(declared.numbers, declared.shards, strict=True) if one == shard]
-            unread[shard] = f"{error}; left out {episode_names(lost)}"
+            unread[shard] = f"{error}; left out {episode_names(episodes)}"
             continue
         parts += part
         taken += 8 * (width + 4) * sum(len(one.values) for one in part)

@@ -30,9 +30,42 @@ DISCRETE_WORDS = frozenset(
         "suction", "vacuum",
     }
 )  # fmt: skip
+#: A column that has one of them is no angle, whatever else its head says: ``joint1_torque``, ``yaw rate``.
+_OTHER_QUANTITIES = frozenset(
+    {
+        "velocity", "velocities", "vel", "speed", "rate", "acceleration", "accelerations", "acc", "accel", "jerk",
+        "torque", "torques", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro", "omega",
+    }
+)  # fmt: skip
+_OTHER_UNITS = frozenset(
+    {
+        "m",
+        "mm",
+        "cm",
+        "dm",
+        "km",
+        "um",
+        "µm",
+        "in",
+        "ft",
+        "px",
+        "n",
+        "nm",
+        "n.m",
+        "v",
+        "mv",
+        "a",
+        "ma",
+        "w",
+        "%",
+        "ticks",
+    }
+)
+_PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
+_MOST = 0.9  # of the samples: columns w, x, y, z without another name are a quaternion if so many are of norm 1
 _LEVELS = 8  # different values of a discrete channel, at most
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
-_COMPONENT = re.compile(r"(.*?)[\W_]*([wxyz])", re.IGNORECASE)
+_COMPONENT = re.compile(r"(.*?)[\W_]*([wxyz])([\W_]?\d+)?", re.IGNORECASE)
 _UNITS_IN_WORDS = {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "radian": "rad", "radians": "rad"}
 
 
@@ -80,9 +113,12 @@ def find_channels(
 
 def unit_of(head: str) -> str | None:
     """The unit in the head of a column: what it ends in within brackets, or a word for degrees or radians."""
-    if found := _UNIT.search(head):
+    if (found := _UNIT.search(head)) and not found[1].strip().isdecimal():  # that of joint[0] is no unit
         return found[1].strip() or None
-    return next((_UNITS_IN_WORDS[word] for word in words_of(head) if word in _UNITS_IN_WORDS), None)
+    words = words_of(head)
+    return (
+        None if _PER_TIME & {*words} else next((_UNITS_IN_WORDS[one] for one in words if one in _UNITS_IN_WORDS), None)
+    )
 
 
 def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[tuple[list[int], str]]]:
@@ -97,8 +133,11 @@ def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[tup
                     f"expected the kind of a column that is read, got {name!r}; read are {[*heads]}"
                 )
         columns = [list(heads).index(name) for name in names]
+        taken = {*kinds, *(k for four, _ in orientations for k in four)}
+        if twice := [name for name, k in zip(names, columns, strict=True) if k in taken or names.count(name) > 1]:
+            raise SpecificationError(f"expected one kind of each column, got several of {twice[0]!r}; say one")
         if kind in ORDERS and len(columns) == len(kind):
-            orientations.append((columns, kind))
+            orientations.append(_in_order_of_the_file(heads, columns, kind))
         elif kind in KINDS and kind != "orientation":
             kinds.update(dict.fromkeys(columns, kind))
         else:
@@ -109,6 +148,18 @@ def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[tup
     return kinds, orientations
 
 
+def _in_order_of_the_file(heads: Sequence[str], columns: list[int], order: str) -> tuple[list[int], str]:
+    """The columns of a quaternion from left to right, and the order of its components there."""
+    pairs = sorted(zip(columns, order, strict=True))
+    four, found = [k for k, _ in pairs], "".join(part for _, part in pairs)
+    if four[-1] - four[0] != len(four) - 1 or found not in ORDERS:
+        raise SpecificationError(
+            f"expected the columns of a quaternion side by side, in the order {' or '.join(ORDERS)}, got "
+            f"{[heads[k] for k in four]} as {found}; choose the columns in such an order, in the shell with --columns"
+        )
+    return four, found
+
+
 def _orientations(heads: Sequence[str], free: list[int], columns: Array) -> list[tuple[list[int], str]]:
     """Neighboring columns w, x, y, z of one name, in one of `ORDERS`, that are quaternions of any movement."""
     parts = {k: _COMPONENT.fullmatch(_UNIT.sub("", heads[k]).strip()) for k in free}
@@ -116,7 +167,7 @@ def _orientations(heads: Sequence[str], free: list[int], columns: Array) -> list
     for k in free:
         four = [k, k + 1, k + 2, k + 3]
         matches = [parts.get(i) for i in four]
-        if not all(matches) or len({one[1].lower() for one in matches if one}) > 1:
+        if not all(matches) or len({(one[1].lower(), one[3]) for one in matches if one}) > 1:
             continue
         order = "".join(one[2].lower() for one in matches if one)
         if order in ORDERS and _quaternion_named(matches[0][1], columns[:, four]):  # type: ignore[index]
@@ -125,9 +176,9 @@ def _orientations(heads: Sequence[str], free: list[int], columns: Array) -> list
 
 
 def _quaternion_named(stem: str, q: Array) -> bool:
-    """Whether columns w, x, y, z are a quaternion: by their name, or, without one, by their norms."""
+    """Whether columns w, x, y, z are a quaternion: by their name, or, without one, by the norms of most samples."""
     return bool(set(words_of(stem)) & {"q", "quat", "quaternion", "orientation", "rotation", "rot"}) or bool(
-        (np.abs(np.linalg.norm(q, axis=1) - 1.0) < 0.01).all()
+        (np.abs(np.linalg.norm(q, axis=1) - 1.0) < 0.01).mean() >= _MOST
     )
 
 
@@ -135,7 +186,11 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp])
     words = set(words_of(head))
     if words & DISCRETE_WORDS and len(np.unique(values)) <= _LEVELS:
         return "discrete"
-    if words & ANGLE_WORDS or unit in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
+    measure = (unit or "").lower()
+    rate = "/" in measure or (words & _PER_TIME and words & set(_UNITS_IN_WORDS))
+    if rate or words & _OTHER_QUANTITIES or measure in _OTHER_UNITS:
+        return "position"
+    if words & ANGLE_WORDS or measure in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"
 
@@ -143,4 +198,4 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp])
 def _shared(heads: list[str]) -> str:
     """What the heads of a quaternion's columns share: "pose.orientation" of pose.orientation.x and so on."""
     match = _COMPONENT.fullmatch(_UNIT.sub("", heads[0]).strip())
-    return (match[1] if match else "") or "orientation"
+    return ((match[1] if match else "") or "orientation") + ((match[3] or "") if match else "")

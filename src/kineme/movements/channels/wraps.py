@@ -11,25 +11,38 @@ _TURN = 2.0 * np.pi
 #: Where recorded angles lie: between minus and plus half a turn, or from 0 to a whole one.
 _RANGES = ((-np.pi, np.pi), (0.0, _TURN), (-180.0, 180.0), (0.0, 360.0))
 _SLACK = 1e-3  # of a period, beyond the range
+_SPARSE = 0.25  # of a period: with longer steps between the jumps no rule could tell
+_UNSTEADY = 3.0  # a step through the border is at most so many times the longest other one
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
 
 
 def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
-    """The period of a column (total,) whose range, and a jump through it, show that it wraps; else None."""
-    jump = float(np.abs(_steps(angles, offsets)).max(initial=0.0))
-    least, most = float(angles.min(initial=0.0)), float(angles.max(initial=0.0))
+    """The period of a column (total,) that shows that it wraps by its range and by jumps through it; else None.
+
+    With these taken away it moves on as it moves elsewhere: a switch between two far values does not.
+    """
+    steps = np.abs(_steps(angles, offsets))
+    jump, least, most = float(steps.max(initial=0.0)), float(angles.min(initial=0.0)), float(angles.max(initial=0.0))
     for low, high in _RANGES:
         period = high - low
         if low - _SLACK * period <= least and most <= high + _SLACK * period and jump > 0.9 * period:
-            return period
+            jumps = steps > _JUMP * period
+            other = float(steps[~jumps].max(initial=0.0))
+            if other < _SPARSE * period and float(np.abs(period - steps[jumps]).max()) <= _UNSTEADY * other:
+                return period
     return None
 
 
 def period_of(angles: Array, unit: str | None) -> float:
-    """The period of an angle: 360 if its unit is the degree, or not known and its values are beyond one turn."""
-    if unit is None:
-        return _TURN if float(np.abs(angles).max(initial=0.0)) <= _TURN * (1 + _SLACK) else 360.0
-    return 360.0 if unit.lower().startswith(("deg", "°")) else _TURN
+    """The period of an angle: by its unit, or, where that says nothing, by its values.
+
+    These are taken for radians within one turn, else for degrees; beyond a turn of those nothing wraps, and the period
+    is infinite.
+    """
+    if unit is not None and unit.lower().startswith(("deg", "°", "rad")):
+        return _TURN if unit.lower().startswith("rad") else 360.0
+    largest = float(np.abs(angles).max(initial=0.0))
+    return next((period for period in (_TURN, 360.0) if largest <= period * (1 + _SLACK)), np.inf)
 
 
 def without_wraps(angles: Array, offsets: NDArray[np.intp], period: float) -> Array:

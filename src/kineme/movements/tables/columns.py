@@ -24,6 +24,7 @@ _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relati
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
 _BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
+_ROS_HEADER = re.compile(r"(.*[./])?header[./](seq|stamp|frame_id)\b.*")  # of a message
 _TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
@@ -180,9 +181,9 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """Whether a column is redundant: a counter of samples, or the velocity or acceleration of another column."""
+    """Whether a column is redundant: a counter of samples, a stamp beside the times, or another column's derivative."""
     words = {word for word in words_of(head) if not word.isdecimal()}
-    if not head.strip() or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
+    if not head.strip() or _ROS_HEADER.fullmatch(head) or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
     if derived is None:

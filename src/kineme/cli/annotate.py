@@ -1,0 +1,156 @@
+"""``kineme annotate``: what happens when in long recordings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import Finite, force_option, json_option, library_option
+from kineme.cli.output import check_new, say
+from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.output.text import counted, printable
+
+
+class Format(click.ParamType):  # type: ignore[type-arg]
+    """A key of `kineme.files.annotations.writers.WRITERS`, which --help does not load."""
+
+    name = "NAME"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+        """The name, if there is such a format."""
+        from kineme.files.annotations.writers import WRITERS
+
+        if value not in WRITERS:
+            self.fail(f"expected one of {', '.join(WRITERS)}, got {value!r}", param, ctx)
+        return str(value)
+
+
+@click.command(short_help="Find the symbols of a library in long recordings.")
+@recordings_argument
+@library_option
+@click.option(
+    "--output", "-o", type=click.Path(path_type=Path),
+    help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
+    "LeRobot data set.  [default: show a table]",
+)  # fmt: skip
+@click.option("--format", "form", type=Format(), help="Format, where the ending does not say it: csv, elan, ...")
+@click.option(
+    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
+    help="The smaller, the more a movement may differ from those of its symbol.",
+)  # fmt: skip
+@layout_options
+@json_option
+@force_option
+def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
+    """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
+
+    Every movement is searched for those of the library's symbols, with rests or without between them. Motion that is
+    like no symbol is unknown. ELAN and Audacity count seconds from the first sample; tables have the recording's clock.
+    The p-value is the share of movements of known symbols that would be as novel or more.
+
+    Example: kineme annotate long.csv --library actions/ -o long-labels.csv
+    """
+    from kineme.files.annotations.tables import as_row
+    from kineme.files.annotations.writers import targets_of, write_annotations
+    from kineme.files.entries import expanded, paths_of
+    from kineme.library.library import ActionLibrary
+    from kineme.library.recognition.annotate import annotate as find
+
+    as_json, force, error_rate = (options.pop(name) for name in ("as_json", "force", "error_rate"))
+    parsed = read(recordings, options)
+    movements = [(source.path, source.place) for source in parsed.sources]
+    sources = [one for path in recordings for one in expanded(path)]
+    if output is None and form is not None:
+        raise click.UsageError("expected --output with --format")
+    if output is not None:
+        for target in targets_of(output, sources, movements, form):
+            check_new(target, force, *sources, *paths_of(recordings, parsed))
+            _check_folder(target, force)
+    with ActionLibrary(folder, read_only=True) as library, _progress(parsed) as progress:
+        found = find(library.store, parsed, error_rate, progress)
+    written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
+    data = {
+        "annotations": [as_row(one) for one in found.annotations],
+        "seconds": float(parsed.demonstrations.durations.sum()),
+        "calibrated": found.calibrated,
+        "written": [str(one) for one in written],
+        "problems": [str(one) for one in (*parsed.problems, *found.problems)],
+    }
+    say(as_json, data, lambda: _text(data))
+
+
+def _check_folder(target: Path, force: bool) -> None:
+    if target.is_dir() and any(target.iterdir()) and not force:
+        raise click.UsageError(
+            f"expected a new folder to write, {printable(target)} is there; write over it with --force"
+        )
+
+
+@contextmanager
+def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
+    """A progress bar on a terminal, in seconds of recordings, with the time left."""
+    from tqdm import tqdm
+
+    total = float(parsed.demonstrations.durations.sum())
+    form = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
+    with tqdm(total=total, desc="annotating", bar_format=form, leave=False, disable=None) as bar:
+
+        def tell(done: float) -> None:
+            bar.update(min(done, total) - bar.n)
+
+        yield tell
+
+
+def _text(data: dict[str, Any]) -> str:
+    from kineme.output.table import to_text
+
+    rows, written = data["annotations"], data["written"]
+    known = [one for one in rows if not one["unknown"]]
+    said = f"{counted(len(known), 'movement')} of {counted(len({one['symbol'] for one in known}), 'symbol')}"
+    lines = [f"{said}, {len(rows) - len(known):,} unknown, in {data['seconds']:,.1f} s"]
+    if rows:
+        lines.append(to_text(_totals(rows) if written else _each(rows)))
+    if not data["calibrated"]:
+        lines.append(
+            "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
+            "differ; learn more of each"
+        )
+    lines += [f"not annotated: {printable(problem)}" for problem in data["problems"]]
+    return "\n".join([*lines, *(f"written to {printable(one)}" for one in written)])
+
+
+def _each(rows: list[dict[str, Any]]) -> Any:
+    from kineme.output.table import Table
+
+    heads = ("recording", "start [s]", "end [s]", "symbol", "confidence", "p-value")
+    return Table(
+        "",
+        heads,
+        [
+            (
+                printable(f"{one['recording']} {one['place']}".strip()),
+                f"{one['start']:.2f}",
+                f"{one['end']:.2f}",
+                "unknown" if one["unknown"] else printable(one["symbol"]),
+                f"{one['confidence']:.2f}",
+                f"{one['p_value']:.2g}",
+            )
+            for one in rows
+        ],
+    )
+
+
+def _totals(rows: list[dict[str, Any]]) -> Any:
+    from kineme.output.table import Table
+
+    names = ["unknown" if one["unknown"] else printable(one["symbol"]) for one in rows]
+    seconds: Counter[str] = Counter()
+    for name, one in zip(names, rows, strict=True):
+        seconds[name] += one["end"] - one["start"]
+    counts = Counter(names).most_common()
+    return Table("", ("symbol", "times", "seconds"), [(name, f"{n:,}", f"{seconds[name]:,.1f}") for name, n in counts])

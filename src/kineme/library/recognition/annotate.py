@@ -1,0 +1,128 @@
+"""What happens when in long recordings, by the symbols of a library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.errors import KinemeError
+from kineme.files.annotations.annotation import Annotation
+from kineme.files.merge_files import Recordings, Source
+from kineme.files.problem import Problem
+from kineme.library.recognition.members import Members, members_of
+from kineme.library.recognition.recognize import EXHAUSTIVE, known_members
+from kineme.library.storage.store import Store
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.known_classes import KnownClasses
+from kineme.recognition.spotting import Spotted, spot
+from kineme.recognition.window_scores import Templates
+from kineme.sampling import evenly_spaced
+
+_OF_EACH = 10  # members of a symbol that windows of a recording are compared with, evenly spaced; more take longer
+_MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
+
+
+class Annotated(NamedTuple):
+    """What happens when in recordings.
+
+    Attributes
+    ----------
+    annotations : list of Annotation
+        In the order of the recordings, and of time.
+    problems : list of Problem
+        Recordings in which nothing can be looked for, and why.
+    calibrated : bool
+        Whether the p-values of every symbol are calibrated at the error rate, as in `Answer`; else they are a guess.
+    """
+
+    annotations: list[Annotation]
+    problems: list[Problem]
+    calibrated: bool
+
+
+def annotate(
+    store: Store, recordings: Recordings, error_rate: float = 0.05, progress: Callable[[float], object] | None = None
+) -> Annotated:
+    """Find the movements of a library's symbols in long recordings, and unknown motion between them.
+
+    Parameters
+    ----------
+    store : Store
+        The library, ``ActionLibrary.store``.
+    recordings : Recordings
+        Each movement is searched on its own.
+    error_rate : float, default 0.05
+        As in `Recognizer.spot`.
+    progress : callable, optional
+        Called now and then with the seconds of recordings that are done.
+
+    Raises
+    ------
+    SpecificationError
+        No movement belongs to a symbol, or an error rate out of range.
+    """
+    known = spotting_classes(store)
+    annotations, problems, done = [], [], 0.0
+    for one, source in zip(recordings.demonstrations, recordings.sources, strict=True):
+        before = done
+
+        def tell(share: float, before: float = before, duration: float = one.duration) -> None:
+            if progress is not None:
+                progress(before + share * duration)
+
+        try:
+            found = spot_known(known, one, error_rate, tell)
+        except KinemeError as error:
+            where = f"{source.place}: " if source.place else ""
+            problems.append(Problem(source.path, None, f"{where}{error}", type(error)))
+        else:
+            annotations += annotations_of(found, one, source)
+        done += one.duration
+        tell(1.0)
+    return Annotated(annotations, problems, bool(known.calibration.calibrated(error_rate).all()))
+
+
+def spotting_classes(store: Store) -> KnownClasses:
+    """What recordings are searched for: the symbols by at most ten members each, and 1000 in all."""
+    members = members_of(store)
+    return known_members(store, _some(members, max(1, min(_OF_EACH, EXHAUSTIVE // len(members.names)))))
+
+
+def spot_known(
+    known: KnownClasses, recording: Trajectory, error_rate: float, progress: Callable[[float], object] | None = None
+) -> list[Spotted]:
+    """Find movements of known classes in a recording, see `Recognizer.spot`."""
+    templates = Templates(known.comparison, known.references, known.calibration)
+    return spot(templates, recording, error_rate, _MAX_PIECES, progress)
+
+
+def annotations_of(found: list[Spotted], recording: Trajectory, source: Source) -> list[Annotation]:
+    """What was spotted in a recording of that source."""
+    origin = float(recording.times[0])
+    return [
+        Annotation(
+            source.path,
+            source.place,
+            one.start,
+            one.end,
+            None if one.label is None else str(one.label),
+            one.p_known,
+            one.confidence,
+            origin,
+        )
+        for one in found
+    ]
+
+
+def _some(members: Members, most: int) -> Members:
+    """At most so many members of each symbol, evenly spaced."""
+    ends = np.append(members.first, len(members.ids))
+    rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]
+    kept = np.concatenate(rows)
+    first = np.cumsum([0, *(len(one) for one in rows[:-1])])
+    groups = None if members.groups is None else members.groups[kept]
+    return replace(members, ids=members.ids[kept], first=first, groups=groups)

@@ -1,0 +1,188 @@
+"""``kineme annotate`` on a long recording of real handwriting, with rests and unknown motion between the letters."""
+
+from __future__ import annotations
+
+import json
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas
+import pytest
+from commands import answer, run, start
+
+import kineme
+from kineme.files.write_movement import write_movement
+
+RATE = 100.0
+LETTERS = ["CShape", "GShape", "Sshape"]
+ORDER = ["GShape", "NShape", "CShape", "Sshape", "GShape", "CShape"]  # NShape is of no symbol
+
+
+@pytest.fixture(scope="module")
+def demos():
+    return kineme.load_lasa([*LETTERS, "NShape"])
+
+
+@pytest.fixture(scope="module")
+def library(demos, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("annotate") / "actions"
+    with kineme.ActionLibrary(folder, create=True) as actions:
+        actions.learn(demos[np.isin(demos.labels, LETTERS)])
+    return folder
+
+
+def _long(demos, start_time=0.0):
+    """Stamps, positions, and what is shown from when to when."""
+    at, parts, truth, n = np.zeros(2), [], [], 0
+    for k, letter in enumerate(ORDER):
+        one = demos[demos.labels == letter][k % 7]
+        times = np.arange(one.times[0], one.times[-1], 1.0 / RATE)
+        path = np.column_stack([np.interp(times, one.times, x) for x in one.positions.T])
+        path = at + path - path[0]
+        rest = np.repeat(path[-1:], 60, axis=0)
+        truth.append((start_time + n / RATE, start_time + (n + len(path)) / RATE, letter))
+        parts += [path, rest]
+        n += len(path) + len(rest)
+        at = path[-1]
+    positions = np.concatenate(parts)
+    return start_time + np.arange(len(positions)) / RATE, positions, truth
+
+
+@pytest.fixture(scope="module")
+def truth(demos):
+    return _long(demos, 50.0)[2]
+
+
+@pytest.fixture
+def recording(demos, tmp_path):
+    times, positions, _ = _long(demos, 50.0)
+    return write_movement(tmp_path / "long.csv", {"times": times, "positions": positions})
+
+
+def _right(truth, rows):
+    for begin, end, letter in truth:
+        middle = 0.5 * (begin + end)
+        here = [one for one in rows if one["start"] <= middle <= one["end"]]
+        assert [one["symbol"] for one in here] == [letter if letter in LETTERS else None]
+
+
+def test_pandas_reads_what_happens_when(recording, library, truth, tmp_path):
+    out = tmp_path / "labels.csv"
+    said = answer("annotate", recording, "-l", library, "-o", out)
+    assert said["written"] == [str(out)]
+    assert said["problems"] == []
+    _right(truth, said["annotations"])
+    table = pandas.read_csv(out, keep_default_na=False)
+    assert table["symbol"].tolist() == [one["symbol"] or "" for one in said["annotations"]]
+    np.testing.assert_allclose(table["start"], [one["start"] for one in said["annotations"]])
+    assert set(table["recording"]) == {"long.csv"}
+    assert table["unknown"].tolist() == [one["unknown"] for one in said["annotations"]]
+
+
+def test_elan_and_audacity_count_from_the_first_sample(recording, library, truth, tmp_path):
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.eaf")
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.txt")
+    values = [one.text for one in ElementTree.parse(tmp_path / "long.eaf").findall(".//TIER[@TIER_ID='symbol']//*")]
+    lines = [line.split("\t") for line in (tmp_path / "long.txt").read_text().splitlines()]
+    assert [text for *_, text in lines] == [one for one in values if one and one.strip()]
+    rows = [
+        {"start": 50 + float(a), "end": 50 + float(b), "symbol": t if t != "unknown" else None} for a, b, t in lines
+    ]
+    _right(truth, rows)
+
+
+def test_several_recordings_are_files_in_a_folder_or_one_table(recording, library, tmp_path):
+    other = recording.rename(tmp_path / "other.csv")
+    recording.write_bytes(other.read_bytes())
+    out = tmp_path / "named"
+    done = run("annotate", recording, other, "-l", library, "-o", out, "--format", "audacity")
+    assert done.returncode == 0, done.stderr
+    assert sorted(one.name[-9:] for one in out.iterdir()) == ["-long.txt", "other.txt"]
+    said = answer("annotate", recording, other, "-l", library)
+    assert {one["recording"] for one in said["annotations"]} == {recording.as_posix(), other.as_posix()}
+    refused = run("annotate", recording, other, "-l", library, "-o", tmp_path / "one.eaf")
+    assert refused.returncode == 1
+    assert "name a folder" in refused.stderr
+
+
+def test_nothing_is_written_over(recording, library, tmp_path):
+    (tmp_path / "labels.csv").write_text("mine")
+    for out in (tmp_path / "labels.csv", recording):
+        before = out.read_bytes()
+        assert run("annotate", recording, "-l", library, "-o", out).returncode == 2
+        assert out.read_bytes() == before
+    for given in (recording, tmp_path, tmp_path / "*.csv"):
+        assert run("annotate", given, "-l", library, "-o", recording, "--force").returncode == 2
+    assert recording.read_bytes() == before
+    assert run("annotate", recording, "-l", library, "-o", tmp_path / "labels.csv", "--force").returncode == 0
+    assert (tmp_path / "labels.csv").read_text().startswith("recording,place,start")
+
+
+def test_a_recording_without_motion_has_no_annotations(recording, library, tmp_path):
+    still = tmp_path / "still.csv"
+    still.write_text("t,x,y\n" + "".join(f"{k / 100},1,1\n" for k in range(300)))
+    said = answer("annotate", recording, still, "-l", library)
+    assert {one["recording"] for one in said["annotations"]} == {recording.as_posix()}
+    text = run("annotate", still, "-l", library)
+    assert text.returncode == 0
+    assert "0 movements of 0 symbols" in text.stdout
+
+
+def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tmp_path):
+    shown = start("annotate", recording, "-l", library)
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stderr == ""
+    assert all(word in shown.stdout for word in ("GShape", "unknown", "start [s]", "p-value"))
+    wrote = run("annotate", recording, "-l", library, "-o", tmp_path / "a.json")
+    assert f"written to {tmp_path / 'a.json'}" in wrote.stdout
+    assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"
+
+
+def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, tmp_path):
+    table = pandas.DataFrame(truth, columns=["start", "end", "label"])
+    table.to_csv(tmp_path / "labels.csv", index=False)
+    learned = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (learned["added"], sorted(learned["symbols"])) == (6, sorted(set(ORDER)))
+    again = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (again["added"], again["known"]) == (0, 6)
+    said = answer("annotate", recording, "-l", tmp_path / "actions")
+    middles = [0.5 * (start + end) for start, end, _ in truth]
+    found = [one["symbol"] for middle in middles for one in said["annotations"] if one["start"] < middle < one["end"]]
+    assert found == [letter for *_, letter in truth]
+
+
+def test_what_was_annotated_is_learned_with_the_unknown_left_without_symbol(recording, library, tmp_path):
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.eaf")
+    learned = answer("learn", recording, "--labels", tmp_path / "long.eaf", "-l", tmp_path / "actions")
+    assert sorted(learned["symbols"]) == LETTERS
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as actions:
+        assert 0 < len(actions.unlabeled()) < len(actions)
+
+
+def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
+    """Written by pandas; each frame says what its episode shows."""
+    times, positions, _ = _long(demos)
+    positions = positions.astype(np.float32)
+    names, source = ["x", "y"], tmp_path / "set"
+    counter = {"dtype": "int64", "shape": [1], "names": None}
+    features = {"observation.state": {"dtype": "float32", "shape": [2], "names": names}}
+    features |= dict.fromkeys(("timestamp", "frame_index", "episode_index", "index", "task_index"), counter)
+    info = {"codebase_version": "v3.0", "fps": RATE, "features": features, "total_episodes": 1, "chunks_size": 1000}
+    info["data_path"] = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+    k = np.arange(len(positions))
+    frames = {"observation.state": list(positions), "timestamp": times.astype(np.float32), "frame_index": k}
+    frames |= {"episode_index": 0 * k, "index": k, "task_index": 0 * k}
+    episodes = {"episode_index": [0], "length": [len(k)], "data/chunk_index": [0], "data/file_index": [0]}
+    for path, table in (("data/chunk-000/file-000", frames), ("meta/episodes/chunk-000/file-000", episodes)):
+        (source / path).parent.mkdir(parents=True)
+        pandas.DataFrame(table).to_parquet(source / f"{path}.parquet")
+    (source / "meta" / "info.json").write_text(json.dumps(info))
+    said = answer("annotate", source, "-l", library, "-o", tmp_path / "named")
+    assert said["written"] == [str(tmp_path / "named")]
+    new = pandas.read_parquet(tmp_path / "named" / "data" / "chunk-000" / "file-000.parquet")
+    for rows in new["language_persistent"]:
+        assert [json.loads(row["content"])["symbol"] for row in rows] == [one["symbol"] for one in said["annotations"]]
+    _right(_long(demos)[2], said["annotations"])
+    again = run("annotate", source, "-l", library, "-o", tmp_path / "named", "--force")
+    assert again.returncode
+    assert "is there; name another, or remove it" in " ".join(again.stderr.split())
