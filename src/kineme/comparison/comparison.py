@@ -77,7 +77,7 @@ class Comparison:
         if demos.n_dims != self.n_dims:
             raise TrajectoryError(
                 f"expected movements of {self.n_dims} dimensions as in fit, got {demos.n_dims}; "
-                "choose them by columns= of read_recordings, in the shell --columns"
+                "select the dimensions by columns= of read_recordings, in the shell --columns"
             )
         return demos
 
