@@ -71,7 +71,7 @@ def test_learning_again_adds_nothing_also_from_another_place(recordings, tmp_pat
     assert answer("learn", recordings, "-l", library)["known"] == 14
     moved = recordings.rename(tmp_path / "elsewhere")
     again = answer("learn", moved, moved / "CShape" / "0.csv", "-l", library)
-    assert (again["added"], again["known"], again["movements"]) == (0, 15, 14)
+    assert (again["added"], again["known"], again["movements"]) == (0, 14, 14)  # a file that is named twice counts once
 
 
 def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_path):

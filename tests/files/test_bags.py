@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 
 import kineme
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, write_bag
 from kineme.files.limits import VARIABLE
 from kineme.files.recordings import read_recording, read_recordings
 

@@ -1,5 +1,6 @@
 """Bags that other programs wrote: ROS 1 and ROS 2 themselves, where they are installed, and the package mcap."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 import kineme
 from bag_files import Maker, pose_rows, stamps, store
 from kineme.files.recordings import read_recordings
+from kineme.files.ros.add_topic import copy_with_topic
 
 _ROS_1 = """
 import sys, math
@@ -83,6 +85,32 @@ def test_a_plan_of_ros_1(bag):
     (movement,) = read_recordings(bag, topic="/plan").demonstrations
     np.testing.assert_array_equal(movement.recorded, np.arange(200)[:, None] * [1, -1])
     np.testing.assert_allclose(movement.times, np.arange(200) / 50, atol=1e-8)
+
+
+_READ = """
+import hashlib, json, sys, rosbag
+with rosbag.Bag(sys.argv[1]) as bag:
+    said = [(t.to_nsec(), m.data) for _, m, t in bag.read_messages("/kineme/annotations")]
+    others = [(topic, raw[0], raw[2], hashlib.md5(raw[1]).hexdigest(), t.to_nsec())
+              for topic, raw, t in bag.read_messages(raw=True) if topic != "/kineme/annotations"]
+    info = bag.get_type_and_topic_info().topics
+    print(json.dumps([said, others, {name: one.message_count for name, one in info.items()}]))
+"""
+
+
+def _read_by_ros(path):
+    run = subprocess.run([_PYTHON, "-c", _READ, str(path)], capture_output=True, text=True, check=True)
+    return json.loads(run.stdout)
+
+
+def test_ros_1_reads_a_copy_with_a_topic_more(bag, tmp_path):
+    texts = [(1_700_000_001 * 10**9 + 7, '{"symbol": "né"}'), (1_700_000_001 * 10**9 + 9, "b")]
+    copy_with_topic(bag, tmp_path / "named.bag", "/kineme/annotations", lambda first, last: texts)
+    _, before, counts = _read_by_ros(bag)
+    said, after, all_counts = _read_by_ros(tmp_path / "named.bag")
+    assert said == [list(one) for one in texts]
+    assert after == before
+    assert all_counts == {**counts, "/kineme/annotations": 2}
 
 
 def test_a_bag_of_ros_1_that_was_cut_off(bag, tmp_path):

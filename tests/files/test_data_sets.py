@@ -8,10 +8,11 @@ import pytest
 
 import kineme
 from kineme.files import formats
+from kineme.files.entries import root_of
 from kineme.files.folders import files_under
 from kineme.files.formats import DataSet, Format, data_set_of
 from kineme.files.limits import VARIABLE
-from kineme.files.recordings import read_recording, read_recordings, root_of
+from kineme.files.recordings import read_recording, read_recordings
 from kineme.movements.tables.parsed import Block, Detected, Parsed
 
 X = np.sin(np.arange(24.0)).reshape(12, 2)

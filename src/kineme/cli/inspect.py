@@ -9,20 +9,20 @@ import click
 
 from kineme.cli.options import json_option
 from kineme.cli.output import say
-from kineme.cli.reading import layout_options, read
+from kineme.cli.reading import layout_options, read, recordings_argument
 
 
 @click.command(short_help="Summarize a set of recordings.")
-@click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
+@recordings_argument
 @layout_options
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
 @json_option
-def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) -> None:
-    """Inspect RECORDINGS, a folder or a file, or - for CSV from the standard input.
+def inspect(recordings: tuple[Path, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
+    """Inspect RECORDINGS: files, folders, patterns of them, or - for CSV from the standard input.
 
     Shows, per label: how many movements, how long, sampled how fast and how evenly, with which gaps. Below: how the
     files were understood, movements that occur twice, and what could not be read and why. In a folder, the name of
-    the innermost folder is the label. Of a ROS bag, its topics and frames are listed first.
+    the innermost folder is the label. Of one ROS bag, its topics and frames are listed first.
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
@@ -32,13 +32,13 @@ def inspect(recordings: Path, plot: Path | None, as_json: bool, **options: Any) 
     from kineme.files.inspection.inspect import nothing_read
     from kineme.files.inspection.report import as_data, as_words
 
-    contents = contents_of(recordings)
+    contents = contents_of(recordings[0]) if len(recordings) == 1 else []
     try:
         recorded = read(recordings, options)
     except DataError as error:
         if not contents or plot is not None:
             raise
-        summary = nothing_read(str(recordings), str(error))
+        summary = nothing_read(str(recordings[0]), str(error))
         text = f"not read: {error}"
     else:
         if plot is not None:

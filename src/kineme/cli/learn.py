@@ -11,14 +11,14 @@ import click
 
 from kineme.cli.options import json_option, library_option
 from kineme.cli.output import say
-from kineme.cli.reading import layout_options, read
+from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
 
 _SHOWN = 10  # problems that are listed
 
 
 @click.command(short_help="Store recordings in an action library.")
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
+@recordings_argument
 @library_option
 @click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")
 @click.option("--no-labels", is_flag=True, help="Store movements without labels, for kineme anchor.")
@@ -32,7 +32,7 @@ _SHOWN = 10  # problems that are listed
 @layout_options
 @json_option
 def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
-    """Learn RECORDINGS, files or folders, or - for CSV from the standard input, into a library.
+    """Learn RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into a library.
 
     The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements
     that are stored already are not stored again; what cannot be read is listed, and the rest is learned.
@@ -42,7 +42,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
 
     Example: kineme learn recordings/ --library actions/
     """
-    from kineme.files.recordings import root_of
+    from kineme.files.entries import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -51,67 +51,41 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
         raise click.UsageError("expected --label or --no-labels, not both")
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
-    parsed, problems = _read_all(recordings, options)
-    people = [_people(path, one, person, by_person) for path, one in parsed]
+    parsed = read(recordings, options)
+    root = root_of(*(path for path in recordings if str(path) != "-"))
+    people = _people(root, parsed, person, by_person)
+    labels = [None if no_labels else each if label is None else label for each in parsed.labels]
     with ActionLibrary(folder, create=True) as library:
         before = library.version
-        reports = [
-            _learn(
-                library,
-                root_of(path),
-                one,
-                options,
-                [None if no_labels else each if label is None else label for each in one.labels],
-                groups,
-            )
-            for (path, one), groups in zip(parsed, people, strict=True)
-        ]
+        report = _learn(library, root, parsed, options, labels, people)
         data = {
             "library": str(folder),
-            "added": sum(one.added for one in reports),
-            "known": sum(one.known for one in reports),
-            "joined": _joined(library, before) if any(one.known for one in reports) else 0,
-            "symbols": [name for one in reports for name in one.symbols],
+            "added": report.added,
+            "known": report.known,
+            "joined": _joined(library, before) if report.known else 0,
+            "symbols": list(report.symbols),
             "movements": len(library),
-            "people": sorted({one for groups in people for one in groups or () if one is not None}),
+            "people": sorted({one for one in people or () if one is not None}),
             "version": library.version,
-            "problems": problems,
+            "problems": list(map(str, parsed.problems)),
         }
     say(as_json, data, lambda: _text(data))
 
 
-def _read_all(paths: tuple[Path, ...], options: dict[str, Any]) -> tuple[list[tuple[Path, Any]], list[str]]:
-    """Recordings with their paths, and problems; an error if nothing could be read."""
-    from kineme.errors import DataError
-
-    parsed: list[tuple[Path, Any]] = []
-    problems: list[str] = []
-    first: DataError | None = None
-    for path in paths:
-        try:
-            one = read(path, options)
-            parsed.append((path, one))
-            problems += map(str, one.problems)
-        except DataError as error:
-            first = first or error
-            problems.append(str(error))
-    if not parsed and first is not None:
-        raise first
-    return parsed, problems
-
-
-def _people(path: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
+def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:
     """Who showed each movement, as far as the options and the recordings say."""
     from kineme.errors import DataError
     from kineme.files.people import each_person
 
+    if recordings.people is not None and person is not None:
+        raise click.UsageError("expected --person or {person} in --label-pattern, not both")
     if not by_person:
-        return None if person is None else [person] * len(recordings)
-    people = each_person(path, recordings.sources)
+        return recordings.people if person is None else [person] * len(recordings)
+    people = each_person(root, recordings.sources)
     if not any(people):
         raise DataError(
-            f"expected {path} to say who showed its movements, by folders person/label/recording or an array people in "
-            "an archive, got neither; name them with --person"
+            f"expected {recordings.sources[0].path} to say who showed its movements, by folders person/label/recording "
+            "or an array people in an archive, got neither; name them with --person"
         )
     return people
 

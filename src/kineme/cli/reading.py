@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,33 @@ class Unit(click.ParamType):  # type: ignore[type-arg]
             return float(value)
         except ValueError:
             return str(value)
+
+
+class Recording(click.Path):
+    """A file, a folder or a pattern of them."""
+
+    def __init__(self) -> None:
+        super().__init__(allow_dash=True, path_type=Path)
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """The path; of an empty text none, since it would mean the current folder."""
+        if str(value) == "":
+            self.fail("expected a file or a folder, got an empty name; the current folder is .", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Level(click.ParamType):  # type: ignore[type-arg]
+    """What a label comes from: task, folder, or a level of folders."""
+
+    name = "task|folder|LEVEL"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str | int:
+        """A number if the text is one, else the word."""
+        if value in {"task", "folder"} or isinstance(value, int):
+            return value
+        if not value.isdecimal() or int(value) < 1:
+            self.fail(f"expected task, folder or a level from 1, the innermost, got {value!r}", param, ctx)
+        return int(value)
 
 
 class Heads(click.ParamType):  # type: ignore[type-arg]
@@ -74,13 +101,23 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--frame", multiple=True, callback=_or_none, metavar="PARENT:CHILD",
         help="Pose of one frame of a ROS bag in another.",
     ),
+    click.option(
+        "--label-pattern", metavar="PATTERN",
+        help="File names that say label and person, as {person}_{label}_{n}.csv; {n} is a number.",
+    ),
+    click.option(
+        "--label-by", type=Level(),
+        help="Label by the task of LeRobot, by the innermost folder, or by the folder so many levels up.",
+    ),
+    click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
 
 
 #: Names of the parameters that `layout_options` adds.
 LAYOUT_OPTIONS = (
-    "time", "columns", "movement", "label_column", "units", "skip", "kinds", "topic", "frame", "follow_links",
+    "time", "columns", "movement", "label_column", "units", "skip", "kinds", "topic", "frame",
+    "label_pattern", "label_by", "trim", "follow_links",
 )  # fmt: skip
 
 
@@ -91,21 +128,30 @@ def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def read(path: Path, options: dict[str, Any]) -> Any:
-    """Read recordings from a folder, a file, or - the standard input, with the `layout_options`."""
+def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the argument RECORDINGS: one or more files, folders and patterns of them."""
+    return click.argument("recordings", nargs=-1, required=True, type=Recording())(command)
+
+
+def read(paths: Path | Sequence[Path], options: dict[str, Any]) -> Any:
+    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`."""
     from kineme.files.limits import read_limited
-    from kineme.files.recordings import read_recordings, read_recordings_from_bytes
+    from kineme.files.name_rule import NameRule
+    from kineme.files.recordings import read_paths
     from kineme.movements.tables.layout import Layout
 
     known = {"label" if name == "label_column" else name: value for name, value in options.items()}
-    follow_links = known.pop("follow_links", False)
+    rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
+    how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
     known["kinds"] = dict(known.get("kinds") or ()) or None
-    if str(path) == "-":
-        return read_recordings_from_bytes(read_limited(sys.stdin.buffer), STANDARD_INPUT, Layout(**known))
-    return read_recordings(path, **known, follow_links=follow_links, progress=_watched)
+    several = [paths] if isinstance(paths, Path) else list(paths)
+    files = [one for one in several if str(one) != "-"]
+    given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
+    return read_paths(files, Layout(**known), rule, **how, progress=_watched, standard_input=given)
 
 
 def _watched(files: Any) -> Any:
+    """The files, with a progress bar on a terminal if they are several."""
     from tqdm import tqdm
 
     return tqdm(files, desc="reading", unit="file", leave=False, disable=None)  # None: on a terminal only

@@ -10,14 +10,14 @@ import click
 
 from kineme.cli.options import Finite, json_option, library_option, whole
 from kineme.cli.output import say
-from kineme.cli.reading import layout_options, read
+from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import printable
 
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
 @click.command(short_help="Recognize recordings with the symbols of a library.")
-@click.argument("recordings", type=click.Path(allow_dash=True, path_type=Path))
+@recordings_argument
 @library_option
 @click.option(
     "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
@@ -26,8 +26,10 @@ _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fe
 @click.option("--top", type=whole(1), default=3, show_default=True, help="Symbols listed per movement.")
 @layout_options
 @json_option
-def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_json: bool, **options: Any) -> None:
-    """Recognize the movements in RECORDINGS, a file or a folder, or - for CSV from the standard input.
+def recognize(
+    recordings: tuple[Path, ...], folder: Path, error_rate: float, top: int, as_json: bool, **options: Any
+) -> None:
+    """Recognize the movements in RECORDINGS: files, folders, patterns of them, or - for CSV from the standard input.
 
     A movement that is like no symbol is unknown. What cannot be read is listed.
 
@@ -36,7 +38,7 @@ def recognize(recordings: Path, folder: Path, error_rate: float, top: int, as_js
     decide what is unknown: those of the symbol (class), those of all symbols (pooled), or too few, as with one of each
     (guess); the promise says what follows. P-values are then a guess too, and the answer says so.
 
-    Example: kineme recognize new.csv --library actions/
+    Example: kineme recognize *.csv --library actions/
     """
     from kineme.library.library import ActionLibrary
 

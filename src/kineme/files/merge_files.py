@@ -42,6 +42,8 @@ class Source(NamedTuple):
     place : str
         Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
     label : str or None
+    person : str or None
+        Who showed it, where ``label_pattern`` says it.
     """
 
     path: str
@@ -50,6 +52,7 @@ class Source(NamedTuple):
     mtime: float
     place: str
     label: str | None
+    person: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +88,12 @@ class Recordings(MovementSequence):
         labels[:] = [source.label for source in self.sources]
         labels.setflags(write=False)
         return labels
+
+    @property
+    def people(self) -> list[str | None] | None:
+        """Who showed each movement, as ``{person}`` in ``label_pattern`` says it; None where it says nothing."""
+        people = [source.person for source in self.sources]
+        return people if any(people) else None
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
@@ -137,7 +146,7 @@ def merge_files(
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
     sources = tuple(
-        Source(one.path, one.sha256, one.size, one.mtime, place, label)
+        Source(one.path, one.sha256, one.size, one.mtime, place, label, one.person)
         for one in full
         for place, label in zip(_block(one).places, _block(one).labels, strict=True)
     )

@@ -32,8 +32,8 @@ def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
 def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
     """The person of each movement, or None where it is unknown.
 
-    In an npz archive, an array named as in `NAMES`, one entry for each movement. Else the folder above that of the
-    label: ``person/label/recording``.
+    Where a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one entry for
+    each movement. Else the folder above that of the label: ``person/label/recording``.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
         Not one person for each movement of a file.
     """
     of_file = cache(lambda name: _people_in(path / name if path.is_dir() else path))
-    return [_person(source, of_file(source.path)) for source in sources]
+    return [source.person or _person(source, of_file(source.path)) for source in sources]
 
 
 def _person(source: Source, listed: list[str] | None) -> str | None:

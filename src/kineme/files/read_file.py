@@ -47,6 +47,7 @@ class FileRead(NamedTuple):
     detected: Detected | None
     block: Block | None
     problems: list[Problem]
+    person: str | None = None  # who showed the movements, where the name of the file says it
 
 
 def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = False) -> FileRead:

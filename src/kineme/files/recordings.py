@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kineme.errors import DataError
-from kineme.files.folders import files_under
+from kineme.errors import DataError, SpecificationError
+from kineme.files.entries import entries_of, in_words, name_of
 from kineme.files.formats import data_set_of
 from kineme.files.limits import max_file_bytes
 from kineme.files.merge_files import Recordings, merge_files
+from kineme.files.name_rule import TASK, NameRule
 from kineme.files.read_file import format_of, read_bytes, read_file
+from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -20,7 +22,7 @@ Progress = Callable[[Sequence[Path]], Iterable[Path]]
 
 
 def read_recordings(  # noqa: PLR0913 - one parameter per question that a table of samples may leave open
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     *,
     time: Column | None = None,
     columns: Column | Sequence[Column] | None = None,
@@ -31,10 +33,13 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     kinds: Mapping[str, str] | None = None,
     topic: str | Sequence[str] | None = None,
     frame: str | Sequence[str] | None = None,
+    label_pattern: str | None = None,
+    label_by: str | int | None = None,
+    trim: bool = False,
     follow_links: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
-    """Read all movements of a folder, a file, or a data set that is a folder.
+    """Read all movements of a folder, a file, a data set that is a folder, or of several of them.
 
     In a folder, a movement that carries no label itself has the name of its file's innermost folder; files directly
     in the folder that is read have none. Hidden files are passed over. What cannot be read is listed, the rest is
@@ -42,8 +47,10 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
 
     Parameters
     ----------
-    path : str or Path
+    path : str or Path or sequence of them
         A folder, a file of a format in `kineme.files.formats.FORMATS`, or a folder of `DATA_SETS` there: one source.
+        A pattern such as ``"optitrack/*.csv"`` stands for what it matches. The names of several are as they are given,
+        and what cannot be read among them is listed.
     time, label : str or int, optional
         Columns of a table, by head or counted from 0. By default they are found by their heads.
     columns, movement : str or int or sequence of them, optional
@@ -63,6 +70,17 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         one that can be read.
     frame : str or sequence of str, optional
         Frames of ROS bags as ``"parent:child"``: the pose of the child in the parent, composed of the transforms.
+    label_pattern : str, optional
+        File names that say the label, who showed the movements, or both: ``"{person}_{label}_{n}.csv"``. Text outside
+        the braces is taken literally, ``{n}`` is a number, other fields are passed over, and each takes as little as it
+        can. With slashes it is compared with folders too: ``"{person}/{label}_{n}.csv"``. A file that it does not match
+        is a problem. People are in `Recordings.people`.
+    label_by : {"task", "folder"} or int, optional
+        ``"task"``: the label in the recording, as the tasks of LeRobot, and never a folder; ``"folder"``: the innermost
+        folder, whatever the file says; a number: the folder so many levels up, 1 for the innermost.
+    trim : bool, default False
+        Whether the rests before and after each movement are left out, by `TrimRest` with its default tolerance. Rest is
+        told by what is learned: a gripper that closes at rest is left out with it.
     follow_links : bool, default False
         Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
     progress : callable, optional
@@ -73,34 +91,49 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     DataError
         Nothing there, or nothing in it that can be read; the message gives the first problem.
     SpecificationError
-        An unknown unit or choice, or a limit of memory that is no number.
+        An unknown unit or choice, a label pattern that cannot be understood, or a limit of memory that is no number.
     """
-    max_file_bytes()
     layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame)
-    path = Path(path)
-    if path.is_dir() and data_set_of(path) is None:
-        files, problems = files_under(path, follow_links)
-        watched = files if progress is None else progress(files)
-        read = [read_file(one, one.relative_to(path), layout, follow_links) for one in watched]
-        return merge_files(read, str(path), problems, kinds)
-    if not path.exists():
-        raise DataError(f"expected a file or folder of recordings, found nothing at {str(path)!r}")
-    return merge_files([read_file(path, name_of(path), layout, follow_links)], str(path), kinds=kinds)
+    rule = NameRule(label_pattern, label_by)
+    paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
+    return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, progress=progress)
 
 
-def root_of(path: Path) -> Path:
-    """The folder that the names of sources are relative to: a folder of files itself, else the folder around it."""
-    return path if path.is_dir() and data_set_of(path) is None else path.parent
+def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
+    paths: Sequence[Path],
+    layout: Layout,
+    rule: NameRule,
+    *,
+    follow_links: bool = False,
+    trim: bool = False,
+    progress: Progress | None = None,
+    standard_input: tuple[str, bytes] | None = None,
+) -> Recordings:
+    """As `read_recordings`, and what a file of some name would hold, from the standard input."""
+    max_file_bytes()
+    if rule.label_by is not None and layout.label is not None:
+        raise SpecificationError("expected label or label_by, not both")
+    entries, problems = entries_of(paths, follow_links)
+    read, where = [], list(paths)
+    if standard_input is not None:
+        name, data = Path(standard_input[0]), standard_input[1]
+        read.append(rule.apply(read_bytes(data, name, layout), name))
+        where.append(name)
+    by_path = {entry.path: entry for entry in entries}
+    for path in by_path if progress is None else progress(list(by_path)):
+        entry = by_path[path]
+        relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
+        one = read_file(path, relative, layout, follow_links)
+        one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
+        read.append(rule.apply(one, path))
+    recordings = merge_files(read, in_words(where), problems, layout.kinds)
+    return trimmed(recordings) if trim else recordings
 
 
-def name_of(path: Path) -> Path:
-    """The name of a file or a data set; of the current folder too."""
-    return Path(path.name or path.resolve().name)
-
-
-def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
-    """Read what a file of that name would hold, for data that come from elsewhere."""
-    return merge_files([read_bytes(data, Path(name), layout)], name, kinds=layout.kinds)
+def trimmed(recordings: Recordings) -> Recordings:
+    """Recordings without the rests at both ends of each movement, see `TrimRest`."""
+    moving = TrimRest().apply(recordings.demonstrations)
+    return replace(recordings, demonstrations=Demonstrations.of_movements(moving))
 
 
 def read_recording(path: str | Path) -> Trajectory:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import secrets
+import shutil
 import stat
 import time
 from collections.abc import Iterator, Sequence
@@ -136,3 +137,26 @@ def _is_at_work(process: int) -> bool:
     except (OSError, OverflowError):  # another user's process, or a number too large for a process id
         return True
     return True
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`.
+
+    Raises
+    ------
+    FileExistsError
+        There is something at `path`.
+    OSError
+        The folder around it is missing, read-only or full.
+    """
+    if path.exists():
+        raise FileExistsError(f"expected a new folder to write, {path} is there")
+    beside = name_beside(path)
+    beside.mkdir()
+    try:
+        yield beside
+        beside.rename(path)
+    finally:
+        if beside.exists():
+            shutil.rmtree(beside)

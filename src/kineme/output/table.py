@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from itertools import zip_longest
+from shutil import get_terminal_size
 from statistics import fmean
-from textwrap import fill, wrap
+from textwrap import fill
 from typing import NamedTuple
 
+from kineme.output.display_width import padded, widest_word, width_of, wrapped
 from kineme.output.text import LONGEST_CELL, in_markup, printable, printable_lines, shortened
+
+_PIPED = 160  # columns of a table that is not on a terminal, beyond which its last column is wrapped
+_GAP = 2  # blanks between columns
+_NARROW = 12  # columns below which no word is shortened
 
 
 class Table(NamedTuple):
@@ -24,15 +32,36 @@ def mean_and_range(values: Sequence[float]) -> str:
     return f"{fmean(values):.3f} ({min(values):.2f}-{max(values):.2f})"
 
 
-def to_text(table: Table, width: int = 160) -> str:
-    """Columns aligned for a terminal; the last one is wrapped to stay within `width`."""
+def to_text(table: Table, width: int | None = None) -> str:
+    """Columns aligned for a terminal.
+
+    What does not fit into the width is wrapped, widest columns first; words that are wider than their column lose their
+    middle. Where not even that leaves a few letters to each, every row becomes a list. `width` is that of the terminal
+    by default. Where the output goes elsewhere, nothing is cut but names of more than 120 letters, and only the last
+    column is wrapped.
+    """
     lines = [(*(_cell(one) for one in row[:-1]), printable(row[-1])) for row in (table.columns, *table.rows)]
-    widths = [max(len(row[k]) for row in lines) for k in range(len(table.columns))]
-    widths[-1] = max(24, min(widths[-1], width - sum(widths[:-1]) - 2 * len(widths)))
-    rendered = [line for row in lines for line in _wrapped(row, widths)]
-    rule = "-" * max(map(len, rendered))
-    title, reading = printable_lines(table.title), fill(printable_lines(table.reading), 110)
-    return "\n".join(filter(None, [title, rule, rendered[0], rule, *rendered[1:], reading]))
+    natural = [max(width_of(row[k]) for row in lines) for k in range(len(table.columns))]
+    columns = _terminal_width() if width is None else width
+    title = printable_lines(table.title)
+    if columns is None:
+        widths: list[int] | None = _with_last(natural, _PIPED)
+        reading = fill(printable_lines(table.reading), 110)
+    else:
+        title = "\n".join("\n".join(wrapped(line, columns)) for line in title.split("\n"))
+        reading = fill(printable_lines(table.reading), min(columns, 110))
+        widths = _narrowed(lines, natural, columns - _GAP * (len(natural) - 1))
+    if widths is None:
+        return "\n".join(filter(None, [title, *_as_lists(lines, columns or _PIPED), reading]))
+    rendered = [_aligned(row, widths) for row in lines]
+    rule = "-" * max(width_of(line) for row in rendered for line in row)
+    body = [line for row in rendered[1:] for line in row]
+    return "\n".join(filter(None, [title, rule, *rendered[0], rule, *body, reading]))
+
+
+def _terminal_width() -> int | None:
+    """Columns of the terminal that the output goes to; None where it goes elsewhere."""
+    return get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 def _cell(text: str) -> str:
@@ -40,10 +69,53 @@ def _cell(text: str) -> str:
     return shortened(printable(text), LONGEST_CELL)
 
 
-def _wrapped(row: tuple[str, ...], widths: list[int]) -> list[str]:
-    first, *more = wrap(row[-1], widths[-1]) or [""]
-    head = "  ".join(cell.ljust(size) for cell, size in zip(row[:-1], widths, strict=False))
-    return [f"{head}  {first}".rstrip(), *(f"{'':{len(head)}}  {line}" for line in more)]
+def _with_last(natural: list[int], width: int) -> list[int]:
+    """The widths, the last one as much as is left."""
+    return [*natural[:-1], max(24, min(natural[-1], width - sum(natural[:-1]) - 2 * len(natural)))]
+
+
+def _narrowed(lines: Sequence[tuple[str, ...]], natural: list[int], width: int) -> list[int] | None:
+    """Widths that sum up to `width` at most; None where columns would get too narrow.
+
+    The widest columns are narrowed first, at first down to their widest words, then further.
+    """
+    words = [max(widest_word(row[k]) for row in lines) for k in range(len(natural))]
+    for least in (words, [min(one, _NARROW) for one in words]):
+        if sum(least) <= width:
+            limit = next(n for n in range(max(natural), 0, -1) if _total(natural, least, n) <= width)
+            widths = [max(low, min(one, limit)) for one, low in zip(natural, least, strict=True)]
+            for k in range(len(widths)):  # what is left over by whole columns
+                widths[k] += max(0, min(natural[k] - widths[k], width - sum(widths)))
+            return widths
+    return None
+
+
+def _total(natural: list[int], least: list[int], limit: int) -> int:
+    return sum(max(low, min(one, limit)) for one, low in zip(natural, least, strict=True))
+
+
+def _aligned(row: tuple[str, ...], widths: list[int]) -> list[str]:
+    """The lines of a row."""
+    cells = [
+        [cell] if width_of(cell) <= width else wrapped(cell, width) for cell, width in zip(row, widths, strict=True)
+    ]
+    lines = zip_longest(*cells, fillvalue="")
+    gap = " " * _GAP
+    return [gap.join(padded(cell, width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+
+
+def _as_lists(lines: Sequence[tuple[str, ...]], width: int) -> list[str]:
+    """Each row as a list of heads and cells."""
+    heads, *rows = lines
+    return [
+        line
+        for row in rows
+        for line in ("-" * width, *(each for pair in zip(heads, row, strict=True) for each in _entry(*pair, width)))
+    ]
+
+
+def _entry(head: str, cell: str, width: int) -> list[str]:
+    return wrapped(f"{head}: {cell}", width) if head else wrapped(cell, width)
 
 
 def to_html(table: Table) -> str:

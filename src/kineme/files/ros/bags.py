@@ -128,7 +128,7 @@ def decoder_of(bag: Bag, topic: Topic) -> Callable[[bytes], Any]:
     DataError
         The bag holds the type in another version than the standard one.
     """
-    store = _types(bag.version)
+    store = standard_types(bag.version)
     _check_version(store, bag.version, topic)
     known = store.get_msgdef(topic.type)
     is_1, cls = bag.version == 1, known.cls
@@ -245,8 +245,8 @@ def _type_name(name: str) -> str:
 
 
 @cache
-def _types(version: int) -> Any:
-    """The standard types of ROS."""
+def standard_types(version: int) -> Any:
+    """The store of the standard types of ROS, of rosbags."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.LATEST)

@@ -1,0 +1,244 @@
+"""A copy of a bag with one topic more: every other message byte for byte, read by rosbags and the package mcap."""
+
+import shutil
+import sqlite3
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import kineme
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, store, write_bag
+from kineme.files.ros.add_topic import copy_with_topic
+
+pytest.importorskip("rosbags")
+
+TOPIC = "/kineme/annotations"
+TEXTS = [(START + SECOND // 4, '{"symbol": "né"}'), (START + SECOND // 10, "first"), (START + SECOND // 4, "last")]
+
+
+def reader(path):
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+
+    return (Reader1 if path.suffix == ".bag" else Reader2)(path)
+
+
+def raw_messages(path):
+    """(topic, type, definition's checksum, time, bytes) of all messages, in the order of reading."""
+    with reader(path) as bag:
+        return [(one.topic, one.msgtype, one.digest, t, bytes(raw)) for one, t, raw in bag.messages()]
+
+
+def texts_of(path, kind):
+    known = store(kind)
+    parse = known.deserialize_ros1 if kind == "ros1" else known.deserialize_cdr
+    return [(t, parse(raw, name).data) for topic, name, _, t, raw in raw_messages(path) if topic == TOPIC]
+
+
+def recorded(tmp_path, kind, compress=False, name="run"):
+    m = Maker(kind)
+    poses = zip(stamps(), pose_rows(), strict=True)
+    messages = [("/tool", ns, m.pose_stamped(ns, row)) for ns, row in poses]
+    messages += [("/chatter", ns + 5, m.string("x" * 3000)) for ns in stamps(20)]
+    messages += [("/raw", ns + 7, ("std_msgs/msg/String", bytes(range(40)))) for ns in stamps(3)]
+    messages += [("/empty", "sensor_msgs/msg/JointState", None)]
+    return write_bag(tmp_path, kind, messages, name=name, compress=compress)
+
+
+def copied(source, target, texts=TEXTS):
+    copy_with_topic(source, target, TOPIC, lambda first, last: texts)
+    return target
+
+
+@pytest.mark.parametrize("compress", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_other_messages_are_the_same_bytes(tmp_path, kind, compress):
+    source = recorded(tmp_path, kind, compress)
+    target = copied(source, tmp_path / ("named.bag" if kind == "ros1" else "named"))
+    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(source)
+    assert texts_of(target, kind) == sorted(TEXTS)
+    with reader(source) as old, reader(target) as new:
+        assert set(new.topics) == {*old.topics, TOPIC}
+        assert new.topics[TOPIC].msgtype == "std_msgs/msg/String"
+        assert new.topics[TOPIC].msgcount == len(TEXTS)
+        assert (new.start_time, new.end_time) == (old.start_time, old.end_time)
+        assert new.message_count == old.message_count + len(TEXTS)
+    times = [one[3] for one in raw_messages(target)]
+    assert times == sorted(times)
+
+
+def test_messages_outside_of_the_recording_extend_it(tmp_path):
+    for kind in KINDS:
+        source = recorded(tmp_path, kind, name=kind)
+        texts = [(START - SECOND, "before"), (START + 100 * SECOND, "after")]
+        target = copied(source, tmp_path / f"named_{kind}{source.suffix}", texts)
+        assert texts_of(target, kind) == texts
+        with reader(target) as new:
+            assert (new.start_time, new.end_time) == (START - SECOND, START + 100 * SECOND + 1)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".db3"])
+def test_a_bare_file_of_ros_2(tmp_path, ending):
+    kind = "mcap" if ending == ".mcap" else "sqlite3"
+    source = recorded(tmp_path, kind) / f"run{ending}"
+    target = copied(source, tmp_path / f"named{ending}")
+    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(source)
+    assert texts_of(target, kind) == sorted(TEXTS)
+
+
+def test_chunks_of_a_bag_of_ros_1_are_copied_and_not_written_anew(tmp_path):
+    source = recorded(tmp_path, "ros1", compress=True)
+    old, new = source.read_bytes(), copied(source, tmp_path / "a.bag").read_bytes()
+    index = int.from_bytes(old[old.index(b"index_pos=") + 10 :][:8], "little")
+    assert old[13 + 4096 : index] == new[13 + 4096 : index]
+
+
+def test_the_package_mcap_reads_the_copy(tmp_path):
+    make_reader = pytest.importorskip("mcap.reader").make_reader
+    source = recorded(tmp_path, "mcap") / "run.mcap"
+    target = copied(source, tmp_path / "named.mcap")
+    with source.open("rb") as file:
+        old = [(c.topic, m) for _, c, m in make_reader(file).iter_messages()]
+    with target.open("rb") as file:
+        read = make_reader(file, validate_crcs=True)
+        new = [(channel.topic, message) for _, channel, message in read.iter_messages()]
+        counts = read.get_summary().statistics
+    assert [one for one in new if one[0] != TOPIC] == old
+    assert [one.log_time for name, one in new if name == TOPIC] == [t for t, _ in sorted(TEXTS)]
+    assert counts.message_count == len(new)
+
+
+def test_checksums_attachments_and_metadata_of_an_mcap_stay(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    from mcap.reader import make_reader
+
+    source = tmp_path / "a.mcap"
+    with source.open("wb") as file:
+        one = writer.Writer(file, chunk_size=300, enable_crcs=True, enable_data_crcs=True)
+        one.start(profile="ros2", library="test")
+        channel = one.register_channel(
+            "/s", "cdr", one.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        )
+        raw = bytes(store("mcap").serialize_cdr(Maker("mcap").string("x" * 50), "std_msgs/msg/String"))
+        for k, ns in enumerate(stamps()):
+            one.add_message(channel, ns, raw, ns - 3, k)
+        one.add_attachment(START, START, "notes.txt", "text/plain", b"abc")
+        one.add_metadata("who", {"person": "anna"})
+        one.finish()
+    target = copied(source, tmp_path / "b.mcap")
+    with target.open("rb") as file:
+        read = make_reader(file, validate_crcs=True)
+        messages = [(c.topic, m.sequence, m.publish_time) for _, c, m in read.iter_messages() if c.topic != TOPIC]
+        assert messages == [("/s", k, ns - 3) for k, ns in enumerate(stamps())]
+        assert [one.data for one in read.iter_attachments()] == [b"abc"]
+        assert [one.metadata for one in read.iter_metadata()] == [{"person": "anna"}]
+    from mcap.stream_reader import StreamReader
+
+    with target.open("rb") as file:
+        assert len(list(StreamReader(file, validate_crcs=True).records)) > 50
+
+
+def test_an_mcap_without_chunks_or_index_is_refused_with_the_remedy(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    raw = bytes(store("mcap").serialize_cdr(Maker("mcap").string("x"), "std_msgs/msg/String"))
+    for k, options in enumerate(
+        [{"use_chunking": False}, {"repeat_channels": False}, {"index_types": writer.IndexType.NONE}]
+    ):
+        source = tmp_path / f"{k}.mcap"
+        with source.open("wb") as file:
+            one = writer.Writer(file, **options)
+            one.start(profile="ros2", library="test")
+            channel = one.register_channel("/s", "cdr", one.register_schema("std_msgs/msg/String", "ros2msg", b"x"))
+            one.add_message(channel, START, raw, START)
+            one.finish()
+        with pytest.raises(kineme.DataError, match="mcap recover"):
+            copied(source, tmp_path / "b.mcap")
+
+
+def test_each_message_goes_into_the_file_of_its_time(tmp_path):
+    """As rosbag2 divides a long recording."""
+    from ruamel.yaml import YAML
+
+    first, second = (recorded(tmp_path, "sqlite3", name=name) for name in ("a", "b"))
+    database = sqlite3.connect(second / "b.db3")
+    database.execute("UPDATE messages SET timestamp = timestamp + ?", (10 * SECOND,))
+    database.commit()
+    database.close()
+    shutil.move(second / "b.db3", first / "b.db3")
+    yaml = YAML()
+    whole = yaml.load(first / "metadata.yaml")
+    about = whole["rosbag2_bagfile_information"]
+    about["relative_file_paths"].append("b.db3")
+    about["message_count"] *= 2
+    for topic in about["topics_with_message_count"]:
+        topic["message_count"] *= 2
+    about["duration"]["nanoseconds"] += 10 * SECOND
+    later = {"path": "b.db3", "starting_time": {"nanoseconds_since_epoch": START + 10 * SECOND}}
+    about["files"].append({**later, "duration": {"nanoseconds": SECOND}, "message_count": 73})
+    about["custom_data"] = {"who": "anna"}
+    yaml.dump(whole, first / "metadata.yaml")
+    texts = [(START + SECOND // 4, "in a"), (START + 10 * SECOND + 9, "in b"), (START + 10 * SECOND + 10, "in b")]
+    target = copied(first, tmp_path / "named", texts)
+    assert texts_of(target / "a.db3", "sqlite3") == texts[:1]
+    assert texts_of(target / "b.db3", "sqlite3") == texts[1:]
+    assert texts_of(target, "sqlite3") == texts
+    assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(first)
+    new = yaml.load(target / "metadata.yaml")["rosbag2_bagfile_information"]
+    assert [one["message_count"] for one in new["files"]] == [74, 75]
+    assert new["custom_data"] == {"who": "anna"}
+
+
+def test_an_older_database_has_fewer_columns(tmp_path):
+    source = recorded(tmp_path, "sqlite3") / "run.db3"
+    database = sqlite3.connect(source)
+    for table in ("schema", "metadata", "message_definitions"):
+        database.execute(f"DROP TABLE {table}")
+    database.execute("ALTER TABLE topics DROP COLUMN type_description_hash")
+    database.commit()
+    database.close()
+    assert texts_of(copied(source, tmp_path / "b.db3"), "sqlite3") == sorted(TEXTS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_texts_it_is_a_plain_copy(tmp_path, kind):
+    source = recorded(tmp_path, kind)
+    target = copied(source, tmp_path / f"b{source.suffix}", [])
+    assert raw_messages(target) == raw_messages(source)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_topic_of_that_name_is_not_mixed_with_ours(tmp_path, kind):
+    once = copied(recorded(tmp_path, kind), tmp_path / ("a.bag" if kind == "ros1" else "a"))
+    with pytest.raises(kineme.DataError, match="without the topic /kineme/annotations, got one that has it"):
+        copied(once, tmp_path / f"b{once.suffix}")
+
+
+def test_files_that_are_compressed_as_a_whole_are_refused(tmp_path):
+    from ruamel.yaml import YAML
+
+    source = recorded(tmp_path, "mcap")
+    yaml = YAML()
+    whole = yaml.load(source / "metadata.yaml")
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    (source / "run.mcap.zstd").write_bytes(zstd.compress((source / "run.mcap").read_bytes()))
+    (source / "run.mcap").unlink()
+    about = whole["rosbag2_bagfile_information"]
+    about |= {"compression_mode": "file", "compression_format": "zstd", "relative_file_paths": ["run.mcap.zstd"]}
+    yaml.dump(whole, source / "metadata.yaml")
+    with pytest.raises(kineme.DataError, match=r"not compressed as a whole.*ros2 bag convert"):
+        copied(source, tmp_path / "b")
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+def test_memory_does_not_grow_with_the_bag(tmp_path, kind):
+    m = Maker(kind)
+    text = m.string("".join(map(chr, np.random.default_rng(0).integers(65, 90, 100_000))))
+    source = write_bag(tmp_path, kind, [("/s", ns, text) for ns in stamps(300)])
+    copied(source, tmp_path / f"warm{source.suffix}")
+    tracemalloc.start()
+    copied(source, tmp_path / f"b{source.suffix}")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 6_000_000
