@@ -107,8 +107,8 @@ def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
         return {"times": one.times, "positions": one.recorded}, named
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
     rates: Any = getattr(movement, "rate_names", None)  # of poses
-    named = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
-    return {"times": one.times, "positions": one.positions, **derivatives}, named
+    of_poses = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
+    return {"times": one.times, "positions": one.positions, **derivatives}, of_poses
 
 
 def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
