@@ -66,6 +66,11 @@ def test_nothing_is_written_over(recording, tmp_path):
     assert [one.name for one in out.iterdir()] == ["long-002.csv"]
     assert run("segment", recording, "-o", out, "--force").returncode == 0
     assert len(list(out.iterdir())) == 3
+    piece = out / "long-001.csv"
+    piece.write_bytes(recording.read_bytes())  # its own pieces would be long-001-001.csv ...
+    recording.rename(out / "long-002.csv")
+    refused = run("segment", out, "-o", out, "--plot", out / "long-002.csv", "--force")
+    assert "another file to write than the input" in refused.stderr
 
 
 def test_parameters_of_another_method_are_refused_by_their_option(recording):

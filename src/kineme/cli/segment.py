@@ -10,8 +10,7 @@ import click
 
 from kineme.cli.options import Finite, force_option, json_option, whole
 from kineme.cli.output import check_new, say
-from kineme.cli.reading import layout_options
-from kineme.cli.several import read_each
+from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
 
 #: Parameters of the methods: type, help.
@@ -33,7 +32,7 @@ def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command(short_help="Cut long recordings into movements.")
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
+@recordings_argument
 @click.option(
     "--output", "-o", type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pieces, a file for each; it is created.  [default: show the table alone]",
@@ -50,22 +49,24 @@ def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
 def segment(
     recordings: tuple[Path, ...], output: Path | None, by: str, form: str, plot: Path | None, **options: Any
 ) -> None:
-    """Cut RECORDINGS, files or folders, or - for CSV from the standard input, into movements.
+    """Cut RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into movements.
 
     Each piece becomes a file with the columns and the time stamps of its recording, named like long-003.csv. Rests
     belong to none. Without --output the pieces are only listed.
 
     Example: kineme segment long.csv -o pieces/ --plot pieces.png
     """
+    from kineme.files.entries import paths_of
+
     as_json, force = options.pop("as_json"), options.pop("force")
     chosen = {name: value for name in _PARAMETERS if (value := options.pop(name)) is not None}
     _check_parameters(by, chosen)
-    check_new(plot, force, *recordings)
-    parsed, problems = read_each(recordings, options)
+    parsed = read(recordings, options)
+    problems = list(map(str, parsed.problems))
     cut, movements = _cut(parsed, by, chosen, problems)
     files = _files(cut, movements, output, form)
-    for path in files:
-        check_new(path, force, *recordings)
+    for path in (plot, *files):
+        check_new(path, force, *paths_of(recordings, parsed))
     if output is not None:
         _write(cut, files, output)
     if plot is not None:
@@ -86,20 +87,19 @@ def _check_parameters(by: str, chosen: dict[str, Any]) -> None:
             raise click.UsageError(f"expected parameters of --by {by}: {flags}; got --{name.replace('_', '-')}")
 
 
-def _cut(parsed: list[Any], by: str, chosen: dict[str, Any], problems: list[str]) -> tuple[list[Any], list[Any]]:
+def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> tuple[list[Any], list[Any]]:
     """The recordings that could be cut, and which they are; the others become problems."""
     from kineme.errors import TrajectoryError
     from kineme.movements.segmentation.segment import segment as cut_one
 
     cut, movements = [], []
-    for recordings in parsed:
-        for one, source in zip(recordings.demonstrations, recordings.sources, strict=True):
-            try:
-                cut.append(cut_one(one, by, **chosen))
-            except TrajectoryError as error:
-                problems.append(f"{source.path} {source.place}".strip() + f": {error}")
-            else:
-                movements.append((source.path, source.place))
+    for one, source in zip(parsed.demonstrations, parsed.sources, strict=True):
+        try:
+            cut.append(cut_one(one, by, **chosen))
+        except TrajectoryError as error:
+            problems.append(f"{source.path} {source.place}".strip() + f": {error}")
+        else:
+            movements.append((source.path, source.place))
     return cut, movements
 
 

@@ -115,6 +115,16 @@ def test_channels_that_are_no_pose_are_refused_by_name():
         PoseDMP().learn(Demonstrations.of_movements(two))
 
 
+@pytest.mark.parametrize(("unit", "lever"), [("m", 0.2), (None, 0.2), ("cm", 20.0), ("mm", 200.0), ("furlong", 0.2)])
+def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
+    q = exp(np.outer(np.linspace(0, 2, 30), [0, 0, 1.0]))
+    channels = (Channel("x", "position", ("x",), unit), Q)
+    columns = np.column_stack([np.zeros(30), from_wxyz(q, Q)])
+    np.testing.assert_allclose(learned(columns, np.array([0, 30]), channels)[-1], [0, 0, 0, 2 * lever], atol=1e-9)
+    joint = (Channel("x", "angle", ("x",), "rad"), Q)
+    np.testing.assert_allclose(learned(columns, np.array([0, 30]), joint)[-1], [0, 0, 0, 2], atol=1e-9)
+
+
 def test_discrete_channels_alone_are_refused():
     with pytest.raises(kineme.SpecificationError, match="a channel that moves, got gripper, all discrete"):
         learned(np.zeros((8, 1)), np.array([0, 8]), (GRIPPER,))
