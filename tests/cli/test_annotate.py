@@ -111,7 +111,9 @@ def test_nothing_is_written_over(recording, library, tmp_path):
         before = out.read_bytes()
         assert run("annotate", recording, "-l", library, "-o", out).returncode == 2
         assert out.read_bytes() == before
-    assert run("annotate", recording, "-l", library, "-o", recording, "--force").returncode == 2
+    for given in (recording, tmp_path, tmp_path / "*.csv"):
+        assert run("annotate", given, "-l", library, "-o", recording, "--force").returncode == 2
+    assert recording.read_bytes() == before
     assert run("annotate", recording, "-l", library, "-o", tmp_path / "labels.csv", "--force").returncode == 0
     assert (tmp_path / "labels.csv").read_text().startswith("recording,place,start")
 
@@ -134,3 +136,53 @@ def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tm
     wrote = run("annotate", recording, "-l", library, "-o", tmp_path / "a.json")
     assert f"written to {tmp_path / 'a.json'}" in wrote.stdout
     assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"
+
+
+def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, tmp_path):
+    table = pandas.DataFrame(truth, columns=["start", "end", "label"])
+    table.to_csv(tmp_path / "labels.csv", index=False)
+    learned = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (learned["added"], sorted(learned["symbols"])) == (6, sorted(set(ORDER)))
+    again = answer("learn", recording, "--labels", tmp_path / "labels.csv", "-l", tmp_path / "actions")
+    assert (again["added"], again["known"]) == (0, 6)
+    said = answer("annotate", recording, "-l", tmp_path / "actions")
+    middles = [0.5 * (start + end) for start, end, _ in truth]
+    found = [one["symbol"] for middle in middles for one in said["annotations"] if one["start"] < middle < one["end"]]
+    assert found == [letter for *_, letter in truth]
+
+
+def test_what_was_annotated_is_learned_with_the_unknown_left_without_symbol(recording, library, tmp_path):
+    run("annotate", recording, "-l", library, "-o", tmp_path / "long.eaf")
+    learned = answer("learn", recording, "--labels", tmp_path / "long.eaf", "-l", tmp_path / "actions")
+    assert sorted(learned["symbols"]) == LETTERS
+    with kineme.ActionLibrary(tmp_path / "actions", read_only=True) as actions:
+        assert 0 < len(actions.unlabeled()) < len(actions)
+
+
+def test_a_lerobot_set_is_copied_with_its_annotations(demos, library, tmp_path):
+    """Written by pandas; each frame says what its episode shows."""
+    times, positions, _ = _long(demos)
+    positions = positions.astype(np.float32)
+    names, source = ["x", "y"], tmp_path / "set"
+    counter = {"dtype": "int64", "shape": [1], "names": None}
+    features = {"observation.state": {"dtype": "float32", "shape": [2], "names": names}}
+    features |= dict.fromkeys(("timestamp", "frame_index", "episode_index", "index", "task_index"), counter)
+    info = {"codebase_version": "v3.0", "fps": RATE, "features": features, "total_episodes": 1, "chunks_size": 1000}
+    info["data_path"] = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+    k = np.arange(len(positions))
+    frames = {"observation.state": list(positions), "timestamp": times.astype(np.float32), "frame_index": k}
+    frames |= {"episode_index": 0 * k, "index": k, "task_index": 0 * k}
+    episodes = {"episode_index": [0], "length": [len(k)], "data/chunk_index": [0], "data/file_index": [0]}
+    for path, table in (("data/chunk-000/file-000", frames), ("meta/episodes/chunk-000/file-000", episodes)):
+        (source / path).parent.mkdir(parents=True)
+        pandas.DataFrame(table).to_parquet(source / f"{path}.parquet")
+    (source / "meta" / "info.json").write_text(json.dumps(info))
+    said = answer("annotate", source, "-l", library, "-o", tmp_path / "named")
+    assert said["written"] == [str(tmp_path / "named")]
+    new = pandas.read_parquet(tmp_path / "named" / "data" / "chunk-000" / "file-000.parquet")
+    for rows in new["language_persistent"]:
+        assert [json.loads(row["content"])["symbol"] for row in rows] == [one["symbol"] for one in said["annotations"]]
+    _right(_long(demos)[2], said["annotations"])
+    again = run("annotate", source, "-l", library, "-o", tmp_path / "named", "--force")
+    assert again.returncode
+    assert "is there; name another, or remove it" in " ".join(again.stderr.split())

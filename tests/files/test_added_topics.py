@@ -242,3 +242,22 @@ def test_memory_does_not_grow_with_the_bag(tmp_path, kind):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 6_000_000
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_bag_is_copied_or_refused_by_name(tmp_path, kind):
+    """Bytes of the index, where the copy is changed, are replaced at random."""
+    source = recorded(tmp_path, kind)
+    file = source if kind == "ros1" else source / ("run.mcap" if kind == "mcap" else "run.db3")
+    data, random = file.read_bytes(), np.random.default_rng(0)
+    damaged, refused = tmp_path / f"damaged{file.suffix}", 0
+    for k in range(60):
+        spoiled = np.frombuffer(data, np.uint8).copy()
+        near_end = random.integers(len(data) - 1500, len(data), 6) if kind != "sqlite3" else random.integers(0, 4000, 6)
+        spoiled[near_end] = random.integers(0, 256, 6)
+        damaged.write_bytes(spoiled.tobytes())
+        try:
+            copied(damaged, tmp_path / f"{k}{file.suffix}")
+        except (kineme.DataError, MemoryError):  # rosbags believes any length; readers of files answer for memory
+            refused += 1
+    assert refused

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,7 @@ import click
 
 from kineme.cli.options import Finite, force_option, json_option, library_option
 from kineme.cli.output import check_new, say
-from kineme.cli.reading import layout_options
-from kineme.cli.several import read_each
+from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
 
 
@@ -33,11 +31,12 @@ class Format(click.ParamType):  # type: ignore[type-arg]
 
 
 @click.command(short_help="Find the symbols of a library in long recordings.")
-@click.argument("recordings", nargs=-1, required=True, type=click.Path(allow_dash=True, path_type=Path))
+@recordings_argument
 @library_option
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path),
-    help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, or a folder.  [default: show a table]",
+    help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
+    "LeRobot data set.  [default: show a table]",
 )  # fmt: skip
 @click.option("--format", "form", type=Format(), help="Format, where the ending does not say it: csv, elan, ...")
 @click.option(
@@ -48,7 +47,7 @@ class Format(click.ParamType):  # type: ignore[type-arg]
 @json_option
 @force_option
 def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
-    """Annotate RECORDINGS, files or folders, or - for CSV from the standard input: what happens when.
+    """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
 
     Every movement is searched for those of the library's symbols, with rests or without between them. Motion that is
     like no symbol is unknown. ELAN and Audacity count seconds from the first sample; tables have the recording's clock.
@@ -56,78 +55,55 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
+    from kineme.files.annotations.tables import as_row
+    from kineme.files.annotations.writers import targets_of, write_annotations
+    from kineme.files.entries import expanded, paths_of
     from kineme.library.library import ActionLibrary
     from kineme.library.recognition.annotate import annotate as find
 
     as_json, force, error_rate = (options.pop(name) for name in ("as_json", "force", "error_rate"))
-    parsed, problems = read_each(recordings, options)
-    movements = [(source.path, source.place) for one in parsed for source in one.sources]
-    _check_output(output, form, recordings, movements, force)
-    annotations, calibrated = [], True
+    parsed = read(recordings, options)
+    movements = [(source.path, source.place) for source in parsed.sources]
+    sources = [one for path in recordings for one in expanded(path)]
+    if output is None and form is not None:
+        raise click.UsageError("expected --output with --format")
+    if output is not None:
+        for target in targets_of(output, sources, movements, form):
+            check_new(target, force, *sources, *paths_of(recordings, parsed))
+            _check_folder(target, force)
     with ActionLibrary(folder, read_only=True) as library, _progress(parsed) as progress:
-        before = 0.0
-        for one in parsed:
-            found = find(library.store, one, error_rate, partial(progress, before))
-            before += float(one.demonstrations.durations.sum())
-            annotations += found.annotations
-            problems += map(str, found.problems)
-            calibrated = calibrated and found.calibrated
-    written = _write(output, form, recordings, movements, annotations)
-    _say(as_json, annotations, problems, written, calibrated, sum(one.demonstrations.durations.sum() for one in parsed))
+        found = find(library.store, parsed, error_rate, progress)
+    written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
+    data = {
+        "annotations": [as_row(one) for one in found.annotations],
+        "seconds": float(parsed.demonstrations.durations.sum()),
+        "calibrated": found.calibrated,
+        "written": [str(one) for one in written],
+        "problems": [str(one) for one in (*parsed.problems, *found.problems)],
+    }
+    say(as_json, data, lambda: _text(data))
 
 
-def _check_output(
-    output: Path | None, form: str | None, recordings: tuple[Path, ...], movements: list[Any], force: bool
-) -> None:
-    """Refuse what cannot be written, before the work is done."""
-    from kineme.files.annotations.writers import targets_of
-
-    if output is None:
-        if form is not None:
-            raise click.UsageError("expected --output with --format")
-        return
-    for target in targets_of(output, recordings, movements, form):
-        check_new(target, force, *recordings)
-        if target.is_dir() and any(target.iterdir()) and not force:
-            raise click.UsageError(
-                f"expected a new folder to write, {printable(target)} is there; write over it with --force"
-            )
-
-
-def _write(output: Path | None, form: str | None, recordings: Any, movements: Any, annotations: Any) -> list[str]:
-    from kineme.files.annotations.writers import write_annotations
-
-    if output is None:
-        return []
-    return [str(one) for one in write_annotations(output, annotations, recordings, form, movements)]
+def _check_folder(target: Path, force: bool) -> None:
+    if target.is_dir() and any(target.iterdir()) and not force:
+        raise click.UsageError(
+            f"expected a new folder to write, {printable(target)} is there; write over it with --force"
+        )
 
 
 @contextmanager
-def _progress(parsed: list[Any]) -> Iterator[Callable[[float, float], None]]:
+def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
     """A progress bar on a terminal, in seconds of recordings, with the time left."""
     from tqdm import tqdm
 
-    total = float(sum(one.demonstrations.durations.sum() for one in parsed))
+    total = float(parsed.demonstrations.durations.sum())
     form = "{l_bar}{bar}| {n:.0f} of {total:.0f} s [{elapsed}<{remaining}]"
     with tqdm(total=total, desc="annotating", bar_format=form, leave=False, disable=None) as bar:
 
-        def tell(before: float, done: float) -> None:
-            bar.update(min(before + done, total) - bar.n)
+        def tell(done: float) -> None:
+            bar.update(min(done, total) - bar.n)
 
         yield tell
-
-
-def _say(as_json: bool, annotations: Any, problems: Any, written: Any, calibrated: bool, seconds: float) -> None:
-    from kineme.files.annotations.tables import as_row
-
-    data = {
-        "annotations": [as_row(one) for one in annotations],
-        "seconds": float(seconds),
-        "calibrated": calibrated,
-        "written": written,
-        "problems": problems,
-    }
-    say(as_json, data, lambda: _text(data))
 
 
 def _text(data: dict[str, Any]) -> str:

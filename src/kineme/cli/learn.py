@@ -22,6 +22,10 @@ _SHOWN = 10  # problems that are listed
 @library_option
 @click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")
 @click.option("--no-labels", is_flag=True, help="Store movements without labels, for kineme anchor.")
+@click.option(
+    "--labels", "table", type=click.Path(dir_okay=False, path_type=Path),
+    help="Table with columns start, end and label, which cuts a long recording; also of ELAN or Audacity.",
+)  # fmt: skip
 @click.option("--person", help="Name of who showed all movements, where others will be recognized.")
 @click.option(
     "--by-person",
@@ -40,18 +44,21 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Where several people show movements and others will be recognized, say who showed what, with --person or
     --by-person: kineme recognize then knows how much people differ, and calls fewer movements of new ones unknown.
 
+    A long recording is cut by a table of what happens when, with --labels: CSV, JSON, a document of ELAN or its
+    tab-delimited export, or labels of Audacity. Stretches without label are stored without.
+
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.files.entries import root_of
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
-    person, by_person = options.pop("person"), options.pop("by_person")
+    person, by_person, table = options.pop("person"), options.pop("by_person"), options.pop("table")
     if label is not None and no_labels:
         raise click.UsageError("expected --label or --no-labels, not both")
     if person is not None and by_person:
         raise click.UsageError("expected --person or --by-person, not both")
-    parsed = read(recordings, options)
+    parsed = _labeled(read(recordings, options), table)
     root = root_of(*(path for path in recordings if str(path) != "-"))
     people = _people(root, parsed, person, by_person)
     labels = [None if no_labels else each if label is None else label for each in parsed.labels]
@@ -70,6 +77,16 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "problems": list(map(str, parsed.problems)),
         }
     say(as_json, data, lambda: _text(data))
+
+
+def _labeled(recordings: Any, table: Path | None) -> Any:
+    """The stretches that a table labels, where there is one."""
+    if table is None:
+        return recordings
+    from kineme.files.annotations.labeled_pieces import labeled_pieces
+    from kineme.files.annotations.read_labels import read_labels
+
+    return labeled_pieces(recordings, read_labels(table))
 
 
 def _people(root: Path, recordings: Any, person: str | None, by_person: bool) -> list[str | None] | None:

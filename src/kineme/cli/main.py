@@ -20,6 +20,7 @@ from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
+from kineme.cli.segment import segment
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -70,3 +71,4 @@ for command in (*MERGE_SPLIT, *MEANING):
     library.add_command(command)
 main.add_command(recognize)
 main.add_command(reproduce)
+main.add_command(segment)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.files.folders import as_text, files_under
 from kineme.files.formats import data_set_of
+from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
 
 _NAMED = 3  # paths that a message names
@@ -80,6 +81,12 @@ def root_of(*paths: Path) -> Path:
     if not is_alone(paths):
         return Path()
     return paths[0] if _is_folder_of_files(paths[0]) else paths[0].parent
+
+
+def paths_of(paths: Sequence[Path], recordings: Recordings) -> list[Path]:
+    """The files and data sets that recordings were read from at these paths; for the standard input there is none."""
+    root = root_of(*(path for path in paths if str(path) != "-"))
+    return [root / name for name in dict.fromkeys(one.path for one in recordings.sources)]
 
 
 def name_of(path: Path) -> Path:

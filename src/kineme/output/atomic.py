@@ -146,16 +146,19 @@ def whole_folder(path: Path) -> Iterator[Path]:
     Raises
     ------
     FileExistsError
-        There is something at `path`.
+        There is something at `path`, and not an empty folder.
     OSError
         The folder around it is missing, read-only or full.
     """
-    if path.exists():
+    empty = path.is_dir() and not any(path.iterdir())
+    if path.exists() and not empty:
         raise FileExistsError(f"expected a new folder to write, {path} is there")
     beside = name_beside(path)
     beside.mkdir()
     try:
         yield beside
+        if empty:
+            path.rmdir()
         beside.rename(path)
     finally:
         if beside.exists():

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.files.annotations.annotation import Annotation
 from kineme.files.annotations.audacity import write_audacity
+from kineme.files.annotations.copies import check_bag, check_lerobot, is_bag, is_lerobot, write_bag, write_lerobot
 from kineme.files.annotations.elan import write_elan
 from kineme.files.annotations.tables import write_csv, write_json
 from kineme.files.file_names import Movement, distinct_stems
@@ -32,12 +33,15 @@ class Writer(NamedTuple):
     copies : callable, optional
         Whether it writes a copy of a recording, given by its path, with the annotations inside. A path without ending
         asks for the first writer that says so of the recording.
+    check : callable, optional
+        It takes the path to write and that recording, and raises a `DataError` if no copy can be written there.
     """
 
     write: Write
     endings: tuple[str, ...]
     several: bool = True
     copies: Callable[[Path], bool] | None = None
+    check: Callable[[Path, Path], None] | None = None
 
 
 #: Name -> format.
@@ -46,6 +50,8 @@ WRITERS: dict[str, Writer] = {
     "json": Writer(write_json, (".json",)),
     "elan": Writer(write_elan, (".eaf",), several=False),
     "audacity": Writer(write_audacity, (".txt",), several=False),
+    "bag": Writer(write_bag, (".bag", ".mcap", ".db3"), copies=is_bag, check=check_bag),
+    "lerobot": Writer(write_lerobot, (), copies=is_lerobot, check=check_lerobot),
 }
 
 
@@ -104,6 +110,8 @@ def targets_of(
         See `writer_of`; several movements for one file of a format that holds one.
     """
     writer = writer_of(path, name, sources)
+    if writer.check is not None:
+        writer.check(path, sources[0])
     if writer.several:
         return {path: list(movements)}
     if path.suffix.lower() in writer.endings:

@@ -6,6 +6,7 @@ from typing import Any
 
 from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
 from kineme.movements.channels.channel import Channel
+from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.parsed import Detected
 from kineme.output.table import Table, to_text
 from kineme.output.text import counted, printable
@@ -41,7 +42,8 @@ def as_words(inspection: Inspection) -> str:
     heads = ("label", "movements", "samples", "duration [s]", "rate [Hz]", "jitter", "gaps", "extent")
     parts = [to_text(Table(title, heads, rows))]
     parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
-    parts += _listed("kinds", [_kind(one) for one in inspection.channels or () if one.kind != "position"])
+    channels = inspection.channels or ()
+    parts += _listed("kinds", [_kind(one, lever_of(channels)) for one in channels if one.kind != "position"])
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
     parts += _listed("not read", list(map(str, inspection.problems)))
     parts += _listed("note", list(inspection.notes))
@@ -69,10 +71,11 @@ def _range(values: Range) -> str:
     return median if least == greatest else f"{median} ({least} to {greatest})"
 
 
-def _kind(channel: Channel) -> str:
+def _kind(channel: Channel, lever: float) -> str:
     what = {
         "angle": f"angle{f' in {channel.unit}' if channel.unit else ''}; wraps are taken away",
-        "orientation": f"orientation, a quaternion {', '.join(channel.order)}; learned as integrated rotation",
+        "orientation": f"orientation, a quaternion {', '.join(channel.order)}; learned as its integrated rotation"
+        + ("" if lever == 1 else f", a radian as {lever:g}"),
         "discrete": "discrete; kept as it is, not learned",
     }
     return f"{', '.join(channel.columns)}: {what[channel.kind]}"

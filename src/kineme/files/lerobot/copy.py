@@ -10,10 +10,21 @@ from pathlib import Path
 
 from kineme.errors import DataError
 from kineme.files.lerobot.episodes import read_episodes
-from kineme.files.lerobot.info import MARKER, read_info, read_json
+from kineme.files.lerobot.info import MARKER, Info, read_info, read_json
 from kineme.files.lerobot.language import COLUMN, FEATURE, Motion, write_shard
 
 _OWN = ("meta", "data")  # folders whose files other programs write over; other ones hold videos
+
+
+def check_takes_texts(source: Path) -> Info:
+    """What a data set says of itself; a `DataError` if its version has no texts on frames."""
+    info = read_info(source)
+    if info.version != 3:
+        raise DataError(
+            f"expected a LeRobot data set of version 3, whose frames can carry texts, got version {info.version}; "
+            "convert it with LeRobot, or write a table: .csv or .json"
+        )
+    return info
 
 
 def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]]) -> None:
@@ -34,12 +45,7 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
     DataError
         Another version, an episode that is not there, or a damaged shard; the message names it.
     """
-    info = read_info(source)
-    if info.version != 3:
-        raise DataError(
-            f"expected a LeRobot data set of version 3, whose frames can carry texts, got version {info.version}; "
-            "convert it with LeRobot, or write a table: .csv or .json"
-        )
+    info = check_takes_texts(source)
     declared = read_episodes(source, info)
     if unknown := set(motions) - set(declared.numbers.tolist()):
         raise DataError(f"expected an episode of the data set, got {min(unknown)}")

@@ -59,6 +59,7 @@ def _read_footer(file: BinaryIO) -> tuple[int, bool, bool]:
 
 
 def _read_summary(file: BinaryIO, start: int) -> Summary:
+    end = file.seek(0, io.SEEK_END)
     file.seek(start)
     summary: Summary = {}
     while True:
@@ -66,9 +67,9 @@ def _read_summary(file: BinaryIO, start: int) -> Summary:
         kind, size = struct.unpack("<BQ", head) if len(head) == 9 else (0, 0)
         if kind == _FOOTER:
             break
-        content = file.read(min(size, 2**31))
-        if not kind or len(content) < size:
+        if not kind or size > end - file.tell():
             raise DataError(f"expected an MCAP file with a whole index; {_REMEDY}")
+        content = file.read(size)
         if kind != _OFFSET:
             summary.setdefault(kind, []).append(content)
     if any(kind not in summary for kind in (_SCHEMA, _CHANNEL, _CHUNK_INDEX)):

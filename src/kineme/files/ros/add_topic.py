@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePath
 from typing import Any
@@ -47,12 +48,15 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
     with open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)
         added = added_topic(bag, name, chosen)
-        if source.is_dir():
-            _copy_folder(bag, source, target, added)
-        elif added.messages:
-            _COPY[source.suffix.lower()](source, target, added)
-        else:
-            shutil.copyfile(source, target)
+        try:
+            if source.is_dir():
+                _copy_folder(bag, source, target, added)
+            elif added.messages:
+                _COPY[source.suffix.lower()](source, target, added)
+            else:
+                shutil.copyfile(source, target)
+        except (struct.error, ValueError, LookupError, TypeError, AttributeError) as error:
+            raise DataError(f"expected a bag that takes a topic more, got: {error!r}; {bag.remedy}") from error
 
 
 def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> None:

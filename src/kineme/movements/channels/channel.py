@@ -21,7 +21,8 @@ class Channel(NamedTuple):
     kind : {"position", "angle", "orientation", "discrete"}
         - ``"position"``: any quantity that moves on a line; learned as it is.
         - ``"angle"``: a joint; learned without the jumps where it wraps.
-        - ``"orientation"``: a unit quaternion; learned as three integrated rotation vectors [rad].
+        - ``"orientation"``: a unit quaternion; learned as three coordinates, its rotation integrated along time [rad],
+          beside positions times 0.2 m.
         - ``"discrete"``: a gripper or a button; kept as the steps that were recorded, and never learned.
     columns : tuple of str
         Heads of its columns, in the order of the file: four of an orientation, one of the others.

@@ -14,6 +14,8 @@ from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, pr
 from kineme.movements.rotations.rotation_vectors import log
 from kineme.validation import Array
 
+_LEVER = 0.2  # m
+_PER_METER = {"m": 1.0, "cm": 1e2, "mm": 1e3, "in": 1 / 0.0254, "ft": 1 / 0.3048}
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
 
@@ -59,6 +61,7 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
     ``r_0 = 0, r_k+1 = r_k + log(q_k+1 conj(q_k))`` [rad], with the rotation vector ``log``. Unlike the rotation vector
     from one reference it has no limit of a full turn, and it does not depend on what came before a movement but for
     an offset. A tool that is mounted differently changes nothing; a scene that is turned turns it as it turns a path.
+    Beside positions it is multiplied by `lever_of` them, so that all coordinates are lengths.
 
     Raises
     ------
@@ -70,13 +73,22 @@ def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Ar
             f"expected a channel that moves, got {', '.join(one.name for one in channels)}, all discrete; "
             "read other columns too, or say that one is a position"
         )
-    parts = []
+    parts, lever = [], lever_of(channels)
     for one, rows in zip(channels, columns_of(channels), strict=True):
         if one.kind == "orientation":
-            parts.append(_integrated(as_wxyz(columns[:, rows], one), offsets))
+            parts.append(lever * _integrated(as_wxyz(columns[:, rows], one), offsets))
         elif one.coordinates:
             parts.append(columns[:, rows])
     return np.ascontiguousarray(np.concatenate(parts, axis=1))
+
+
+def lever_of(channels: Channels) -> float:
+    """What a radian counts as beside positions: 0.2 m in their unit, meters if it is not known; without positions, 1.
+
+    It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
+    """
+    units = [one.unit for one in channels if one.kind == "position"]
+    return _LEVER * _PER_METER.get(units[0] or "m", 1.0) if units else 1.0
 
 
 def as_wxyz(q: Array, channel: Channel) -> Array:

@@ -1,0 +1,161 @@
+"""``kineme segment``: cut recordings into movements, a file for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.options import Finite, force_option, json_option, whole
+from kineme.cli.output import check_new, say
+from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.output.text import counted, printable
+
+#: Parameters of the methods: type, help.
+_PARAMETERS: dict[str, tuple[Any, str]] = {
+    "min_rest": (Finite(0), "rest: a shorter one is a pause within a movement, in seconds."),
+    "min_movement": (Finite(0), "rest, speed: a shorter one is a twitch, in seconds."),
+    "speed": (Finite(0), "rest: share of the peak speed below which the recording rests."),
+    "depth": (Finite(0), "speed: a minimum counts below this share of the peaks beside it."),
+    "turn": (Finite(0), "speed: also cut at turns sharper than this angle, in radians."),
+    "penalty": (Finite(0), "change-points: cost of one more piece."),
+    "n_pieces": (whole(1), "change-points: number of pieces."),
+}
+
+
+def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
+    for name, (kind, words) in reversed(_PARAMETERS.items()):
+        command = click.option(f"--{name.replace('_', '-')}", type=kind, help=f"Of --by {words}")(command)
+    return command
+
+
+@click.command(short_help="Cut long recordings into movements.")
+@recordings_argument
+@click.option(
+    "--output", "-o", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the pieces, a file for each; it is created.  [default: show the table alone]",
+)  # fmt: skip
+@click.option("--by", type=click.Choice(["rest", "speed", "change-points"]), default="rest", show_default=True,
+              help="Cut at rests, at minima of speed, or at change points of the velocity.")  # fmt: skip
+@_parameters
+@click.option("--format", "form", type=click.Choice(["csv", "npz", "json"]), default="csv", show_default=True,
+              help="Format of the pieces.")  # fmt: skip
+@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
+@layout_options
+@json_option
+@force_option
+def segment(
+    recordings: tuple[Path, ...], output: Path | None, by: str, form: str, plot: Path | None, **options: Any
+) -> None:
+    """Cut RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input, into movements.
+
+    Each piece becomes a file with the columns and the time stamps of its recording, named like long-003.csv. Rests
+    belong to none. Without --output the pieces are only listed.
+
+    Example: kineme segment long.csv -o pieces/ --plot pieces.png
+    """
+    from kineme.files.entries import paths_of
+
+    as_json, force = options.pop("as_json"), options.pop("force")
+    chosen = {name: value for name in _PARAMETERS if (value := options.pop(name)) is not None}
+    _check_parameters(by, chosen)
+    parsed = read(recordings, options)
+    problems = list(map(str, parsed.problems))
+    cut, movements = _cut(parsed, by, chosen, problems)
+    files = _files(cut, movements, output, form)
+    for path in (plot, *files):
+        check_new(path, force, *paths_of(recordings, parsed))
+    if output is not None:
+        _write(cut, files, output)
+    if plot is not None:
+        _draw(cut, plot)
+    pieces = _as_data(cut, movements, files)
+    say(as_json, {"pieces": pieces, "problems": problems}, lambda: _text(pieces, problems, output))
+
+
+def _check_parameters(by: str, chosen: dict[str, Any]) -> None:
+    from dataclasses import fields
+
+    from kineme.movements.segmentation.table import SEGMENTERS
+
+    known = [field.name for field in fields(SEGMENTERS[by])]
+    for name in chosen:
+        if name not in known:
+            flags = ", ".join(f"--{one.replace('_', '-')}" for one in known if one in _PARAMETERS)
+            raise click.UsageError(f"expected parameters of --by {by}: {flags}; got --{name.replace('_', '-')}")
+
+
+def _cut(parsed: Any, by: str, chosen: dict[str, Any], problems: list[str]) -> tuple[list[Any], list[Any]]:
+    """The recordings that could be cut, and which they are; the others become problems."""
+    from kineme.errors import TrajectoryError
+    from kineme.movements.segmentation.segment import segment as cut_one
+
+    cut, movements = [], []
+    for one, source in zip(parsed.demonstrations, parsed.sources, strict=True):
+        try:
+            cut.append(cut_one(one, by, **chosen))
+        except TrajectoryError as error:
+            problems.append(f"{source.path} {source.place}".strip() + f": {error}")
+        else:
+            movements.append((source.path, source.place))
+    return cut, movements
+
+
+def _files(cut: list[Any], movements: list[Any], output: Path | None, form: str) -> list[Path]:
+    """A file for each piece; none without a folder for them."""
+    from kineme.files.file_names import distinct_stems
+
+    if output is None:
+        return []
+    stems = distinct_stems(movements)
+    return [
+        output / f"{stem}-{k:03d}.{form}" for stem, one in zip(stems, cut, strict=True) for k in range(1, len(one) + 1)
+    ]
+
+
+def _write(cut: list[Any], files: list[Path], output: Path) -> None:
+    from kineme.files.write_movement import write_movement
+
+    output.mkdir(parents=True, exist_ok=True)
+    pieces = (piece for one in cut for piece in one)
+    for path, piece in zip(files, pieces, strict=True):
+        write_movement(path, piece)
+
+
+def _draw(cut: list[Any], path: Path) -> None:
+    from kineme.errors import DataError
+    from kineme.movements.segmentation.figure import draw_segmentations
+    from kineme.output.figures import save_figure
+
+    if not cut:
+        raise DataError("expected recordings that can be cut, to draw them, got none")
+    save_figure(draw_segmentations(cut), path)
+
+
+def _as_data(cut: list[Any], movements: list[Any], files: list[Path]) -> list[dict[str, Any]]:
+    rows = [
+        {"recording": path, "place": place, "piece": k, "start": start, "end": end, "duration": end - start}
+        for one, (path, place) in zip(cut, movements, strict=True)
+        for k, (start, end) in enumerate(one.cuts.tolist(), 1)
+    ]
+    return [row | {"file": str(file)} for row, file in zip(rows, files, strict=True)] if files else rows
+
+
+def _text(pieces: list[dict[str, Any]], problems: list[str], output: Path | None) -> str:
+    from kineme.output.table import Table, to_text
+
+    heads = ("recording", "piece", "start [s]", "end [s]", "duration [s]")
+    rows = [
+        (
+            printable(f"{one['recording']} {one['place']}".strip()),
+            str(one["piece"]),
+            *(f"{one[name]:.3f}" for name in ("start", "end", "duration")),
+        )
+        for one in pieces
+    ]
+    lines = [to_text(Table("", heads, rows))] if rows else []
+    lines += [f"not cut: {printable(problem)}" for problem in problems]
+    where = "" if output is None else f", written to {printable(output)}"
+    return "\n".join([*lines, f"{counted(len(pieces), 'movement')}{where}"])

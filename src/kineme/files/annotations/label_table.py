@@ -1,0 +1,123 @@
+"""Tables of labels beside a long recording: which row, head and unit means what."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from kineme.errors import DataError
+from kineme.files.annotations.audacity import UNKNOWN
+
+_START = re.compile(r"(start|begin|onset|from)\b|(start|begin)[ _]?time")
+_END = re.compile(r"(end|stop|offset|to)\b|(end|stop)[ _]?time")
+_MILLISECONDS = re.compile(r"(?<!\.)\b(ms|msec|milliseconds?)\b\W*$")
+_LABELS = frozenset(
+    {"label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture"}
+)
+_RECORDINGS, _PLACES = frozenset({"recording", "file", "path"}), frozenset({"place"})
+_CLOCK = re.compile(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d+)?)")
+_NOTHING = frozenset({"", "-", "?", UNKNOWN, "none", "nan", "null"})  # labels that say that there is none
+
+
+class LabelRow(NamedTuple):
+    """A row of a table of labels.
+
+    Attributes
+    ----------
+    start, end : float
+        In seconds.
+    label : str or None
+    recording, place : str
+        Which recording, and which movement of it; empty where the table does not say.
+    line : int
+        Row of the table, from 1.
+    """
+
+    start: float
+    end: float
+    label: str | None
+    recording: str
+    place: str
+    line: int
+
+
+class Heads(NamedTuple):
+    """Columns of a table of labels by their roles, the units of times in seconds, and whether ELAN wrote the heads."""
+
+    start: int
+    end: int
+    label: int
+    recording: int | None
+    place: int | None
+    units: tuple[float, float]
+    of_elan: bool
+
+
+def heads_of(cells: Sequence[str]) -> Heads | None:
+    """The roles of the columns of a table with these heads; None if they are none."""
+    names = [cell.strip().strip('"#').strip().lower() for cell in cells]
+    starts, ends = ([k for k, one in enumerate(names) if wanted.match(one)] for wanted in (_START, _END))
+    if not starts or not ends:
+        return None
+    start, end = (min(some, key=lambda k: "hh:mm" in names[k]) for some in (starts, ends))
+    known = [k for k, one in enumerate(names) if one in _LABELS]
+    others = [k for k, one in enumerate(names) if k not in {*starts, *ends} and not one.startswith("duration")]
+    labels = known or others[-1:]
+    if not labels:
+        raise DataError(f"expected a column of labels beside start and end, got {list(cells)}; call it label")
+    units = tuple(1e-3 if _MILLISECONDS.search(names[k]) else 1.0 for k in (start, end))
+    return Heads(
+        start,
+        end,
+        labels[0],
+        next((k for k, one in enumerate(names) if one in _RECORDINGS), None),
+        next((k for k, one in enumerate(names) if one in _PLACES), None),
+        (units[0], units[1]),
+        "time - " in names[start],
+    )
+
+
+def heads_of_cells(cells: Sequence[str]) -> Heads | None:
+    """The roles of the columns of a table without heads, start, end and label in this order; None if they are none."""
+    clocks = [k for k, cell in enumerate(cells) if ":" in cell and seconds_of(cell) is not None]
+    numbers = [k for k, cell in enumerate(cells[:-1]) if ":" not in cell and seconds_of(cell) is not None]
+    times = clocks if len(clocks) > 1 else numbers
+    return Heads(times[0], times[1], len(cells) - 1, None, None, (1.0, 1.0), True) if len(times) > 1 else None
+
+
+def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
+    """A row as a record.
+
+    Raises
+    ------
+    DataError
+        Times that are none, or an end before the start; the message names the line.
+    """
+    if len(cells) <= max(heads.start, heads.end, heads.label):
+        raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
+    times = [seconds_of(cells[k]) for k in (heads.start, heads.end)]
+    start, end = (math.nan if one is None else one * unit for one, unit in zip(times, heads.units, strict=True))
+    if not end > start:
+        raise DataError(
+            f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
+        )
+    recording, place = (
+        "" if k is None or k >= len(cells) else cells[k].strip() for k in (heads.recording, heads.place)
+    )
+    label = cells[heads.label].strip()
+    return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
+
+
+def seconds_of(cell: str) -> float | None:
+    """A time as seconds or as hh:mm:ss.sss; None if it is neither."""
+    text = cell.strip()
+    if clock := _CLOCK.fullmatch(text):
+        hours, minutes, seconds = clock.groups()
+        return 3600.0 * int(hours or 0) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

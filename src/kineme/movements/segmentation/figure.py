@@ -1,0 +1,91 @@
+"""A figure of recordings that were cut: channels or speed over time, the pieces shaded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from kineme.movements.segmentation.motion import observe
+from kineme.movements.segmentation.segmentation import Segmentation
+from kineme.movements.trajectories.movements import axis_names
+from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.output.text import drawable, shortened
+from kineme.sampling import evenly_spaced
+from kineme.validation import Array
+
+_CHANNELS = 8  # of one recording that are drawn, each in a panel of its own
+_RECORDINGS = 8  # of several, whose speeds are drawn
+_POINTS = 6000  # samples that are drawn
+_NUMBERED = 40  # pieces whose numbers are written
+_NAME = 24
+
+
+def draw_segmentations(segmentations: Sequence[Segmentation]) -> Figure:
+    """Of one recording its channels and its speed over time, of several the speed of each; pieces are shaded."""
+    shown = segmentations[:_RECORDINGS]
+    if len(segmentations) == 1:
+        panels = [*_channels(shown[0]), _speed(shown[0], "speed")]
+        figure = new_figure(7.2, 0.7 + 0.85 * len(panels))
+        axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True).ravel()
+        owners = [shown[0]] * len(panels)
+    else:
+        panels = [_speed(one, drawable(shortened(one.recording.name or "recording", _NAME))) for one in shown]
+        figure = new_figure(7.2, 0.7 + 1.1 * len(panels))
+        axes = figure.subplots(len(panels), 1, squeeze=False).ravel()
+        owners = list(shown)
+    for one, owner, (name, values) in zip(axes, owners, panels, strict=True):
+        _draw(one, owner, name, values)
+    for one, owner in zip(axes[:1] if len(segmentations) == 1 else axes, owners, strict=False):
+        _number(one, owner)
+    axes[-1].set_xlabel(_axis(segmentations, len(shown)))
+    return figure
+
+
+def _channels(one: Segmentation) -> list[tuple[str, Array]]:
+    """Names and values of the columns that are drawn."""
+    recording = one.recording
+    named = recording.channels
+    names = axis_names(recording.n_dims) if named is None else [c for channel in named for c in channel.columns]
+    values = recording.positions if named is None else recording.recorded
+    return [(drawable(shortened(name, _NAME)), values[:, k]) for k, name in enumerate(names[:_CHANNELS])]
+
+
+def _speed(one: Segmentation, name: str) -> tuple[str, Array]:
+    """The speed that the recording is cut by, in shares of its peak."""
+    motion = observe(one.recording, one.method.resolution)
+    return name, motion.speed / motion.peak
+
+
+def _draw(axes: Any, one: Segmentation, name: str, values: Array) -> None:
+    times = one.recording.times - one.recording.times[0]
+    kept = evenly_spaced(len(times), _POINTS)
+    for k, (start, end) in enumerate((one.cuts - one.recording.times[0]).tolist()):
+        axes.axvspan(start, end, color=BLUE if k % 2 else ORANGE, alpha=0.18, linewidth=0)
+    axes.plot(times[kept], values[kept], color=GRAY, linewidth=0.8)
+    axes.set_ylabel(name, rotation=0, ha="right", va="center")
+    axes.tick_params(labelsize=6.5, length=2)
+    axes.locator_params(axis="y", nbins=3)
+    axes.margins(x=0.0)
+
+
+def _number(axes: Any, one: Segmentation) -> None:
+    """Write the numbers of the pieces above the panel."""
+    middles = one.cuts.mean(axis=1) - one.recording.times[0]
+    for k in evenly_spaced(len(middles), _NUMBERED).tolist() if len(middles) else []:
+        at = (float(middles[k]), 1.02)
+        axes.annotate(str(k + 1), at, xycoords=("data", "axes fraction"), ha="center", fontsize=6.5, color=GRAY)
+
+
+def _axis(segmentations: Sequence[Segmentation], n_shown: int) -> str:
+    parts = ["time since the first sample [s]; speeds in shares of the peak speed"]
+    if len(segmentations) == 1:
+        recording = segmentations[0].recording
+        n = recording.n_dims if recording.channels is None else np.shape(recording.recorded)[1]
+        if n > _CHANNELS:
+            parts.append(f"the first {_CHANNELS} of {n} channels")
+    elif n_shown < len(segmentations):
+        parts.append(f"the first {n_shown} of {len(segmentations)} recordings")
+    return "; ".join(parts)
