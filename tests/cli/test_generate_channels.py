@@ -6,7 +6,8 @@ import pytest
 
 import kineme
 from kineme.files.write_movement import write_movement
-from kineme.orientation import exp, product
+from kineme.orientation import exp, log, product
+from kineme.primitives.generation.figure import short_names
 
 HEADS = "t,tool.x,tool.y,tool.z,tool.qx,tool.qy,tool.qz,tool.qw,gripper"
 N = 80
@@ -39,6 +40,24 @@ def test_a_pose_keeps_its_columns_and_is_read_again_as_what_it_was(pose, tmp_pat
     np.testing.assert_allclose(np.abs(made.recorded[-1, 3:7] @ [0, 1, 0, 0]), 1, atol=1e-4)
     np.testing.assert_allclose(made.recorded[0, 3:7], was.recorded[0, 3:7], atol=1e-6)  # with its sign
     np.testing.assert_allclose(made.recorded[-1, :3], [1, 0.5, 0.2], atol=0.001)
+
+
+def test_velocities_belong_to_the_columns_that_name_them_where_the_orientation_comes_first(pose, tmp_path):
+    """As in Vicon's exports: RX, RY, RZ, RW, TX, TY, TZ."""
+    table = np.loadtxt(pose, delimiter=",", skiprows=1)[:, [0, 4, 5, 6, 7, 8, 1, 2, 3]]
+    heads = "time,RX,RY,RZ,RW,gripper,TX,TY,TZ"
+    np.savetxt(tmp_path / "vicon.csv", table, delimiter=",", header=heads, comments="")
+    assert run(tmp_path / "vicon.csv", "--rate", 1000, "-o", tmp_path / "new.csv").returncode == 0
+    made = np.genfromtxt(tmp_path / "new.csv", delimiter=",", names=True, deletechars="")
+    step = np.diff(made["time"])
+    for axis in ("TX", "TY", "TZ"):
+        for rate, of in ((f"v_{axis}", axis), (f"a_{axis}", f"v_{axis}")):
+            middle = (made[rate][1:] + made[rate][:-1]) / 2
+            np.testing.assert_allclose(np.diff(made[of]) / step, middle, atol=2e-3)
+    q = np.column_stack([made[f"R{part}"] for part in "WXYZ"])
+    turned = log(product(q[1:], q[:-1] * [1, -1, -1, -1])) / step[:, None]
+    for k, axis in enumerate(("v_R.rx", "v_R.ry", "v_R.rz")):
+        np.testing.assert_allclose(turned[:, k], (made[axis][1:] + made[axis][:-1]) / 2, atol=2e-3)
 
 
 def test_a_gripper_steps_when_it_did_whatever_the_tempo(pose, tmp_path):
@@ -113,3 +132,9 @@ def test_a_bad_fit_is_said(tmp_path):
     assert done.returncode == 0
     assert "warning: the fit is off the recording by up to" in done.stderr
     assert run(path, "--n-basis", 150, "-o", tmp_path / "good.csv").stderr == ""
+
+
+def test_short_names_of_columns_tell_them_apart():
+    joints = [f"{joint}.pos" for joint in ("shoulder_pan", "shoulder_lift", "elbow_flex")]  # as LeRobot names them
+    assert short_names(joints) == ["…ulder_pan.pos", "…lder_lift.pos", "elbow_flex.pos"]
+    assert short_names(["field.pose.position.x", "y", "v."]) == ["position.x", "y", "v."]

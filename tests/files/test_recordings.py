@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import kineme
+import kineme.orientation
 from kineme.files.recordings import read_recording
-from kineme.files.write_movement import WRITERS, write_movement
+from kineme.files.write_movement import WRITERS, ColumnNames, write_movement
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.4, 0.5])
 PATH = np.array([[0.0, 1.0], [0.5, 1.5], [1.0, 2.5], [1.5, 2.0], [2.0, 3.0]])
@@ -151,3 +152,24 @@ def test_the_page_lists_every_format():
     page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
     table = page.partition("## What is read")[2].partition("\n## ")[0]
     assert [ending for ending in (*FORMATS, *(one.marker for one in DATA_SETS)) if f"`{ending}`" not in table] == []
+
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_generated_poses_are_read_as_poses(tmp_path, ending):
+    u = np.linspace(0, 1, 50)
+    q = kineme.orientation.exp(np.outer(u, [0.3, 0, 2.0]))
+    rollout = kineme.orientation.PoseDMP().learn([np.column_stack([u, u**2, 1 - u, q])]).rollout(n_samples=60)
+    path = write_movement(tmp_path / f"x{ending}", rollout)
+    one = read_recording(path)
+    assert [(c.name, c.kind) for c in one.channels or ()][2:] == [("z", "position"), ("q", "orientation")]
+    np.testing.assert_allclose(one.recorded, rollout.positions[0], atol=1e-12)
+    if ending == ".csv":
+        assert path.read_text().startswith("time,x,y,z,qw,qx,qy,qz,v_x,v_y,v_z,v_q.rx,v_q.ry,v_q.rz,a_x")
+
+
+def test_a_name_with_a_line_break_is_one_head_of_csv(tmp_path):
+    columns = {"times": TIMES, "positions": PATH}
+    names = ColumnNames(("a\nb", 'c,"d"'), ("a\nb", 'c,"d"'))
+    text = write_movement(tmp_path / "x.csv", columns, names).read_text()
+    assert text.startswith('time,a b,"c,""d"""\n')
+    np.testing.assert_array_equal(read_recording(tmp_path / "x.csv").positions, PATH)

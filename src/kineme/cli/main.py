@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import sys
 from typing import Any
 
@@ -32,6 +33,9 @@ class _OneLineErrors(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         if isinstance(sys.stdout, io.TextIOWrapper):
             sys.stdout.reconfigure(errors="backslashreplace")  # characters that the encoding lacks are escaped
+        logging.getLogger("matplotlib").setLevel(
+            logging.ERROR
+        )  # where it cannot keep its cache is not the user's concern
         if sys.stderr.isatty():
             tell_when_compiling(_say_compiling)
         try:

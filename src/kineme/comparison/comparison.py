@@ -76,7 +76,8 @@ class Comparison:
         demos = Demonstrations.of(movements)
         if demos.n_dims != self.n_dims:
             raise TrajectoryError(
-                f"expected movements of {self.n_dims} dimensions as in fit, got {demos.n_dims}; select the dimensions"
+                f"expected movements of {self.n_dims} dimensions as in fit, got {demos.n_dims}; "
+                "select the dimensions by columns= of read_recordings, in the shell --columns"
             )
         return demos
 

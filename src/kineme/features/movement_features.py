@@ -111,7 +111,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         if demonstrations.n_dims != self.n_dims_:
             raise TrajectoryError(
                 f"expected movements of {self.n_dims_} dimensions as in fit, got {demonstrations.n_dims}; "
-                "fit again, or select the dimensions"
+                "fit again, or select the dimensions by columns= of read_recordings, in the shell --columns"
             )
         return features_of(self.dmp_.learn(demonstrations), self.feature, self.n_samples).astype(self.dtype, copy=False)
 

@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,7 +106,9 @@ def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
         named = ColumnNames(recorded_names(one.channels), learned_names(one.channels))
         return {"times": one.times, "positions": one.recorded}, named
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
-    return {"times": one.times, "positions": one.positions, **derivatives}, None
+    rates: Any = getattr(movement, "rate_names", None)  # of poses
+    of_poses = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
+    return {"times": one.times, "positions": one.positions, **derivatives}, of_poses
 
 
 def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
@@ -125,8 +127,9 @@ def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
 
 
 def _cell(text: str) -> str:
-    """A head of CSV, quoted where it must be."""
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\r\n') else text
+    """A head of CSV, quoted where it must be; a line is a sample, so that no head has line breaks."""
+    text = " ".join(text.splitlines())
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"') else text
 
 
 def _npz(columns: Columns, names: ColumnNames | None) -> bytes:

@@ -83,7 +83,7 @@ def spot(
     if whole.n_dims != comparison.n_dims:
         raise TrajectoryError(
             f"expected a recording of {comparison.n_dims} dimensions as in fit, got {whole.n_dims}; "
-            "select the dimensions"
+            "select the dimensions by columns= of read_recordings, in the shell --columns"
         )
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(whole, durations, max_pieces)

@@ -14,6 +14,7 @@ from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.orientation import PoseDMP, exp, product
+from kineme.primitives.generation.generate import _in_order_of_rates
 
 Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")
 XYZ = tuple(Channel(axis, "position", (axis,)) for axis in "xyz")
@@ -127,3 +128,23 @@ def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
 def test_discrete_channels_alone_are_refused():
     with pytest.raises(kineme.SpecificationError, match="a channel that moves, got gripper, all discrete"):
         learned(np.zeros((8, 1)), np.array([0, 8]), (GRIPPER,))
+
+
+def test_the_first_quaternion_of_each_movement_keeps_its_sign_whatever_came_before():
+    q = from_wxyz(np.abs(turning(turns=0.1)), Q)
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    q[20:40] *= -1
+    found = canonical(q, np.array([0, 30, 80]), (Q,))
+    assert (found[:30] > -0.2).all()
+    np.testing.assert_allclose(found[30], q[30], atol=1e-12)
+    assert ((found[30:] * found[30]).sum(axis=1) > 0).all()
+
+
+def test_movements_of_other_channels_have_none_together():
+    both, _ = poses()
+    other = replace(both.movements, channels=(*XYZ, Q, GRIPPER._replace(name="claw")))
+    assert Demonstrations([both[0], Demonstrations.of_movements(other)[1]]).channels is None
+
+
+def test_rates_follow_an_orientation_between_positions():
+    assert _in_order_of_rates((XYZ[0], Q, GRIPPER, *XYZ[1:])) == [0, 3, 4, 5, 1, 2]

@@ -168,3 +168,8 @@ def test_a_quaternion_keeps_the_columns_of_the_file_however_the_caller_lists_the
 def test_quaternions_that_cannot_be_are_refused(given, words):
     with pytest.raises(SpecificationError, match=words):
         find_channels(list("abcde"), np.column_stack([U] * 5), np.array([0, T]), given)
+
+
+@pytest.mark.parametrize(("n_levels", "kind"), [(8, "discrete"), (9, "position")])
+def test_a_discrete_channel_has_eight_values_at_most(n_levels, kind):
+    assert found("x", "gripper", columns=np.column_stack([U, np.arange(T) % n_levels]))[1].kind == kind

@@ -185,7 +185,10 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     if x.ndim != 2:
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
     if t is None and not isinstance(layout.units, float | int):
-        raise DataError(f"expected times beside the positions, got {listed(arrays)}; say their step with units=")
+        raise DataError(
+            f"expected times beside the positions, got {listed(arrays)}; say their step with units=, "
+            "in the shell --units"
+        )
     if t is not None and t.shape != x.shape[:1]:
         raise DataError(f"expected one time stamp for each of the {len(x)} samples, got times of shape {t.shape}")
     if "offsets" not in arrays:

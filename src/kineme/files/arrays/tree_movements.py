@@ -56,7 +56,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         raise DataError(
-            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns="
+            f"expected one array of coordinates, got {listed_shapes(first.entries, wide)}; say which with columns=, "
+            "in the shell --columns"
         )
     roles = choose_roles(heads, kinds, layout)
     needed = {owners[k] for k in chain(roles.positions, roles.movement, [roles.time, roles.label]) if k is not None}
@@ -67,7 +68,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
 def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     """Movements that are arrays alone, without times."""
     if len(found) == 1 and not found[0].place and not isinstance(layout.units, float | int):
-        raise DataError("expected times beside the positions, got one array alone; say their step with units=")
+        raise DataError(
+            "expected times beside the positions, got one array alone; say their step with units=, in the shell --units"
+        )
     check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
     xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]
     xs = [x[:, None] if x.ndim == 1 else x for x in xs]

@@ -14,21 +14,22 @@ from kineme.files.merge_files import Recordings
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
-from kineme.output.text import drawable
+from kineme.output.text import drawable, shortened
 from kineme.sampling import evenly_spaced
 
 _PANELS = 30  # labels that are drawn
 _OVERLAID = 25  # movements of a label that are drawn, evenly spaced
 _POINTS = 400  # samples of a movement that are drawn
 _COLUMNS = 6
-_NAME = 22  # letters of a label above its panel
+_NAME = 22  # letters of a label above its panel, and of a column in the legend
+_LETTERS, _BESIDE = 11, 24  # letters of the legend in an inch, and those that start and end take
 
 
 def draw_recordings(recordings: Recordings) -> Figure:
     """Small multiples, one per label.
 
     One dimension is drawn over time, two in the plane, of three and more the first three in space. Every panel has a
-    scale of its own, the same for its axes.
+    scale of its own, the same for its axes; below it stand the sides of the box around what is drawn.
     """
     labels = labels_in_order(recordings)
     shown = labels[:_PANELS]
@@ -43,10 +44,14 @@ def draw_recordings(recordings: Recordings) -> Figure:
         _draw_label(axes, recordings, label)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
-    first = ", ".join(recordings.detected[0][0].columns[:3]) if recordings.detected else ", ".join(axis_names(n_dims))
+    names = recordings.detected[0][0].columns[:3] if recordings.detected else axis_names(n_dims)
+    first = ", ".join(shortened(name, _NAME) for name in names)
     across = f"{first} over time [s]" if n_dims == 1 else f"{first} of {n_dims} dimensions" if n_dims > 3 else first
     more = f"; the first {_PANELS} of {len(labels)} labels" if len(labels) > _PANELS else ""
-    figure.legend(handles=_key(drawable(across) + more), loc="outside lower center", ncols=3, handletextpad=0.3)
+    across = drawable(across) + more
+    ncols = 3 if len(across) < _LETTERS * figure.get_figwidth() - _BESIDE else 1
+    across = across if ncols > 1 else across.replace(", ", ",\n")
+    figure.legend(handles=_key(across), loc="outside lower center", ncols=ncols, handletextpad=0.3)
     return figure
 
 
@@ -65,6 +70,9 @@ def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
     axes.set_title(f"{drawable(name)} ({len(chosen)})", pad=3)
     if paths[0].shape[1] > 2:
         _tidy_space(axes)
+        points = np.concatenate(paths)
+        sides = " × ".join(f"{side:.2g}" for side in np.ptp(points, axis=0))
+        axes.text2D(0.5, -0.02, sides, transform=axes.transAxes, ha="center", fontsize=6.5, color=GRAY)
     elif recordings.demonstrations.n_dims == 1:
         axes.tick_params(labelsize=6, length=2)
     else:

@@ -89,7 +89,7 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
         numbers = [k for k, owner in enumerate(owners) if owner == name]
     else:
         got = listed(f"{name} ({width})" for name, width in (vectors or dict.fromkeys(info.heads, 1)).items())
-        raise DataError(f"expected the feature {STATE!r}, got {got}; say which with columns=")
+        raise DataError(f"expected the feature {STATE!r}, got {got}; say which with columns=, in the shell --columns")
     features = {name: len(info.heads[name]) for name in dict.fromkeys(owners[k] for k in numbers)}
     starts = dict(zip(features, np.cumsum([0, *features.values()]).tolist(), strict=False))
     columns = [starts[owners[k]] + k - owners.index(owners[k]) for k in numbers]

@@ -84,7 +84,8 @@ def _lists_to_read(file: Any, layout: Layout) -> set[str]:
         if len(lists) > 1:
             got = ", ".join(sorted(lists))
             raise DataError(
-                f"expected one column of lists, or plain columns, got {got}; say which with columns="
+                f"expected one column of lists, or plain columns, got {got}; say which with columns=, "
+                "in the shell --columns"
             ) from None
         return lists
     return set()

@@ -161,7 +161,10 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
 
 
 def _kinds(channels: Channels | None) -> str:
-    return "plain coordinates" if channels is None else ", ".join(f"{one.name} ({one.kind})" for one in channels)
+    if channels is None:
+        return "plain coordinates"
+    columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
+    return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:

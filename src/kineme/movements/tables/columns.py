@@ -143,7 +143,8 @@ def _time(
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
     raise DataError(
         f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
-        "say which with time=, or the step between samples with units= where there is none"
+        "say which with time=, or the step between samples with units= where there is none, "
+        "in the shell with --time, --units"
     )
 
 
@@ -165,7 +166,10 @@ def _label(heads: Sequence[str], layout: Layout, named: bool) -> int | None:
         return _number(heads, layout.label)
     of_labels = [k for k, head in enumerate(heads) if named and _named_as(head, LABEL_WORDS)]
     if len(of_labels) > 1:
-        raise DataError(f"expected one column of labels, got {[heads[k] for k in of_labels]}; say which with label=")
+        raise DataError(
+            f"expected one column of labels, got {[heads[k] for k in of_labels]}; say which with label=, "
+            "in the shell --label-column"
+        )
     return of_labels[0] if of_labels else None
 
 

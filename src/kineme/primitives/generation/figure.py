@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
     """
     names, fitted = learned.columns, generate(learned, MovementOptions()).columns
     path = _path_columns(learned)
-    n_rows = min(len(names), _ROWS)
+    shown, n_rows = short_names(names), min(len(names), _ROWS)
     figure = new_figure(7.2, max(3.4, 1.2 + 0.95 * n_rows))
     over_time: Figure | SubFigure = figure
     if path:
@@ -43,7 +44,7 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
             axes.plot(learned.demonstration.times - learned.demonstration.times[0], learned.recorded[:, k], **_RECORDED)
         axes.plot(fitted["times"], fitted["positions"][:, k], **_FITTED)
         axes.plot(made["times"], made["positions"][:, k], **_MADE)
-        axes.set_ylabel(drawable(_short(names[k])), fontsize=8)
+        axes.set_ylabel(drawable(shown[k]), fontsize=8)
     for axes in grid[len(names) :]:
         axes.set_visible(False)
     for axes in (grid[n_rows - 1], grid[len(names) - 1]):
@@ -68,7 +69,7 @@ def _path_columns(learned: Learned) -> list[int]:
 
 def _draw_path(figure: SubFigure, learned: Learned, paths: tuple[Array, Array], obstacles: Array | None) -> None:
     fitted, made = paths
-    names = [learned.columns[k] for k in _path_columns(learned)]
+    names = short_names([learned.columns[k] for k in _path_columns(learned)])
     axes: Any = figure.subplots(subplot_kw=None if len(names) == 2 else {"projection": "3d"})
     shown = [fitted, made]
     if learned.recorded is not None:
@@ -82,7 +83,7 @@ def _draw_path(figure: SubFigure, learned: Learned, paths: tuple[Array, Array], 
     if obstacles is not None and obstacles.shape[1] == len(names):
         axes.plot(*obstacles.T, "X", color=ORANGE, markersize=8, linestyle="none")
         shown.append(obstacles)
-    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), (drawable(_short(name)) for name in names), strict=False)))
+    axes.set(**dict(zip(("xlabel", "ylabel", "zlabel"), map(drawable, names), strict=False)))
     set_equal_scales(axes, np.concatenate(shown))
 
 
@@ -102,8 +103,14 @@ def _key(learned: Learned, has_path: bool, has_obstacles: bool) -> list[Any]:
     ]
 
 
-def _short(name: str) -> str:
-    """The last parts of a long name, which tell the columns of one recording apart."""
-    while len(name) > _LONGEST and "." in name:
+def short_names(names: Sequence[str]) -> list[str]:
+    """The last parts of long names; where these do not tell the columns of one recording apart, the last letters."""
+    short = [_last_parts(name) for name in names]
+    different = len(set(short)) == len(set(names))
+    return [name if len(name) <= _LONGEST else "…" + name[1 - _LONGEST :] for name in (short if different else names)]
+
+
+def _last_parts(name: str) -> str:
+    while len(name) > _LONGEST and "." in name.rstrip("."):
         name = name.partition(".")[2]
-    return name if len(name) <= _LONGEST else "…" + name[1 - _LONGEST :]
+    return name

@@ -9,7 +9,7 @@ import numpy as np
 
 from kineme.errors import SpecificationError
 from kineme.files.write_movement import ColumnNames, Columns
-from kineme.movements.channels.channel import is_plain
+from kineme.movements.channels.channel import Channels, is_plain
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
 from kineme.movements.rotations.quaternions import continuous
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -80,6 +80,8 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     if learned.demonstration is not None and learned.demonstration.channels is not None:
         duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
         made["positions"] = _as_recorded(made, learned.demonstration, duration)
+        of_rates = _in_order_of_rates(learned.demonstration.channels)
+        made |= {name: made[name][:, of_rates] for name in ("velocities", "accelerations")}
     return Generated(made, ColumnNames(learned.columns, learned.rates))
 
 
@@ -115,6 +117,14 @@ def _as_recorded(made: Columns, demonstration: Trajectory, duration: float) -> A
             parts.append(made["positions"][:, moved : moved + 1])
             moved += 1
     return np.concatenate(parts, axis=1)
+
+
+def _in_order_of_rates(channels: Channels) -> list[int]:
+    """The columns of a primitive's velocities in the order of the channels: those of an orientation it has last."""
+    kinds = [one.kind for one in channels for _ in one.coordinates]
+    plain = [k for k, kind in enumerate(kinds) if kind != "orientation"]
+    last = [k for k, kind in enumerate(kinds) if kind == "orientation"]
+    return np.argsort(plain + last).tolist()
 
 
 def _signed(q: Array, start: Array) -> Array:

@@ -90,6 +90,11 @@ class PoseRollout(BaseRollout):
         return [*"xyz"[: self.tangent.starts.shape[1] - 3], "qw", "qx", "qy", "qz"]
 
     @property
+    def rate_names(self) -> list[str]:
+        """What the columns of `velocities` and `accelerations` are called: x, y, z and q.rx, q.ry, q.rz."""
+        return [*"xyz"[: self.tangent.starts.shape[1] - 3], "q.rx", "q.ry", "q.rz"]
+
+    @property
     def _batch(self) -> Batch:
         return self.tangent.primitives
 

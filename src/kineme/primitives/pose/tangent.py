@@ -81,7 +81,8 @@ def as_poses(movements: MovementsLike) -> Demonstrations:
         if kinds.count("orientation") != 1 or demos.n_dims not in (3, 6):
             raise TrajectoryError(
                 "expected channels that are an orientation, or an orientation and three positions, got "
-                f"{', '.join(f'{one.name} ({one.kind})' for one in demos.channels)}; choose the columns"
+                f"{', '.join(f'{one.name} ({one.kind})' for one in demos.channels)}; "
+                "choose the columns by columns= of read_recordings, in the shell --columns"
             )
         return _with_positions(demos, np.concatenate(_pose_columns(demos.channels, demos.recorded), axis=1))
     if demos.n_dims not in COLUMNS:
