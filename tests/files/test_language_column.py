@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 import pytest
-from lerobot_sets import write_v2, write_v3
 
 import kineme
 from kineme.files.lerobot.copy import copy_with_motions
 from kineme.files.lerobot.language import COLUMN, Motion
+from lerobot_sets import write_v2, write_v3
 
 pa = pytest.importorskip("pyarrow")
 pd = pytest.importorskip("pandas")

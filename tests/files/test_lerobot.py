@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from lerobot_sets import NAMES, TASKS, write_v2, write_v3
 
 import kineme
 from kineme.errors import DataError
 from kineme.files.inspection.inspect import inspect
+from lerobot_sets import NAMES, TASKS, write_v2, write_v3
 
 
 @pytest.fixture(params=["v2", "v3", "v3 lists"])
