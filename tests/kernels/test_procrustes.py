@@ -126,3 +126,12 @@ def test_few_and_many_movements_in_the_plane_are_compared_alike(n, dtype, choice
     a, b = (rows[:, :30] + 1j * rows[:, 30:] for rows in (A.astype(float), B.astype(float)))
     found = procrustes.alignment(procrustes.prepare(A), procrustes.prepare(B))
     np.testing.assert_allclose(found, np.abs(a.conj() @ b.T), rtol=2e-5 if dtype is np.float32 else 1e-12, atol=1e-5)
+
+
+@any_seed
+def test_without_rotation_rows_prepared_for_rotations_are_the_same(seed):
+    A, B = _rows(seed, 3, 2), _rows(seed + 1, 4, 2)
+    still, turning = Procrustes(2, 0.0), Procrustes(2, math.pi)
+    expected = _distances(still, A, B)
+    for one, other in ((still, turning), (turning, still), (turning, turning)):
+        np.testing.assert_allclose(still.squared_distances(one.prepare(A), other.prepare(B)), expected, atol=1e-9)

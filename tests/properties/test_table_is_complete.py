@@ -49,6 +49,7 @@ EXEMPT = {
     "primitives.rollout_figure.draw_rollout": "one picture",
     "primitives.rollout_figure.draw_rollout_into": "one picture",
     "primitives.pose.pose_rollout.PoseRollout.axis_names": "of columns",
+    "primitives.pose.pose_rollout.PoseRollout.rate_names": "of columns",
     "primitives.pose.pose_primitives.PosePrimitives.controller": "one movement by contract",
     "primitives.discrete.dmp.Primitives.controller": "one movement by contract",
     "primitives.rhythmic.rhythmic_dmp.RhythmicPrimitives.controller": "one movement by contract",

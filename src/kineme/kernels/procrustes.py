@@ -106,7 +106,10 @@ class Procrustes:
     def alignment(self, A: Prepared, B: Prepared) -> Array:
         """The largest inner products ``<A, R B>`` (n, m) over the rotations allowed, less what they cost."""
         if self.max_angle == 0 or self.n_dims == 1:
-            return np.asarray(A.rows @ B.rows.T)
+            a, b = A.rows, B.rows
+            if np.iscomplexobj(a) != np.iscomplexobj(b):  # one was prepared for rotations
+                a, b = (rows if np.iscomplexobj(rows) else as_complex(rows) for rows in (a, b))
+            return np.asarray((a @ b.conj().T).real)
         if self.n_dims == 2:
             if self.prior is None:  # the angle's sign does not matter here
                 return _within(_split(_products(A.rows, B.rows), len(B.rows)), self.max_angle)
