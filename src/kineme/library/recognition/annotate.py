@@ -14,7 +14,7 @@ from kineme.files.annotations.annotation import Annotation
 from kineme.files.merge_files import Recordings, Source
 from kineme.files.problem import Problem
 from kineme.library.recognition.members import Members, members_of
-from kineme.library.recognition.recognize import EXHAUSTIVE, known_members
+from kineme.library.recognition.recognize import known_members
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.known_classes import KnownClasses
@@ -22,6 +22,7 @@ from kineme.recognition.spotting import Spotted, spot
 from kineme.recognition.window_scores import Templates
 from kineme.sampling import evenly_spaced
 
+_MOST = 1000  # movements that a recording is searched for
 _OF_EACH = 10  # members of a symbol that windows of a recording are compared with, evenly spaced; more take longer
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
@@ -89,7 +90,7 @@ def annotate(
 def spotting_classes(store: Store) -> KnownClasses:
     """What recordings are searched for: the symbols by at most ten members each, and 1000 in all."""
     members = members_of(store)
-    return known_members(store, _some(members, max(1, min(_OF_EACH, EXHAUSTIVE // len(members.names)))))
+    return known_members(store, _some(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
 
 
 def spot_known(
