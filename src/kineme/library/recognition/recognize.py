@@ -20,8 +20,8 @@ from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.known_classes import KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
 
-#: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000 movements
-#: of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
+#: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
+#: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
 EXHAUSTIVE = 2500
 
 
