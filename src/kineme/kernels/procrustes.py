@@ -106,17 +106,15 @@ class Procrustes:
     def alignment(self, A: Prepared, B: Prepared) -> Array:
         """The largest inner products ``<A, R B>`` (n, m) over the rotations allowed, less what they cost."""
         if self.max_angle == 0 or self.n_dims == 1:
-            a, b = A.rows, B.rows
-            if np.iscomplexobj(a) != np.iscomplexobj(b):  # one was prepared for rotations
-                a, b = (rows if np.iscomplexobj(rows) else as_complex(rows) for rows in (a, b))
+            mixed = np.iscomplexobj(A.rows) != np.iscomplexobj(B.rows)  # one was prepared for rotations
+            a, b = (as_complex(one.rows) if mixed and not np.iscomplexobj(one.rows) else one.rows for one in (A, B))
             return np.asarray((a @ b.conj().T).real)
         if self.n_dims == 2:
             if self.prior is None:  # the angle's sign does not matter here
                 return _within(_split(_products(A.rows, B.rows), len(B.rows)), self.max_angle)
             return self._soft_in_plane(A, B, rotations=False)[0]
-        if self.prior is None:
-            return _in_space(A, B, self._hard_filler(len(A.rows) * len(B.rows)))[0]
-        return _in_space(A, B, self._soft_filler(len(A.rows) * len(B.rows)))[0]
+        filler = self._hard_filler if self.prior is None else self._soft_filler
+        return _in_space(A, B, filler(len(A.rows) * len(B.rows)))[0]
 
     def align(self, A: Prepared, B: Prepared) -> tuple[Array, NDArray[np.float32] | None]:
         """The same, and the rotations that bring B closest to A.
