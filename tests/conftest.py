@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -48,3 +49,29 @@ def make_movement():
 @pytest.fixture(scope="session")
 def agree():
     return _agree
+
+
+@pytest.fixture(scope="session")
+def development_data():
+    """The folder with recordings of people for development, which are no part of the project."""
+    folder = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[2] / "shared" / "data"))
+    if not (folder / "gestures3d.npz").is_file():
+        pytest.skip(f"no gestures3d.npz in {folder}; name the folder in the environment variable KINEME_RECORDINGS")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def gestures(development_data):
+    """Digits and solids that five people drew in the air, and who."""
+    from kineme.experiments.evaluation.data import load_data
+
+    data = load_data(str(development_data / "gestures3d.npz"))
+    return data.demonstrations, np.asarray(data.people)
+
+
+@pytest.fixture(scope="session")
+def digits(gestures):
+    """Digits that five people drew in the air, and who."""
+    demos, people = gestures
+    chosen = np.flatnonzero(np.char.isdigit(np.asarray(demos.labels, dtype=str)))
+    return demos[chosen], people[chosen]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,12 +18,10 @@ from kineme.comparison.describe import describe
 from kineme.comparison.distances import squared_distances
 from kineme.comparison.representation import ROW_REPRESENTATIONS
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.experiments.evaluation.data import load_data
 from unlabeled_samples import draw_kinds, recovered
 
 quick = settings(max_examples=5, deadline=None, derandomize=True)
 seeds = st.integers(0, 10_000)
-FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
 
 def squares_of(*coordinates):
@@ -243,16 +238,6 @@ def test_representations_count_by_their_weights():
     assert weights == (2.0, 2.0, 1.0, 2.0)
 
 
-@pytest.fixture(scope="module")
-def gestures():
-    """Digits and solids that five people drew in the air, and who."""
-    path = FOLDER / "gestures3d.npz"
-    if not path.is_file():
-        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
-    data = load_data(str(path))
-    return data.demonstrations, np.asarray(data.people)
-
-
 def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
     """0.69 unless it is said who drew what."""
     demos, people = gestures
@@ -260,17 +245,6 @@ def test_solids_of_five_people_are_told_apart_by_who_drew_them(gestures):
     named = propose(demos[solids], groups=people[solids])
     assert 9 <= len(named) <= 11
     assert recovered(demos.labels[solids], named) >= 0.9
-
-
-@pytest.fixture(scope="module")
-def digits():
-    """Digits that five people drew in the air, and who."""
-    path = FOLDER / "gestures3d.npz"
-    if not path.is_file():
-        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
-    data = load_data(str(path))
-    chosen = np.flatnonzero(np.char.isdigit(np.asarray(data.demonstrations.labels, dtype=str)))
-    return data.demonstrations[chosen], np.asarray(data.people)[chosen]
 
 
 def test_digits_of_five_people_are_ten_clusters(digits):

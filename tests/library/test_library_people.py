@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,12 +160,9 @@ def test_a_damaged_person_is_found(tmp_path):
         assert [str(one) for one in library.verify()] == ["row 2 of table shown_by: damaged bytes"]
 
 
-def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(tmp_path):
+def test_fewer_movements_of_new_people_are_unknown_where_people_are_told_apart(tmp_path, development_data):
     """Digits in space, shown eight times by four people, asked of a fifth: the page's advice."""
-    folder = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
-    path = folder / "gestures3d.npz"
-    if not path.is_file():
-        pytest.skip(f"no gestures3d.npz in {folder}; name the folder in the environment variable KINEME_RECORDINGS")
+    path = development_data / "gestures3d.npz"
     read = kineme.read_recordings(path)
     labels, people = read.labels.astype(str), np.array(each_person(path, read.sources))
     digits = np.flatnonzero(np.char.isdigit(labels))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,15 +10,12 @@ from sklearn.utils import Bunch
 
 import kineme
 from kineme.comparison.widths import SHARE
-from kineme.experiments.evaluation.data import load_data
 from kineme.experiments.evaluation.splits import one_person_out
 from kineme.recognition.early import evidence
 from kineme.recognition.early.early import cut, partial_shares
 from kineme.recognition.early.ending import Ending
 from kineme.recognition.early.hypotheses import Early, Hypotheses, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
-
-FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
 
 def log_classes(*movements):
@@ -109,17 +104,6 @@ def test_a_class_of_what_is_over_counts_by_its_most_similar_movement_whatever_it
 
 def test_the_similarity_of_whole_movements_counts_to_the_power_of_three():
     assert evidence._POWER == 3.0
-
-
-@pytest.fixture(scope="module")
-def digits():
-    """Digits that five people drew in the air, and who."""
-    path = FOLDER / "gestures3d.npz"
-    if not path.is_file():
-        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
-    data = load_data(str(path))
-    chosen = np.flatnonzero(np.char.isdigit(np.asarray(data.demonstrations.labels, dtype=str)))
-    return data.demonstrations[chosen], np.asarray(data.people)[chosen]
 
 
 def test_digits_of_other_people_are_known_at_the_end_as_whole_movements_are(digits):

@@ -4,19 +4,16 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import re
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
-from kineme.experiments.evaluation.data import load_data
 from kineme.experiments.evaluation.spotting import Counts, concatenate, count_spotted
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.recognition.spotting import Spotted, _left_over, best_chain
@@ -26,7 +23,6 @@ from movement_samples import draw_shapes
 KNOWN = ["CShape", "NShape", "Sshape", "WShape"]
 UNKNOWN = ["heee", "Spoon", "Khamesh"]
 RATE = 100
-FOLDER = Path(os.environ.get("KINEME_RECORDINGS", Path(__file__).resolve().parents[3] / "shared" / "data"))
 
 
 @cache
@@ -234,19 +230,11 @@ def test_a_class_that_much_of_the_recording_is_near_to_counts_less():
     assert np.isfinite(weighted_by_rarity(compared, 0.0 * distances).scores).all()
 
 
-@cache
-def _gestures():
-    path = FOLDER / "gestures3d.npz"
-    if not path.exists():
-        pytest.skip(f"no gestures3d.npz in {FOLDER}; name the folder in the environment variable KINEME_RECORDINGS")
-    data = load_data(str(path))
-    return data.demonstrations, np.asarray(data.demonstrations.labels), np.asarray(data.people)
-
-
 @pytest.mark.parametrize(("rests", "least"), [(True, 0.8), (False, 0.72)])
-def test_gestures_of_twenty_kinds_are_found_by_templates_of_other_people(rests, least):
+def test_gestures_of_twenty_kinds_are_found_by_templates_of_other_people(gestures, rests, least):
     """Precision was 0.65 when the chosen window alone, over the scale of each class, told the class."""
-    movements, labels, people = _gestures()
+    movements, people = gestures
+    labels = np.asarray(movements.labels)
     found = Counts()
     for k, person in enumerate(np.unique(people)):
         rng = np.random.default_rng([1, k])

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import kineme
 from kineme.experiments.evaluation.data import DataSet
-
-_RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data"
 
 
 @pytest.fixture(scope="session")
@@ -42,12 +37,3 @@ def of_people(make_small):
     arrays = [b * x.positions for part, b in zip(parts, bends, strict=True) for x in part]
     demos = kineme.Demonstrations.from_arrays(arrays, np.concatenate([part.labels for part in parts]))
     return DataSet("people", demos, {}, np.repeat(["ann", "bob", "cy"], len(parts[0])).astype(object))
-
-
-@pytest.fixture(scope="session")
-def development_data():
-    """The folder with recordings of people for development, which are no part of the project."""
-    folder = Path(os.environ.get("KINEME_RECORDINGS", _RECORDINGS))
-    if not (folder / "gestures3d.npz").is_file():
-        pytest.skip(f"no gestures3d.npz in {folder}; name the folder in the environment variable KINEME_RECORDINGS")
-    return folder
