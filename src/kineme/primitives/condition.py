@@ -5,8 +5,8 @@ The covariance is kept as a factor F, ``Sigma = F' F``, and never formed. With `
     Sigma A' (A Sigma A' + diag(s^2))^-1 e = F' Q R'^-1 e,
 
 where s is stacked below B, if it is not 0, before it is decomposed. The condition number of B is not squared, so what
-is observed exactly is met to rounding although it was observed at close times. The change is the most probable one: among
-all that meet e it has the least Mahalanobis norm.
+is observed exactly is met to rounding, at close times too. The change is the most probable one: among all that meet e
+it has the least Mahalanobis norm.
 
 Source: Y. Zhou, J. Gao, T. Asfour, "Learning Via-Movement Primitives with Inter- and Extrapolation Capabilities",
 IROS 2019, for the weights of movements; the formula is that of any Gaussian.
