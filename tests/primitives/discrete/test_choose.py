@@ -67,9 +67,9 @@ def test_degrees_of_freedom_are_the_trace_of_the_fit():
     columns, curvature = trajectory_columns(decoder(dmp, 50), dmp.K)
     normal = columns.T @ columns + 1e-5 * curvature.T @ curvature
     expected = np.trace(columns @ np.linalg.solve(normal, columns.T))
-    assert score(dmp, relative_paths(dmp, noisy(n_samples=50)), np.array([1e-5])).degrees_of_freedom[0] == pytest.approx(
-        expected, rel=1e-6
-    )
+    assert score(dmp, relative_paths(dmp, noisy(n_samples=50)), np.array([1e-5])).degrees_of_freedom[
+        0
+    ] == pytest.approx(expected, rel=1e-6)
 
 
 def test_noise_is_smoothed_and_clean_paths_are_followed():

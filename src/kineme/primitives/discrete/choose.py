@@ -112,7 +112,9 @@ def choose(
     best = errors.min(axis=1)
     a = int(np.argmax(best <= max((1.0 + tolerance) * best.min(), negligible)))  # the fewest that are good enough
     chosen = replace(dmp, n_basis=counts[a], ridge=float(ridges[errors[a].argmin()]))
-    return BasisSelection(chosen, np.array(counts), ridges, errors, np.array([one.degrees_of_freedom for one in scores]))
+    return BasisSelection(
+        chosen, np.array(counts), ridges, errors, np.array([one.degrees_of_freedom for one in scores])
+    )
 
 
 def relative_paths(dmp: Specification, movements: MovementsLike) -> Array:

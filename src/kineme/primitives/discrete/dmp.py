@@ -109,11 +109,11 @@ class DMP(Specification):
         tolerance: float = 0.005,
         negligible: float = 1e-4,
     ) -> BasisSelection[Self]:
-        """Choose the number of basis functions and the ridge by generalized cross-validation, for all movements at once.
+        """Choose the number of basis functions and the ridge by generalized cross-validation.
 
         ``mean (y - H y)^2 / (1 - trace(H) / T)^2`` estimates the mean squared error of predicting a sample of a path
-        from all its others (Golub, Heath and Wahba 1979, Eq. 1.4). Chosen are the fewest basis functions that are good
-        enough, with their best ridge; everything else stays as in this specification.
+        from all its others (Golub, Heath and Wahba 1979, Eq. 1.4). Chosen for all movements together are the
+        fewest basis functions that are good enough, with their best ridge; all else stays as in this specification.
 
         Parameters
         ----------
