@@ -17,6 +17,7 @@ VARIABLE = "KINEME_MAX_FILE_BYTES"
 
 _MOST = 4 * 2**30
 _CHUNK = 2**20
+_IN_PASSING = 2**26
 
 
 def max_file_bytes() -> int:
@@ -51,6 +52,23 @@ def check_expanded(n_bytes: int, what: str = "a file") -> None:
             f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
             f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
         )
+
+
+def most_in_passing() -> int:
+    """The limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
+    return max(max_file_bytes(), _IN_PASSING)
+
+
+def check_in_passing(n_bytes: int, what: str) -> None:
+    """Refuse what is in memory on the way only, and above the limit on that.
+
+    Raises
+    ------
+    DataError
+        As of `check_expanded`.
+    """
+    if n_bytes > most_in_passing():
+        check_expanded(n_bytes, what)
 
 
 def read_limited(stream: BinaryIO) -> bytes:
