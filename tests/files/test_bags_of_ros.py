@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kineme
-from bag_files import Maker, pose_rows, stamps, store
+from bag_files import Maker, pose_rows, stamps, store, write_mcap
 from kineme.files.recordings import read_recordings
 from kineme.files.ros.add_topic import copy_with_topic
 
@@ -121,22 +121,6 @@ def test_a_bag_of_ros_1_that_was_cut_off(bag, tmp_path):
     path.write_bytes(data[:at] + bytes(8) + data[at + 8 : len(data) // 2])
     with pytest.raises(kineme.DataError, match=r"cut\.bag: expected .* not indexed.*; .* run rosbag reindex"):
         read_recordings(path)
-
-
-def write_mcap(path, messages, profile="ros2", encoding="ros2msg", **options):
-    """Written by the package mcap: (topic, type, log time, bytes)."""
-    writer_of = pytest.importorskip("mcap.writer", reason="no package mcap").Writer
-    with path.open("wb") as file:
-        writer = writer_of(file, **options)
-        writer.start(profile=profile, library="test")
-        channels = {}
-        for topic, name, recorded, raw in messages:
-            if topic not in channels:
-                schema = writer.register_schema(name, encoding, b"# of the test")
-                channels[topic] = writer.register_channel(topic, "cdr", schema)
-            writer.add_message(channels[topic], recorded, raw, recorded)
-        writer.finish()
-    return path
 
 
 def serialized(m, ns, row):

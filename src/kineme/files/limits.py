@@ -39,6 +39,11 @@ def max_file_bytes() -> int:
     return int(given)
 
 
+def most_in_passing() -> int:
+    """The limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
+    return max(max_file_bytes(), _IN_PASSING)
+
+
 def check_expanded(n_bytes: int, what: str = "a file") -> None:
     """Refuse a size in memory above the limit.
 
@@ -47,16 +52,7 @@ def check_expanded(n_bytes: int, what: str = "a file") -> None:
     DataError
         The message names the limit and how to raise it.
     """
-    if n_bytes > (most := max_file_bytes()):
-        raise DataError(
-            f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
-            f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
-        )
-
-
-def most_in_passing() -> int:
-    """The limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
-    return max(max_file_bytes(), _IN_PASSING)
+    _check(n_bytes, max_file_bytes(), what)
 
 
 def check_in_passing(n_bytes: int, what: str) -> None:
@@ -67,8 +63,15 @@ def check_in_passing(n_bytes: int, what: str) -> None:
     DataError
         As of `check_expanded`.
     """
-    if n_bytes > most_in_passing():
-        check_expanded(n_bytes, what)
+    _check(n_bytes, most_in_passing(), what)
+
+
+def _check(n_bytes: int, most: int, what: str) -> None:
+    if n_bytes > most:
+        raise DataError(
+            f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
+            f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"
+        )
 
 
 def read_limited(stream: BinaryIO) -> bytes:

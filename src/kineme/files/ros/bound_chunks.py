@@ -63,4 +63,4 @@ def check_overlaps(storage: Any, topics: Sequence[str]) -> None:
     n_bytes = 0
     for _, _, change in sorted(begins + ends):
         n_bytes += change
-        check_in_passing(n_bytes, "chunks of MCAP of one time")
+        check_in_passing(n_bytes, "a set of chunks of one time")
