@@ -49,10 +49,9 @@ def find_quaternions(
         Numbered ones that may begin or end with the scalar; see `_order_of`.
     """
     found = []
-    for stem, parts in _groups(_COMPONENT, heads, free).items():
-        four = "".join(sorted(parts))
-        if four == "wxyz" and _is_quaternion(stem[0], columns[:, [*parts.values()]]):
-            found.append(quaternion_of([parts[part] for part in four], four))
+    for (stem, _), parts in _groups(_COMPONENT, heads, free).items():
+        if {*parts} == {*"wxyz"} and _is_quaternion(stem, columns[:, [*parts.values()]]):
+            found.append(quaternion_of([*parts.values()], "".join(parts)))
     for (stem, _), parts in _groups(_NUMBERED, heads, free).items():
         four = [parts[part] for part in sorted(parts)]
         if "".join(sorted(parts)) in _NUMBERINGS and _NAMES & {*words_of(stem)} and _unit_norms(columns[:, four]):
