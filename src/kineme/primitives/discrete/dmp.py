@@ -301,7 +301,9 @@ class Primitives(Learned):
         from kineme.primitives.discrete.rollout import own_primitives
 
         own = own_primitives(movement)
-        return cls._of_rows(own.dmp, {name: getattr(own, name) for name in cls.ROWS}, own.labels, own.names)
+        return cls._of_rows(
+            own.dmp, {name: getattr(own, name) for name in cls.ROWS}, own.labels, own.names, own.recorded_as
+        )
 
     def controller(  # noqa: PLR0913 - an option per parameter
         self,

@@ -169,6 +169,7 @@ def rollout(
 def own_primitives(movement: Rollout) -> Learned:
     """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights."""
     some = movement.primitives
+    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
     weights = some.scaled_weights * movement.ratio[:, :, None]
     if movement.change is not None:
         weights += movement.change.coefficients @ movement.change.directions
@@ -179,9 +180,6 @@ def own_primitives(movement: Rollout) -> Learned:
         goals=movement.goals.copy(),
         velocities=movement.velocities_at_start.copy(),
         durations=movement.durations.copy(),
-        extents=np.array(np.broadcast_to(some.extents, movement.starts.shape)),
-        labels=movement.labels,
-        names=movement.names,
     )
 
 
