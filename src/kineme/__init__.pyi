@@ -52,6 +52,7 @@ from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring
+from kineme import robots as robots
 from kineme.library.library import ActionLibrary as ActionLibrary
 
 # Errors and warnings
