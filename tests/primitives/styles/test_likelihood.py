@@ -73,9 +73,11 @@ def test_conditioning_makes_likely_what_was_asked_for(two_styles):
     assert now.log_likelihood(learned[other], 0.01)[0] < mean.log_likelihood(learned[other], 0.01)[0]
 
 
-def test_movements_are_learned_first(demonstrate):
+def test_movements_are_learned_first_and_each_is_alone(demonstrate):
     demos = demonstrate(5)
     mean = average(DMP(n_basis=15).learn(demos))
+    alone = [mean.log_likelihood(demos[i : i + 1])[0] for i in range(5)]
+    np.testing.assert_allclose(mean.log_likelihood(demos), alone, rtol=1e-9)
     np.testing.assert_array_equal(mean.log_likelihood(demos), mean.log_likelihood(DMP(n_basis=15).learn(demos)))
 
 
