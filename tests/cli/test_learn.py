@@ -175,7 +175,7 @@ def test_people_from_a_column_of_a_table(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["who,label,t,x,y", *rows]))
     library = tmp_path / "actions"
     learned = answer("learn", tmp_path / "a.csv", "--person-column", "who", "-l", library)
-    assert (learned["added"], learned["people"], learned["symbols"]) == (4, ["ann", "bob"], ["nod", "wave"])
+    assert (learned["added"], learned["people"], learned["symbols"]) == (4, ["ann", "bob"], ["wave", "nod"])
     done = run("learn", tmp_path / "a.csv", "--person-column", "who", "--person", "eve", "-l", library)
     assert "expected --person, or people from --person-column or --label-pattern, not both" in done.stderr
     assert "person who" in run("inspect", tmp_path / "a.csv", "--person-column", "who").stdout
