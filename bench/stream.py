@@ -24,7 +24,7 @@ def measure(quick: bool) -> list[Row]:
         for n in (52,) if quick else (100, 500):
             known = _perturbed(shown, n, SEED)
             recognizer = kineme.Recognizer().fit(known, known.labels)
-            updates, ends = _timed(recognizer, _perturbed(shown, 3 if quick else 8, SEED + 1))
+            updates, ends = _timed(recognizer, _perturbed(shown, 3 if quick else 5, SEED + 1))
             slow = float(np.percentile(updates, 99))
             details = {"samples": len(updates), "rate": RATE, "perturbation": repr(_PERTURBATION), "seed": SEED}
             named = f"{n} demonstrations in {words}"

@@ -31,7 +31,9 @@ def test_a_movement_begins_where_the_person_or_the_label_changes(table):
 
 def test_people_of_movements_that_columns_tell_apart(tmp_path):
     """Rows of one movement stand anywhere; a fault costs its movement alone, with its person."""
-    rows = [f"{k / 10},{demo},{who},{k + demo},{k * k}" for k in range(10) for demo, who in enumerate(("ann", "bob", ""))]
+    rows = [
+        f"{k / 10},{demo},{who},{k + demo},{k * k}" for k in range(10) for demo, who in enumerate(("ann", "bob", ""))
+    ]
     rows[3] = "0.1,0,ann,oops,1"
     (tmp_path / "a.csv").write_text("\n".join(["t,demo,who,x,y", *rows]))
     read = kineme.read_recordings(tmp_path / "a.csv", person="who", movement="demo")

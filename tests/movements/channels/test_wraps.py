@@ -78,7 +78,8 @@ def test_a_thousandth_of_a_turn_beyond_the_range_is_rounding(beyond, period):
 
 
 @pytest.mark.parametrize(
-    ("largest", "period"), [(2 * np.pi * 1.0009, 2 * np.pi), (2 * np.pi * 1.0011, 360.0), (360.3, 360.0), (360.4, np.inf)]
+    ("largest", "period"),
+    [(2 * np.pi * 1.0009, 2 * np.pi), (2 * np.pi * 1.0011, 360.0), (360.3, 360.0), (360.4, np.inf)],
 )
 def test_angles_of_no_unit_pass_a_turn_by_a_thousandth(largest, period):
     assert period_of(np.array([0.0, largest]), None) == period
