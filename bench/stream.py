@@ -1,4 +1,4 @@
-"""The rate that a live stream holds: processor time of each update, over whole movements, and of the answer at the end."""
+"""The rate that a live stream holds: processor time of each update over whole movements, and of `finish`."""
 
 from __future__ import annotations
 

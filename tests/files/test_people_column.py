@@ -39,7 +39,7 @@ def test_people_of_movements_that_columns_tell_apart(tmp_path):
     read = kineme.read_recordings(tmp_path / "a.csv", person="who", movement="demo")
     assert read.people == ["bob", None]
     assert len(read.problems) == 1
-    assert kineme.read_recordings(tmp_path / "a.csv", movement="demo", columns="x,y".split(",")).people is None
+    assert kineme.read_recordings(tmp_path / "a.csv", movement="demo", columns=["x", "y"]).people is None
 
 
 def test_a_column_of_subjects_that_tells_movements_apart_names_people_too(tmp_path):

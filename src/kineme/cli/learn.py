@@ -42,7 +42,8 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     that are stored already are not stored again; what cannot be read is listed, and the rest is learned.
 
     Where several people show movements and others will be recognized, say who showed what, with --person,
-    --person-column or --by-person: kineme recognize then knows how much people differ, and calls fewer movements of new ones unknown.
+    --person-column or --by-person: kineme recognize then knows how much people differ, and calls fewer movements of
+    new ones unknown.
 
     A long recording is cut by a table of what happens when, with --labels: CSV, JSON, a document of ELAN or its
     tab-delimited export, or labels of Audacity. Stretches without label are stored without.

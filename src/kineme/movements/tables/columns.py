@@ -34,8 +34,8 @@ _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([
 class Roles(NamedTuple):
     """Column numbers by role, and the columns that are ignored.
 
-    `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``. `person`
-    is one of those in `movement`.
+    `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``.
+    `person` is one of those in `movement`.
     """
 
     time: int | None
