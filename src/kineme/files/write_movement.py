@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,13 +102,11 @@ def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Col
 
 def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     one = as_recording(movement)
+    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
     if one.channels is not None:
         named = ColumnNames(recorded_names(one.channels), learned_names(one.channels))
-        return {"times": one.times, "positions": one.recorded}, named
-    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
-    rates: Any = getattr(movement, "rate_names", None)  # of poses
-    of_poses = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
-    return {"times": one.times, "positions": one.positions, **derivatives}, of_poses
+        return {"times": one.times, "positions": one.recorded, **derivatives}, named
+    return {"times": one.times, "positions": one.positions, **derivatives}, None
 
 
 def _csv(columns: Columns, names: ColumnNames | None) -> bytes:

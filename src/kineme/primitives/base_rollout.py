@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, overload
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
@@ -69,6 +71,11 @@ class BaseRollout(ABC):
         return axis_names(self.positions.shape[2])
 
     @property
+    def channels(self) -> Channels | None:
+        """What the columns of `positions` are; None where they are what was learned."""
+        return None
+
+    @property
     def labels(self) -> NDArray[Any] | None:
         """Labels of the movements (n,), those of their primitives, or None."""
         labels = self._batch.labels
@@ -84,12 +91,18 @@ class BaseRollout(ABC):
     def demonstrations(self) -> Demonstrations:
         """The movements as `Demonstrations`, with the labels and names of their primitives.
 
+        Their positions are those generated, quaternions too: `channels` say so, and recognition converts them.
+
         Raises
         ------
         TrajectoryError
             Movements that are none, as of fewer than four samples.
         """
-        return Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+        made = Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+        if self.channels is None:
+            return made
+        known = replace(made.movements, channels=self.channels, dimensions=recorded_names(self.channels))
+        return Demonstrations.of_movements(known)
 
     @property
     def trajectories(self) -> Demonstrations:

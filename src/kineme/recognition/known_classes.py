@@ -15,6 +15,7 @@ from kineme.comparison.fit import fit_comparison, fit_to_references
 from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, score
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, answers, known_labels
@@ -87,12 +88,14 @@ def fit_known_classes(
     weights: str | Sequence[float] = "auto",
     classifier: str = "auto",
     groups: NDArray[np.intp] | None = None,
+    channels: Channels | None = None,
 ) -> KnownClasses:
     """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
+    `channels` are what was recorded of the movements, where that is known.
     """
-    return _known(*fit_to_references(specification, references, weights), classifier, groups)
+    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups)
 
 
 def _known(

@@ -18,7 +18,7 @@ from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
-from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.channel import in_words, is_plain, same_columns
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -152,19 +152,16 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
             f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
         )
     ours = store.channels
-    if n_dims is None or ours == demos.channels or all(is_plain(one or ()) for one in (ours, demos.channels)):
+    if (
+        n_dims is None
+        or same_columns(ours, demos.channels)
+        or all(is_plain(one or ()) for one in (ours, demos.channels))
+    ):
         return
     raise TrajectoryError(
-        f"expected movements recorded as {_kinds(ours)}, as all others of the library in {store.folder}, got "
-        f"{_kinds(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
+        f"expected movements recorded as {in_words(ours)}, as all others of the library in {store.folder}, got "
+        f"{in_words(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
     )
-
-
-def _kinds(channels: Channels | None) -> str:
-    if channels is None:
-        return "plain coordinates"
-    columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
-    return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:

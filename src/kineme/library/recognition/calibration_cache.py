@@ -35,7 +35,7 @@ def sample_comparison(store: Store, members: Members) -> Comparison:
     """A comparison with widths and weights that are fitted to a sample of the members."""
     chosen, how = evenly_spaced(len(members.ids), _SAMPLE), store.specification
     references = described_references(store, members.ids[chosen], members.labels[chosen])
-    return fit_to_references(how.comparison, references, how.weights)[0]
+    return fit_to_references(how.comparison, references, how.weights, store.channels)[0]
 
 
 def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:

@@ -76,7 +76,7 @@ def known_members(store: Store, members: Members) -> KnownClasses:
     how = store.specification
     references = described_references(store, members.ids, members.labels)
     references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
-    return fit_known_classes(how.comparison, references, how.weights, how.classifier, members.groups)
+    return fit_known_classes(how.comparison, references, how.weights, how.classifier, members.groups, store.channels)
 
 
 def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:

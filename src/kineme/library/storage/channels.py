@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -42,11 +43,14 @@ def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
 
 def _channel(one: dict[str, Any]) -> Channel:
     columns, unit = tuple(one["columns"]), one["unit"]
-    channel = Channel(one["name"], one["kind"], columns, unit, one["order"])
+    period = one.get("period", 0.0)  # earlier versions did not say it
+    channel = Channel(one["name"], one["kind"], columns, unit, one["order"], period)
     texts = [channel.name, *columns, *([] if unit is None else [unit])]
     sized = len(columns) == (4 if channel.kind == "orientation" else 1)
     ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
-    if channel.kind not in KINDS or not sized or not ordered or not all(isinstance(text, str) for text in texts):
+    texts_only = all(isinstance(text, str) for text in texts)
+    periodic = period is None or (isinstance(period, float) and math.isfinite(period) and period >= 0)
+    if channel.kind not in KINDS or not (sized and ordered and texts_only and periodic):
         raise ValueError("no channel")
     return channel
 

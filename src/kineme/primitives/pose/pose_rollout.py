@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.rotations.quaternions import product
 from kineme.movements.rotations.rotation_vectors import exp
 from kineme.primitives.base_rollout import BaseRollout
@@ -88,6 +89,15 @@ class PoseRollout(BaseRollout):
     def axis_names(self) -> list[str]:
         """What the columns of `positions` are called: x, y, z and qw, qx, qy, qz."""
         return [*"xyz"[: self.tangent.starts.shape[1] - 3], "qw", "qx", "qy", "qz"]
+
+    @property
+    def channels(self) -> Channels:
+        """What the columns of `positions` are: positions, and an orientation (w, x, y, z)."""
+        *positions, w, x, y, z = self.axis_names
+        return (
+            *(Channel(name, "position", (name,)) for name in positions),
+            Channel("q", "orientation", (w, x, y, z), None, "wxyz"),
+        )
 
     @property
     def rate_names(self) -> list[str]:
