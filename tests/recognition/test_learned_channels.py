@@ -150,8 +150,17 @@ def test_columns_of_the_same_names_are_what_was_learned_whatever_their_values_lo
 def test_a_list_of_movements_of_several_channels_is_refused_too(of_poses):
     six = tuple(Channel(f"j{k}", "angle", (f"j{k}",), "rad") for k in range(6))
     odd = of_joints([np.cumsum(np.random.default_rng(0).normal(size=(30, 6)), axis=0)], ["a"], six)[0]
-    with pytest.raises(TrajectoryError, match=r"got j0 \(angle\)"):
+    with pytest.raises(TrajectoryError, match=r"index 1 of the list: .* got j0 \(angle\)"):
         of_poses.predict([poses()[0], odd])
+
+
+def test_movements_of_a_list_are_converted_by_their_own_channels(of_poses):
+    asked = poses(seed=1)
+    made = PoseDMP().learn(asked).rollout(n_samples=80)
+    found = of_poses.comparison_.checked([asked[0], made[0], made, Trajectory(asked[0].times, asked[0].recorded, "a")])
+    assert len(found) == 9
+    np.testing.assert_allclose(found[1].positions[-1], found[0].positions[-1], atol=0.02)
+    np.testing.assert_allclose(found[8].positions, found[0].positions, atol=1e-12)
 
 
 def test_another_width_is_refused_with_what_was_expected(of_poses, of_angles):

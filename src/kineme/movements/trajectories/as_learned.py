@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -45,32 +47,46 @@ def as_learned(
     TrajectoryError
         Channels of other kinds, another number of columns, or columns of a quaternion that is not of norm 1.
     """
+    if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
+        return _one_by_one(movements, learned, n_dims, what)
     demos = Demonstrations.of(movements)
     if demos.channels is not None:
         return _of_kinds(demos, learned, n_dims, what)
-    if isinstance(movements, (list, tuple)):  # movements of several channels have none together
-        several = {one.channels: one for one in movements if isinstance(one, Trajectory) and one.channels is not None}
-        for one in several.values():
-            _of_kinds(Demonstrations([one]), learned, n_dims, what)
     if learned is not None and demos.n_dims == len(recorded_names(learned)):
-        return _converted(demos, learned)
+        return of_columns(demos, learned)
     if demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     return demos
+
+
+def _of_several_channels(movements: Sequence[Any]) -> bool:
+    """Whether channels differ in a list: of all its movements together nothing would be known."""
+    every = {id(channels): channels for channels in (getattr(one, "channels", None) for one in movements)}
+    return len(every) > 1 and len({*every.values()}) > 1
+
+
+def _one_by_one(movements: Sequence[Any], learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
+    found: list[Trajectory] = []
+    for i, one in enumerate(movements):
+        try:
+            found += as_learned(one if hasattr(one, "demonstrations") else [one], learned, n_dims, what)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"index {i} of the list: {error}") from error
+    return Demonstrations(found)
 
 
 def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
     """Movements with channels."""
     channels = demos.channels or ()
     if learned is None:  # learned as plain columns: so is what is asked
-        plain = demos if demos.n_dims == n_dims else _as_recorded(demos)
+        plain = demos if demos.n_dims == n_dims else as_recorded(demos)
         if plain.n_dims == n_dims:
             return plain
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     if moving_kinds(channels) == moving_kinds(learned):
         return _with_lever(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
     if recorded_names(channels) == recorded_names(learned):
-        return _converted(_as_recorded(demos), learned)
+        return of_columns(as_recorded(demos), learned)
     if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     raise TrajectoryError(
@@ -90,7 +106,7 @@ def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     )
 
 
-def _converted(demos: Demonstrations, learned: Channels) -> Demonstrations:
+def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
     """Movements whose positions are recorded columns, by what these are."""
     if all(one.kind == "position" for one in learned):
         return demos
@@ -98,8 +114,8 @@ def _converted(demos: Demonstrations, learned: Channels) -> Demonstrations:
     return Demonstrations.of_movements(of_channels(raw, learned), demos.steps)
 
 
-def _as_recorded(demos: Demonstrations) -> Demonstrations:
-    """The recorded columns as plain positions."""
+def as_recorded(demos: Demonstrations) -> Demonstrations:
+    """The recorded columns as plain positions, of which nothing else is known."""
     plain = replace(demos.movements, positions=demos.recorded, recorded=None, channels=None, dimensions=None)
     return Demonstrations.of_movements(plain, demos.steps)
 
