@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, cast
 
@@ -14,6 +14,7 @@ from kineme.comparison.described import Described
 from kineme.comparison.fit import fit_comparison, fit_to_references
 from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, score
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
@@ -23,6 +24,10 @@ from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
+
+
+#: What calibrates references, as `calibrate` does.
+Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None], Calibration]
 
 
 class FittedRecognizer(Protocol):
@@ -89,21 +94,26 @@ def fit_known_classes(
     classifier: str = "auto",
     groups: NDArray[np.intp] | None = None,
     channels: Channels | None = None,
+    calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
     """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
-    `channels` are what was recorded of the movements, where that is known.
+    `channels` are what was recorded of the movements, where that is known. `calibrated` may hold a calibration in store.
     """
-    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups)
+    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups, calibrated)
 
 
 def _known(
-    comparison: Comparison, references: References, classifier: str, groups: NDArray[np.intp] | None = None
+    comparison: Comparison,
+    references: References,
+    classifier: str,
+    groups: NDArray[np.intp] | None = None,
+    calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
         fitted = fit_classifier(classifier, comparison, references)
-        calibration = calibrate(comparison.similarity, references, groups)
+        calibration = calibrated(comparison.similarity, references, groups)
     return KnownClasses(comparison, references, fitted, calibration)
 
 
