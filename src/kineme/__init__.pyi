@@ -31,6 +31,10 @@ from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimitives
 from kineme import orientation as orientation
 from kineme import styles as styles
+from kineme.primitives.discrete.choose import BasisSelection as BasisSelection
+from kineme.primitives.contextual.contextual import Contextual as Contextual
+from kineme.primitives.improvement.improve import improve as improve
+from kineme.primitives.improvement.improve import Improvement as Improvement
 
 # Features and kernels
 from kineme.features.dmp_features import DMPFeatures as DMPFeatures

@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,11 +102,13 @@ def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Col
 
 def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     one = as_recording(movement)
-    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
-    if one.channels is not None:
+    rates: Any = getattr(movement, "rate_names", None)  # of rollouts
+    if one.channels is not None and (rates is None or getattr(movement, "channels", None) is not None):
         named = ColumnNames(recorded_names(one.channels), learned_names(one.channels))
-        return {"times": one.times, "positions": one.recorded, **derivatives}, named
-    return {"times": one.times, "positions": one.positions, **derivatives}, None
+        return {"times": one.times, "positions": one.recorded}, named
+    derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
+    of_rollout = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
+    return {"times": one.times, "positions": one.positions, **derivatives}, of_rollout
 
 
 def _csv(columns: Columns, names: ColumnNames | None) -> bytes:

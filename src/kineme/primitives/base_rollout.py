@@ -18,6 +18,7 @@ from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.batch import Batch
+from kineme.primitives.recorded_as import RecordedAs, with_recorded
 from kineme.validation import Array
 
 if TYPE_CHECKING:
@@ -54,6 +55,20 @@ class BaseRollout(ABC):
         """Accelerations, per second squared."""
 
     @property
+    def _shares(self) -> Array:
+        """When the samples are, as a share of the duration (T,)."""
+        return np.asarray(self.times[0] / self.times[0, -1])
+
+    @property
+    def _to_recording(self) -> RecordedAs | None:
+        return self._batch.to_recording
+
+    @property
+    def _column_channels(self) -> Channels | None:
+        """What the columns of `positions` are, where these are no coordinates and no recording is known."""
+        return None
+
+    @property
     @abstractmethod
     def _batch(self) -> Batch:
         """The primitives that move, one for each movement or one for all."""
@@ -68,12 +83,19 @@ class BaseRollout(ABC):
     @property
     def axis_names(self) -> list[str]:
         """What the d columns of `positions` are called, in tables and figures."""
-        return axis_names(self.positions.shape[2])
+        about = self._to_recording
+        return axis_names(self.positions.shape[2]) if about is None else list(about.column_names)
+
+    @property
+    def rate_names(self) -> list[str]:
+        """What the columns of `velocities` and `accelerations` are called."""
+        about = self._to_recording
+        return axis_names(self.velocities.shape[2]) if about is None else list(about.rate_names)
 
     @property
     def channels(self) -> Channels | None:
-        """What the columns of `positions` are; None where they are what was learned."""
-        return None
+        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        return self._batch.channels
 
     @property
     def labels(self) -> NDArray[Any] | None:
@@ -89,9 +111,13 @@ class BaseRollout(ABC):
 
     @cached_property
     def demonstrations(self) -> Demonstrations:
-        """The movements as `Demonstrations`, with the labels and names of their primitives.
+        """The movements as `Demonstrations`, with the labels, names and channels of their primitives.
 
-        Their positions are those generated, quaternions too: `channels` say so, and recognition converts them.
+        Of primitives that were learned from recordings with named columns they are what a recording of the movement
+        would be: orientations in the recorded order, and discrete channels that step where they did.
+
+        Of other poses the positions are the columns that are generated, quaternions (w, x, y, z) too. Their channels
+        say so, and recognition converts them.
 
         Raises
         ------
@@ -99,10 +125,14 @@ class BaseRollout(ABC):
             Movements that are none, as of fewer than four samples.
         """
         made = Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
-        if self.channels is None:
+        about = self._to_recording
+        if about is not None:
+            return Demonstrations.of_movements(with_recorded(made.movements, about, self._shares, len(self._batch)))
+        if (columns := self._column_channels) is None:
             return made
-        known = replace(made.movements, channels=self.channels, dimensions=recorded_names(self.channels))
-        return Demonstrations.of_movements(known)
+        return Demonstrations.of_movements(
+            replace(made.movements, channels=columns, dimensions=recorded_names(columns))
+        )
 
     @property
     def trajectories(self) -> Demonstrations:

@@ -25,7 +25,6 @@ from kineme.recognition.conformal import Calibration, calibrate, check_error_rat
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
 
-
 #: What calibrates references, as `calibrate` does.
 Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None], Calibration]
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from kineme.errors import DataError, TrajectoryError
+from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.collect import collect_arrays
@@ -57,6 +59,7 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
         copy=True,
     )
     channels = find_channels(dimensions, movements.positions, movements.offsets, layout.kinds or {})
+    movements = replace(movements, positions=in_order(movements.positions, dimensions, channels))
     return of_channels(movements, channels)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.movements_like import MovementsLike
     from kineme.primitives.control.controller import Controller
     from kineme.primitives.control.obstacles import ObstacleAvoidance
+    from kineme.primitives.discrete.choose import BasisSelection
     from kineme.primitives.discrete.rollout import Rollout
 
 
@@ -97,6 +99,58 @@ class DMP(Specification):
         from kineme.primitives.discrete.encode import encode  # movements load when there are some
 
         return Primitives(self, **encode(self, movements))
+
+    def choose(
+        self,
+        movements: MovementsLike,
+        *,
+        n_basis: Sequence[int] | None = None,
+        ridge: Sequence[float] | None = None,
+        tolerance: float = 0.005,
+        negligible: float = 1e-4,
+    ) -> BasisSelection[Self]:
+        """Choose the number of basis functions and the ridge by generalized cross-validation.
+
+        ``mean (y - H y)^2 / (1 - trace(H) / T)^2`` estimates the mean squared error of predicting a sample of a path
+        from all its others (Golub, Heath and Wahba 1979, Eq. 1.4). Chosen for all movements together are the
+        fewest basis functions that are good enough, with their best ridge; all else stays as in this specification.
+
+        Parameters
+        ----------
+        movements : as `learn` takes them
+            Noise is assumed to be independent from sample to sample; smoothed recordings are followed too closely. More
+            than 2,000 movements are represented by 2,000 of them.
+        n_basis : sequence of int, optional
+            Numbers to try; by default from 6 to 100, at most as many as samples.
+        ridge : sequence of float, optional
+            Ridges to try; by default powers of ten from 1e-12 to 100.
+        tolerance : float, default 0.005
+            Good enough is an error within this share of the smallest one; the noise of the samples is part of both,
+        negligible : float, default 1e-4
+            or below this share of the movements' extents.
+
+        Returns
+        -------
+        BasisSelection
+            With ``dmp``, the specification to learn with, and the error of all that was tried.
+
+        Raises
+        ------
+        SpecificationError
+            ``fit="forcing"``; numbers or ridges out of range.
+        TrajectoryError
+            Movements that cannot be used: see `learn`.
+
+        Examples
+        --------
+        >>> import kineme
+        >>> demos = kineme.load_lasa(["CShape"])
+        >>> selection = kineme.DMP().choose(demos)
+        >>> primitives = selection.dmp.learn(demos)
+        """
+        from kineme.primitives.discrete.choose import choose  # only who chooses needs it
+
+        return choose(self, movements, n_basis, ridge, tolerance, negligible)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -64,7 +64,7 @@ class Rollout(BaseRollout):
     @property
     def times(self) -> Array:
         """Times of the samples (n, T) [s]."""
-        return self.durations[:, None] * np.linspace(0.0, self.end, self.n_samples)
+        return self.durations[:, None] * self._shares
 
     @cached_property
     def positions(self) -> Array:
@@ -80,6 +80,10 @@ class Rollout(BaseRollout):
     def accelerations(self) -> Array:
         """Accelerations (n, T, d), per second squared."""
         return self._derivative(2)
+
+    @property
+    def _shares(self) -> Array:
+        return np.linspace(0.0, self.end, self.n_samples)
 
     @property
     def _batch(self) -> Batch:
