@@ -86,7 +86,7 @@ def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
     return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
 
 
-def fit_known_classes(
+def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
     specification: ComparisonSpecification,
     references: References,
     weights: str | Sequence[float] = "auto",
@@ -98,7 +98,7 @@ def fit_known_classes(
     """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
-    `channels` are what was recorded of the movements, where that is known. `calibrated` may hold a calibration in store.
+    `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.
     """
     return _known(*fit_to_references(specification, references, weights, channels), classifier, groups, calibrated)
 
