@@ -142,15 +142,22 @@ def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_o
     assert library.verify() == []
 
 
+def nameless(demos):
+    """Poses as arrays: positions, and quaternions (w, x, y, z)."""
+    blocks = np.split(demos.recorded[:, [1, 2, 3, 7, 4, 5, 6]], demos.offsets[1:-1])
+    return Demonstrations.from_arrays(blocks, demos.labels, [one.times for one in demos])
+
+
 @pytest.mark.parametrize("exhaustive", [0, 100])
-def test_generated_poses_are_recognized(library, exhaustive):
-    made = PoseDMP().learn(poses()).rollout(n_samples=100)
+@pytest.mark.parametrize("shown", [nameless, lambda demos: demos], ids=["nameless", "named"])
+def test_generated_poses_are_recognized(library, exhaustive, shown):
+    made = PoseDMP().learn(shown(poses())).rollout(n_samples=100)
     asked = LibraryRecognizer(library.store, exhaustive=exhaustive)
     assert [answer.label for answer in asked.recognize(made)] == list("ababab")
 
 
 def test_generated_poses_are_learned_as_poses(tmp_path):
-    made = PoseDMP().learn(poses()).rollout(n_samples=100)
+    made = PoseDMP().learn(nameless(poses())).rollout(n_samples=100)
     with ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(made)
         assert library.n_dims == 6

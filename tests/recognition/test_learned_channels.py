@@ -40,6 +40,15 @@ def poses(channels=POSE, seed=0, n=6):
     return Demonstrations.of_movements(of_channels(plain.movements, channels))
 
 
+def nameless(demos):
+    """Poses as arrays: positions, and quaternions (w, x, y, z)."""
+    blocks = np.split(demos.recorded[:, [1, 2, 3, 7, 4, 5, 6]], demos.offsets[1:-1])
+    return Demonstrations.from_arrays(blocks, demos.labels, [one.times for one in demos])
+
+
+both = pytest.mark.parametrize("shown", [nameless, lambda demos: demos], ids=["nameless", "named"])
+
+
 def joints(seed=0, n=6):
     """Joint angles that wrap, as recorded, and their times."""
     u = np.linspace(0, 1, 60)
@@ -90,9 +99,10 @@ def test_recorded_columns_are_converted_and_coordinates_taken_as_they_are(of_pos
     same(of_poses.recognize([Trajectory(one.times, one.positions) for one in asked]), expected)
 
 
-def test_generated_poses_are_recognized_whatever_the_order_of_their_quaternions(of_poses):
+@both
+def test_generated_poses_are_recognized_whatever_the_order_of_their_quaternions(of_poses, shown):
     asked = poses(seed=1)
-    made = PoseDMP().learn(asked).rollout(n_samples=80)
+    made = PoseDMP().learn(shown(asked)).rollout(n_samples=80)
     assert of_poses.predict(made).tolist() == list("ababab")
     assert [of_poses.recognize(one).label for one in made] == list("ababab")
     assert of_poses.predict(list(made)).tolist() == list("ababab")
@@ -102,12 +112,13 @@ def test_generated_poses_are_recognized_whatever_the_order_of_their_quaternions(
     assert (again.n_dims_, again.predict(asked).tolist()) == (6, list("ababab"))
 
 
-def test_positions_in_a_unit_that_is_not_said_are_in_the_one_that_was_learned():
+@both
+def test_positions_in_a_unit_that_is_not_said_are_in_the_one_that_was_learned(shown):
     channels = (GRIPPER, *(one._replace(unit="mm") for one in XYZ), Q)
     demos = poses(channels)
     recognizer = Recognizer().fit(demos)
     assert np.ptp(demos.positions[:, 3:]) > 100
-    made = PoseDMP().learn(demos).rollout(n_samples=80)
+    made = PoseDMP().learn(shown(demos)).rollout(n_samples=80)
     learned = recognizer.comparison_.checked(made)
     np.testing.assert_allclose(learned.positions[-1, 3:], demos.positions[-1, 3:], atol=2)
     meters = poses((GRIPPER, *(one._replace(unit="m") for one in XYZ), Q))
@@ -154,9 +165,10 @@ def test_a_list_of_movements_of_several_channels_is_refused_too(of_poses):
         of_poses.predict([poses()[0], odd])
 
 
-def test_movements_of_a_list_are_converted_by_their_own_channels(of_poses):
+@both
+def test_movements_of_a_list_are_converted_by_their_own_channels(of_poses, shown):
     asked = poses(seed=1)
-    made = PoseDMP().learn(asked).rollout(n_samples=80)
+    made = PoseDMP().learn(shown(asked)).rollout(n_samples=80)
     found = of_poses.comparison_.checked([asked[0], made[0], made, Trajectory(asked[0].times, asked[0].recorded, "a")])
     assert len(found) == 9
     np.testing.assert_allclose(found[1].positions[-1], found[0].positions[-1], atol=0.02)
