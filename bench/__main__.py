@@ -21,6 +21,7 @@ SUBJECTS = (
     "recognize_files",
     "one_shot",
     "open_set",
+    "outliers",
     "defaults",
     "library",
     "lerobot",
