@@ -43,20 +43,24 @@ def inspect(
     from kineme.files.inspection.report import as_data, as_words
 
     contents = contents_of(recordings[0]) if len(recordings) == 1 else []
+    unlike: tuple[int, ...] = ()
+    found: dict[str, Any] = {}
     try:
         recorded = read(recordings, options)
     except DataError as error:
         if not contents or plot is not None:
             raise
         summary = nothing_read(str(recordings[0]), str(error))
-        texts, unlike, data = [f"not read: {error}"], (), {}
+        texts = [f"not read: {error}"]
     else:
         summary = summarize(recorded)
-        unlike, data, words = _outliers(recorded, error_rate) if outliers else ((), {}, "")
-        texts = [as_words(summary), *([words] if words else [])]
+        texts = [as_words(summary)]
+        if outliers:
+            unlike, found, words = _outliers(recorded, error_rate)
+            texts += [words] if words else []
         if plot is not None:
             _draw(recorded, unlike, plot)
-    data = as_data(summary) | data | ({"contents": contents_as_data(contents)} if contents else {})
+    data = as_data(summary) | found | ({"contents": contents_as_data(contents)} if contents else {})
     say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
 
 
