@@ -71,7 +71,7 @@ def test_what_is_said_of_an_outlier():
     assert (data["found"][0]["movement"], data["checked"], data["error_rate"]) == ("m2", 21, 0.05)
     labels[2] = "CShape"
     assert outliers_as_words(find_outliers(demos, labels), names) == (
-        "no outliers: each of 21 movements is like others of its label"
+        "no outliers: none of 21 movements is unlike the others of its label"
     )
 
 

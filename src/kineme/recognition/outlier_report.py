@@ -29,7 +29,7 @@ def outliers_as_words(outliers: Outliers, names: Sequence[str]) -> str:
     if not outliers.checked:
         return ""
     if not outliers.found:
-        return f"no outliers: each of {counted(outliers.checked, 'movement')} is like others of its label"
+        return f"no outliers: none of {counted(outliers.checked, 'movement')} is unlike the others of its label"
     title = (
         f"outliers: {len(outliers.found):,} of {counted(outliers.checked, 'movement')} unlike the others of their label"
         f" (about {100 * outliers.error_rate:.2g} % of those listed are false alarms)"

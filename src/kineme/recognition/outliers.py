@@ -93,9 +93,10 @@ def find_outliers(
     label, ``d = sqrt(-2 log K)`` by the similarity K of `Recognizer`, over the typical one s, the median of its label
     shrunk towards that of all as if by four more movements; e is its distance from the nearest of some 500 movements of
     other labels, h the median of e. Above their median m, scores of movements that are alike fall about exponentially,
-    ``p = exp(-(a - m) / t) / 2`` with ``t = (q - m) / log(5 / 2)``; q is the score that a fifth exceeds. Both are of
-    the set itself, and hardly change if some of it are outliers. Of all movements, those are found that the procedure
-    of Benjamini and Hochberg lists: with n movements, the k of smallest p where the k-th has ``p <= error_rate k / n``.
+    ``p = exp(-(a - m) / t) / 2`` with ``t = (1 + 1 / sqrt(n)) (q - m) / log(5 / 2)`` among n movements; q is the
+    score that a fifth exceeds, and the first factor is for what is not known of it. Both are of the set itself, and
+    hardly change if some of it are outliers. Those movements are found that the procedure of Benjamini and Hochberg
+    lists: the k of smallest p where the k-th has ``p <= error_rate k / n``.
 
     Shape counts; place, size and duration do not, nor do rotations that are usual. The law is an approximation:
     `docs/recordings.md` has measured rates.
@@ -156,6 +157,7 @@ def tail_p_values(scores: Array) -> Array:
     """P-values of scores by the law that their middle tells, see `find_outliers`."""
     middle, upper = np.quantile(scores, [_MIDDLE, _UPPER])
     step = max(float(upper - middle), _NARROWEST) / math.log((1 - _MIDDLE) / (1 - _UPPER))
+    step *= 1 + 1 / math.sqrt(len(scores))
     return np.asarray(np.minimum(1.0, (1 - _MIDDLE) * np.exp(-(scores - middle) / step)))
 
 
