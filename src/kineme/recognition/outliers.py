@@ -83,7 +83,7 @@ class Outliers:
 
 def find_outliers(
     movements: MovementsLike,
-    labels: Sequence[Label | None] | None = None,
+    labels: Sequence[Label | None] | NDArray[Any] | None = None,
     error_rate: float = 0.05,
     progress: Callable[[int], object] | None = None,
 ) -> Outliers:
@@ -168,7 +168,7 @@ def listed(p_values: Array, error_rate: float) -> NDArray[np.intp]:
     return np.asarray(order[: below[-1] + 1 if len(below) else 0])
 
 
-def _owners(demos: Demonstrations, labels: Sequence[Label | None] | None) -> dict[Any, NDArray[np.intp]]:
+def _owners(demos: Demonstrations, labels: Sequence[Label | None] | NDArray[Any] | None) -> dict[Any, NDArray[np.intp]]:
     """Label -> the movements that have it."""
     given: Any = demos.labels if labels is None else labels
     if given is None:
