@@ -52,6 +52,7 @@ from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring
+from kineme import robots as robots
 from kineme.library.library import ActionLibrary as ActionLibrary
 
 # Errors and warnings
@@ -61,6 +62,7 @@ from kineme.errors import DegenerateMovementError as DegenerateMovementError
 from kineme.errors import SpecificationError as SpecificationError
 from kineme.errors import DataError as DataError
 from kineme.errors import DegenerateMovementWarning as DegenerateMovementWarning
+from kineme.errors import ExtrapolationWarning as ExtrapolationWarning
 
 __version__: str
 __all__: list[str]

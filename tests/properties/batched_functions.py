@@ -11,7 +11,7 @@ import atexit
 import shutil
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,9 @@ from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
+from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.fits import FITS
@@ -159,6 +161,16 @@ def rollout_of(demos: Demonstrations) -> list[dict[str, Any]]:
     ends, tau = primitives.goals - primitives.starts, primitives.durations
     options = {"start": primitives.starts + 0.1 * ends, "goal": primitives.goals + 0.3 * ends, "duration": 2 * tau}
     return moved(demos, primitives.rollout(**options, velocity=0.5 * ends / tau[:, None]))
+
+
+def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Through a point of its own, with one dimension free, and on at the goal; as primitives of their own."""
+    primitives = DMP("decoupled", n_basis=20).learn(demos)
+    ends, tau = primitives.goals - primitives.starts, primitives.durations
+    points = primitives.starts + 0.4 * ends
+    points[ends[:, 0] > 0, 1] = np.nan
+    path = primitives.rollout(via=[(0.4, points)], end_velocity=0.2 * ends / tau[:, None])
+    return moved(demos, Primitives.from_rollout(path).rollout())
 
 
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:
@@ -431,6 +443,26 @@ def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
     )
 
 
+def recorded_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
+    """What a recording of the replayed poses would be, with a gripper that steps; positions in extents of their own."""
+    elapsed = demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
+    gripper = elapsed > np.repeat(demos.durations / 3.0, demos.lengths)
+    columns = np.column_stack((demos.positions[:, [0, 1, 2, 4, 5, 6, 3]], gripper))
+    channels = (
+        *(Channel(axis, "position", (axis,)) for axis in "xyz"),
+        Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw"),
+        Channel("gripper", "discrete", ("gripper",)),
+    )
+    named = Demonstrations.of_movements(of_channels(replace(demos.movements, positions=columns), channels))
+    primitives = PoseDMP(DMP(n_basis=20)).learn(named)
+    primitives = type(primitives).concatenate([primitives[i] for i in range(len(primitives))])
+    rollout = primitives.rollout(n_samples=200)
+    assert rollout.channels == primitives.to_recording.channels == channels
+    recorded = rollout.demonstrations.recorded.reshape(len(demos), 200, 8)
+    start, unit = demos.positions[demos.offsets[:-1], None, :3], pose_extents(demos)[:, None, None]
+    return each(len(demos), path=(recorded[..., :3] - start) / unit, other=recorded[..., 3:])
+
+
 def tangents(demos: Demonstrations) -> list[dict[str, Any]]:
     """There and back, and the quaternions one by one."""
     tangent, references = to_tangent(demos)
@@ -490,6 +522,7 @@ TABLE = [
     *(feature_row(formulation, feature, fit) for formulation in FORMULATIONS for feature in FEATURES for fit in FITS),
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
+    Batched("Primitives.rollout via", modulated, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),
     step_row(Resample(60), 1e-10),
@@ -519,6 +552,7 @@ TABLE = [
     *(rhythm_row(RhythmicDMP(fit=fit)) for fit in FITS),
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),
     Batched("PoseDMP.learn", pose_numbers, 1e-6, draw=poses),
+    Batched("PoseDMP.learn of channels", recorded_numbers, 1e-6, draw=poses),
     Batched("to_tangent", tangents, 1e-12, draw=poses),
     Batched("PoseFeatures", pose_features, 1e-8, draw=poses),
     style_row(),
