@@ -23,7 +23,7 @@ from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
-#: movements of 26 classes in space: 2.2 s until the first answer of all and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
+#: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
 EXHAUSTIVE = 2500
 
 
