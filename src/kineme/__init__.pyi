@@ -62,6 +62,7 @@ from kineme.errors import DegenerateMovementError as DegenerateMovementError
 from kineme.errors import SpecificationError as SpecificationError
 from kineme.errors import DataError as DataError
 from kineme.errors import DegenerateMovementWarning as DegenerateMovementWarning
+from kineme.errors import ExtrapolationWarning as ExtrapolationWarning
 
 __version__: str
 __all__: list[str]
