@@ -30,15 +30,17 @@ _NEW_FILE = click.Path(path_type=Path)
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
 @click.option("--robot", required=True, help="panda, ur5e, wam, so101, or a .urdf file.")
 @click.option("--tip", help="Link that follows the movement.  [default: the end of the arm]")
-@click.option("--at", type=Numbers(), help="Where the movement starts, in the frame of the robot.  [default: where the arm does it best]")
-@click.option("--goal", type=Numbers(), help="Where it ends, in the frame of the robot.  [default: as demonstrated from its start]")
+@click.option("--at", type=Numbers(), help="Start in the frame of the robot.  [default: where the arm does it best]")
+@click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
+@click.option("--goal", type=Numbers(), help="End in the frame of the robot.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
-@click.option("--scale", type=Finite(), default=1.0, show_default=True, help="Meters for one unit of the recording; for movements of the tip.")
+@click.option("--scale", type=Finite(), default=1.0, show_default=True, help="Meters for one unit of the recording.")
 @click.option("--joints", is_flag=True, help="SOURCE is a movement of the joints, not of the tip.")
-@click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True, help="Where the axes of a movement in the plane lie.")
-@click.option("--orientation", type=Numbers(), help="Of the tip, as w,x,y,z.  [default: as demonstrated, else as at rest]")
+@click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True,
+              help="Where the axes of a movement in the plane lie.")  # fmt: skip
+@click.option("--orientation", type=Numbers(), help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]")
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
-              help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")
+              help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
 @click.option("--from", "start", type=Numbers(), help="Where the joints stand now.  [default: the rest posture]")
 @click.option("--slow-down", is_flag=True, help="Slow the movement down as far as limits demand.")
 @click.option("--fastest", is_flag=True, help="Pass the path in the least time that the limits allow.")
@@ -68,9 +70,9 @@ def move(**options: Any) -> None:
     kineme move wave --library actions/ --robot panda --at 0.45,0.1,0.3 --goal 0.5,-0.2,0.4 -o wave_joints.csv
     kineme move wave --library actions/ --robot my_robot.urdf --tip tool0 --slow-down --ros2 wave.mcap
     """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.output.table import to_text
     from kineme.robots.checks.report import preflight_table
     from kineme.robots.models.robot import load
-    from kineme.output.table import to_text
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")
@@ -82,27 +84,33 @@ def move(**options: Any) -> None:
     for sentence in robot.assumed:
         write(f"note: {sentence}", err=True)
     if not to_screen:
-        say(options["as_json"], _as_data(made), lambda: "\n".join([to_text(preflight_table(made.preflight)), _summary(made)]))
+        say(
+            options["as_json"],
+            _as_data(made),
+            lambda: "\n".join([to_text(preflight_table(made.preflight)), _summary(made)]),
+        )
     _write(made, options)
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
-    from kineme.robots.robot_movement import InfeasibleError, move as move_robot
+    from kineme.robots.robot_movement import InfeasibleError
+    from kineme.robots.robot_movement import move as move_robot
 
-    generated, in_place = _generated(robot, options)
+    generated = _generated(options)
     timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
     try:
         return move_robot(
-            generated,
+            generated.movement,
             robot,
             space="joints" if options["joints"] else "tip",
             orientation=options["orientation"],
             follow=options["follow"],
             plane=options["plane"],
-            place="as given" if in_place else "free",
+            place="as given" if options["at"] or options["as_recorded"] or options["joints"] else "free",
             timing=timing,
             rate=options["rate"],
             start=options["start"],
+            steps=generated.steps,
             force=options["force"],
         )
     except InfeasibleError as error:
@@ -114,16 +122,17 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         raise
 
 
-def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, bool]:
-    """The movement of the tip [m] or the joints, and whether its place is given."""
+def _generated(options: dict[str, Any]) -> Any:
+    """The movement of the tip [m] or of the joints."""
     from kineme.robots.placed import placed
 
-    learned = read_source(options)
+    if options["goal"] and not (options["at"] or options["as_recorded"] or options["joints"]):
+        raise click.UsageError("expected --at with --goal: where the movement starts; or --as-recorded")
     return placed(
-        learned,
-        at=options["at"],
-        goal=options["goal"],
-        duration=options["duration"],
+        read_source(options),
+        options["at"],
+        options["goal"],
+        options["duration"],
         scale=options["scale"],
         rate=options["rate"],
         joints=options["joints"],
@@ -143,10 +152,10 @@ def _summary(made: Any) -> str:
 def _as_data(made: Any) -> dict[str, Any]:
     import math
 
-    checks = [
-        {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in one._asdict().items()}
-        for one in made.preflight.checks
-    ]
+    def known(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    checks = [{name: known(value) for name, value in one._asdict().items()} for one in made.preflight.checks]
     return {
         "robot": made.robot.name,
         "duration": made.trajectory.duration,

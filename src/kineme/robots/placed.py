@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channel
 from kineme.movements.channels.coordinates import as_wxyz, columns_of
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
@@ -60,22 +61,71 @@ def placed(  # noqa: PLR0913 - one parameter per option
     SpecificationError
         A start or goal of another number of coordinates.
     """
-    columns, orientation, discrete = _columns(learned, joints)
-    start = _start(learned)[columns]
-    axes = list(range(len(columns))) if joints or len(columns) == 3 else list(PLANES[plane])
-    begin, end = _point(at, "at", len(columns) if joints else 3), _point(goal, "goal", len(columns) if joints else 3)
+    found = _columns(learned, joints)
+    shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
+    n = len(found.positions)
+    axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
+    begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
     unit = 1.0 if joints else scale
+    start = shown[0, found.positions]
     origin = start * unit if begin is None else begin[axes]
     target = None
     if end is not None:
-        target = _whole_goal(learned, columns, start + (end[axes] - origin) / unit)
+        wanted = shown[-1].copy()
+        wanted[found.positions] = start + (end[axes] - origin) / unit
+        target = wanted[found.moving]
     made = generate(learned, MovementOptions(goal=target, duration=duration, rate=rate)).columns
-    moved = (made["positions"][:, columns] - start) * unit + origin
-    if not joints and len(columns) == 2 and begin is not None:
+    moved = (made["positions"][:, found.positions] - start) * unit + origin
+    if begin is not None and not joints and n == 2:
         in_space = np.tile(begin, (len(moved), 1))
         in_space[:, axes] = moved
         moved = in_space
-    if orientation is not None:
-        moved = np.column_stack((moved, orientation(made["positions"])))
-    steps = {name: made["positions"][:, column] for name, column in discrete.items()}
+    if found.orientation is not None and moved.shape[1] == 3:
+        moved = np.column_stack((moved, as_wxyz(made["positions"][:, found.orientation[1]], found.orientation[0])))
+    steps = {name: made["positions"][:, column] for name, column in found.discrete.items()}
     return Placed(Trajectory(times=made["times"], positions=moved), steps)
+
+
+class _Columns(NamedTuple):
+    """Columns of a recording by what an arm does with them."""
+
+    positions: list[int]
+    moving: list[int]  # all but the discrete ones
+    orientation: tuple[Channel, slice] | None
+    discrete: dict[str, int]
+
+
+def _columns(learned: Learned, joints: bool) -> _Columns:
+    channels = learned.primitive.channels
+    if channels is None:
+        everything = list(range(len(learned.columns)))
+        return _checked(_Columns(everything, everything, None, {}), learned, joints)
+    at = list(zip(channels, columns_of(channels), strict=True))
+    kinds = ("angle", "position") if joints else ("position",)
+    turned = [(one, columns) for one, columns in at if one.kind == "orientation"]
+    found = _Columns(
+        [columns.start for one, columns in at if one.kind in kinds],
+        [k for one, columns in at if one.kind != "discrete" for k in range(columns.start, columns.stop)],
+        turned[0] if len(turned) == 1 and not joints else None,
+        {one.name: columns.start for one, columns in at if one.kind == "discrete"},
+    )
+    return _checked(found, learned, joints)
+
+
+def _checked(found: _Columns, learned: Learned, joints: bool) -> _Columns:
+    if not joints and len(found.positions) not in (2, 3):
+        raise TrajectoryError(
+            f"expected two or three positions of the tip, got {len(found.positions)} among "
+            f"{', '.join(learned.columns)}; choose columns, or say that it is a movement of the joints (joints=True, "
+            "--joints)"
+        )
+    return found
+
+
+def _point(point: ArrayLike | None, name: str, n: int) -> Array | None:
+    if point is None:
+        return None
+    values = as_numbers(point, name)
+    if values.shape != (n,) or not np.isfinite(values).all():
+        raise SpecificationError(f"expected {name} as {n} finite numbers, got {np.asarray(point).tolist()}")
+    return values

@@ -14,10 +14,8 @@ def preflight_table(preflight: Preflight) -> Table:
         (f"{one.what}, {one.where}", f"{one.worst:.3g}", _limit(one), one.unit, f"{one.time:.2f}", _verdict(one))
         for one in preflight.checks
     ]
-    unchecked = "; ".join(preflight.unchecked)
-    return Table(
-        "Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, f"Not checked: {unchecked}." if unchecked else ""
-    )
+    unchecked = f"Not checked: {'; '.join(preflight.unchecked)}." if preflight.unchecked else ""
+    return Table("Preflight", ("check", "worst", "limit", "unit", "at [s]", ""), rows, unchecked)
 
 
 def _limit(check: Check) -> str:

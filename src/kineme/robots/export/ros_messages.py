@@ -36,12 +36,15 @@ def state_messages(types: dict[str, Any], trajectory: JointTrajectory) -> Iterat
     steps = np.column_stack([np.zeros((len(trajectory), 0)), *trajectory.steps.values()])
     for t, time in enumerate(trajectory.times):
         stamp = _nanoseconds(time)
-        yield stamp, types[STATE](
-            header=_header(types, stamp),
-            name=names,
-            position=np.concatenate((trajectory.positions[t], steps[t])),
-            velocity=np.concatenate((trajectory.velocities[t], np.zeros(steps.shape[1]))),
-            effort=np.zeros(0),
+        yield (
+            stamp,
+            types[STATE](
+                header=_header(types, stamp),
+                name=names,
+                position=np.concatenate((trajectory.positions[t], steps[t])),
+                velocity=np.concatenate((trajectory.velocities[t], np.zeros(steps.shape[1]))),
+                effort=np.zeros(0),
+            ),
         )
 
 
