@@ -19,6 +19,7 @@ SUBJECTS = (
     "control",
     "recognize",
     "recognize_files",
+    "stream",
     "one_shot",
     "open_set",
     "defaults",

@@ -137,6 +137,17 @@ def test_a_bad_fit_is_said(tmp_path):
     assert run(path, "--n-basis", 150, "-o", tmp_path / "good.csv").stderr == ""
 
 
+@pytest.mark.parametrize(("ripple", "bad"), [(0.045, False), (0.055, True)])
+def test_a_fit_is_bad_beyond_a_twentieth_of_the_extent(tmp_path, ripple, bad):
+    """Few basis functions follow the way and not the ripples on it, which are so high beside an extent of 1."""
+    times = np.linspace(0, 1, 300)
+    rippled = np.column_stack([times, ripple * np.sin(2 * np.pi * 40 * times)])
+    path = write_movement(tmp_path / "rippled.csv", {"times": times, "positions": rippled})
+    done = run(path, "--n-basis", 10, "-o", tmp_path / "new.csv")
+    assert done.returncode == 0
+    assert ("warning: the fit is off" in done.stderr) == bad
+
+
 def test_short_names_of_columns_tell_them_apart():
     joints = [f"{joint}.pos" for joint in ("shoulder_pan", "shoulder_lift", "elbow_flex")]  # as LeRobot names them
     assert short_names(joints) == ["…ulder_pan.pos", "…lder_lift.pos", "elbow_flex.pos"]

@@ -44,7 +44,7 @@ class Source(NamedTuple):
         Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
     label : str or None
     person : str or None
-        Who showed it, where ``label_pattern`` says it.
+        Who showed it, where a column or ``label_pattern`` says it.
     """
 
     path: str
@@ -92,7 +92,7 @@ class Recordings(MovementSequence):
 
     @property
     def people(self) -> list[str | None] | None:
-        """Who showed each movement, as ``{person}`` in ``label_pattern`` says it; None where it says nothing."""
+        """Who showed each movement, by a column, or ``{person}`` in ``label_pattern``; None where these say nothing."""
         people = [source.person for source in self.sources]
         return people if any(people) else None
 
@@ -149,12 +149,17 @@ def merge_files(
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
     sources = tuple(
-        Source(one.path, one.sha256, one.size, one.mtime, place, label, one.person)
+        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person)
         for one in full
-        for place, label in zip(_block(one).places, _block(one).labels, strict=True)
+        for place, label, person in zip(_block(one).places, _block(one).labels, _people(one), strict=True)
     )
     detected = Counter(one.detected for one in full if one.detected)
     return Recordings(_demonstrations(full, sources, channels), sources, tuple(listed), tuple(detected.most_common()))
+
+
+def _people(one: FileRead) -> Sequence[str | None]:
+    """Who showed each movement, as the file says it."""
+    return _block(one).people or [None] * len(_block(one).labels)
 
 
 def _block(one: FileRead) -> Block:

@@ -41,6 +41,8 @@ class Layout:
         Topics of a bag; of several, the others are interpolated to the stamps of the first.
     frame : str or sequence of str, optional
         Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
+    person : str or int, optional
+        Column that names who showed a movement; another movement begins where it changes.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Layout:
     kinds: Mapping[str, str] | None = None
     topic: str | Sequence[str] | None = None
     frame: str | Sequence[str] | None = None
+    person: Column | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
