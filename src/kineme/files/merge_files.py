@@ -97,6 +97,19 @@ class Recordings(MovementSequence):
         people = [source.person for source in self.sources]
         return people if any(people) else None
 
+    @property
+    def short_names(self) -> list[str]:
+        """A name for each movement: its place where all are of one file, as ``episode 3``; else file and place."""
+        one_file = len({source.path for source in self.sources}) == 1
+        return [
+            source.place
+            if source.place and one_file
+            else f"{source.path}#{source.place}"
+            if source.place
+            else source.path
+            for source in self.sources
+        ]
+
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
         files, problems = counted(n_files, "file"), counted(len(self.problems), "problem")
