@@ -22,6 +22,7 @@ SUBJECTS = (
     "stream",
     "one_shot",
     "open_set",
+    "outliers",
     "defaults",
     "library",
     "lerobot",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
@@ -12,6 +13,7 @@ import pytest
 import kineme
 from kineme import ActionLibrary, Demonstrations
 from kineme.errors import DataError, TrajectoryError
+from kineme.library.storage.channels import channels_of_text, other_columns
 from kineme.library.storage.folder import FILE
 from kineme.library.storage.read import movements
 from kineme.library.symbols.grounding import learned_of
@@ -101,6 +103,70 @@ def test_names_of_plain_columns_bind_nobody(tmp_path):
         library.learn(paths[2:])
         assert movements(library.store, np.array([1, 2, 3])).channels == channels
         assert library.verify() == []
+
+
+def test_angles_are_stored_once_with_the_positions():
+    channels = (Channel("joint", "angle", ("joint",)), *CHANNELS)
+    assert other_columns(channels) == [1, 5, 6, 7, 8]
+    assert other_columns(channels[:1]) == []
+
+
+def test_angles_beside_orientations_come_back_as_precisely_as_positions(tmp_path):
+    random = np.random.default_rng(0)
+    channels = (Channel("joint1", "angle", ("joint1",), "rad"), *CHANNELS)
+    plain = poses()
+    joint = np.cumsum(random.normal(size=len(plain.positions)))[:, None] * 1e-3 + 2.0
+    columns = np.concatenate((joint, plain.recorded), axis=1)
+    demos = of_channels(replace(plain.movements, positions=columns, recorded=None), channels)
+    with ActionLibrary(tmp_path / "joints", create=True) as library:
+        library.learn(Demonstrations.of_movements(demos))
+        stored = movements(library.store, np.arange(1, 7))
+        np.testing.assert_array_equal(stored.recorded[:, 0], stored.positions[:, 0])
+        np.testing.assert_allclose(stored.recorded, demos.recorded, atol=1e-6)
+
+
+@pytest.mark.parametrize("spoil", [lambda blob: blob[:-4], lambda blob: blob + blob[:4], lambda blob: b""])
+def test_columns_of_another_size_are_refused(library, spoil):
+    folder = library.store.folder
+    library.close()
+    with closing(sqlite3.connect(folder / FILE)) as connection, connection:
+        from kineme.library.storage.rows import seal
+
+        table = connection.execute("SELECT * FROM recorded WHERE movement = 1")
+        names = [one[0] for one in table.description]
+        row = dict(zip(names, table.fetchone(), strict=True))
+        (blob,) = [name for name, value in row.items() if isinstance(value, bytes)]
+        row[blob] = spoil(row[blob])
+        crc = seal("recorded", tuple(value for name, value in row.items() if name != "crc"))
+        connection.execute(f"UPDATE recorded SET {blob} = ?, crc = ? WHERE movement = 1", (row[blob], crc))
+    with ActionLibrary(folder, read_only=True) as damaged, pytest.raises(DataError, match="recorded"):
+        movements(damaged.store, np.array([1]))
+
+
+def _spoiled(**changes):
+    channels = [one._asdict() for one in CHANNELS]
+    channels[changes.pop("at")] |= changes
+    return json.dumps(channels)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _spoiled(at=4, order="zyxw"),
+        _spoiled(at=4, order=""),
+        _spoiled(at=1, order="wxyz"),
+        _spoiled(at=0, kind="angle"),
+        _spoiled(at=4, columns=["a", "b", "c"]),
+        _spoiled(at=1, columns=["a", "b"]),
+        _spoiled(at=1, kind="color"),
+        _spoiled(at=1, unit=5),
+        _spoiled(at=1, name=None),
+    ],
+)
+def test_a_channel_of_which_one_thing_is_wrong_is_refused(text, tmp_path):
+    with pytest.raises(DataError, match="recorded as"):
+        channels_of_text(text, 6, tmp_path)
+    assert channels_of_text(json.dumps([one._asdict() for one in CHANNELS]), 6, tmp_path) == CHANNELS
 
 
 @pytest.mark.parametrize("text", ["[]", "x", '[{"name": 1}]', "[" * 100_000])
