@@ -1,6 +1,7 @@
 """What columns are, from the file on: names and kinds are kept, and what is no orientation is refused by name."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kineme
@@ -165,3 +166,14 @@ def test_headers_of_messages_are_no_coordinates(tmp_path, before):
     assert [one.kind for one in recordings.demonstrations.channels] == ["position", "orientation"]
     assert recordings.detected[0][0].ignored == tuple(heads[1:5])
     assert recordings.demonstrations.durations[0] == pytest.approx(1)
+
+
+def test_columns_of_a_quaternion_that_stand_apart_are_read_alike_from_files_and_frames(tmp_path):
+    u = np.linspace(0, 1, 40)
+    q = np.column_stack([np.cos(u), np.sin(u) * 0.6, 0 * u, np.sin(u) * 0.8])
+    columns = {"t": u, "qw": q[:, 0], "x": u**2, "qx": q[:, 1], "y": 1 - u, "qy": q[:, 2], "qz": q[:, 3]}
+    frame = pd.DataFrame(columns)
+    frame.to_csv(tmp_path / "apart.csv", index=False)
+    for one in (kineme.read_recordings(tmp_path / "apart.csv").demonstrations, kineme.Demonstrations.of(frame)):
+        assert one.dimensions == ("q.rx", "q.ry", "q.rz", "x", "y")
+        np.testing.assert_allclose(one.recorded, np.column_stack([q, u**2, 1 - u]), atol=1e-12)

@@ -32,6 +32,7 @@ OTHER_PARTS = {
     "files": "reads and writes files, one by one; reports on whole sets",
     "library": "its class is in the table; what lies under it writes and reads rows of a database",
     "movements.segmentation": "one recording by contract",
+    "robots": "one movement by contract",
     "validation": "checks that raise",
 }
 

@@ -14,6 +14,7 @@ from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import printable
 
+_SMALLEST = 0.001  # p-value that is shown; JSON has all digits
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
@@ -124,4 +125,6 @@ def _relative(transform: dict[str, Any]) -> str:
 
 
 def _share(p_value: float | None) -> str:
-    return "" if p_value is None else f"{p_value:.2g}"
+    if p_value is None:
+        return ""
+    return f"{p_value:.2g}" if p_value >= _SMALLEST else f"<{_SMALLEST:g}"
