@@ -23,6 +23,7 @@ SUBJECTS = (
     "stream",
     "one_shot",
     "open_set",
+    "outliers",
     "defaults",
     "library",
     "lerobot",

@@ -65,7 +65,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     kinds : mapping, optional
         What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
         "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
-        `Demonstrations.channels`.
+        `Demonstrations.channels`. As in `columns`, what several heads begin with stands for all of them.
     topic : str or sequence of str, optional
         Topics of ROS bags; of several, the others are interpolated to the stamps of the first. By default the only
         one that can be read.

@@ -46,11 +46,6 @@ class Roles(NamedTuple):
     nanoseconds: int | None = None
     person: int | None = None
 
-    @property
-    def in_turns(self) -> bool:
-        """Whether no column tells movements apart but those of labels and of people, which change from time to time."""
-        return not self.movement or self.movement == (self.person,)
-
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
     """Find the columns' roles.

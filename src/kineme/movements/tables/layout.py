@@ -35,8 +35,8 @@ class Layout:
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
     kinds : mapping, optional
-        Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
-        order of a quaternion.
+        Heads of columns, separated by commas, -> "position", "angle" or "discrete"; of four -> "wxyz" or "xyzw", the
+        order of a quaternion. What several heads begin with, before a dot, stands for all of them.
     topic : str or sequence of str, optional
         Topics of a bag; of several, the others are interpolated to the stamps of the first.
     frame : str or sequence of str, optional

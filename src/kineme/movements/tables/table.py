@@ -100,7 +100,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
     )
-    places = [""] * n if n == 1 and roles.in_turns and table.segments is None else keys
+    places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
 
 
@@ -126,6 +126,11 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     return in_seconds(stamps, units), units, known
 
 
+def _in_turns(roles: Roles) -> bool:
+    """Whether no column tells movements apart but those of labels and of people, which change from time to time."""
+    return not roles.movement or roles.movement == (roles.person,)
+
+
 def _time_heads(heads: Sequence[str], roles: Roles) -> str | None:
     """The column of times, or the two whose sum they are."""
     if roles.time is None or roles.nanoseconds is None:
@@ -142,7 +147,7 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
         return np.zeros(n_rows, np.intp), [""], [None]
     labels = [None] * n_rows if label is None else table.columns[label].tolist()
     columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
-    if roles.in_turns:
+    if _in_turns(roles):
         told = list(zip(labels, *columns, strict=True))
         changes = np.array([before != one for before, one in pairwise(told)], dtype=bool)
         codes = np.append(0, np.cumsum(changes | (times[1:] < times[:-1])))
