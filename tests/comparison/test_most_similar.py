@@ -85,6 +85,19 @@ def test_what_reaches_the_bar_is_known_and_nothing_else_seems_to(d, seed, width,
     assert (found >= exact - 1e-5).all()
 
 
+@pytest.mark.parametrize(("bar", "bounded"), [(0.2, 0), (0.4, 1), (0.9, 0)])
+def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monkeypatch):
+    """Point clouds have a quarter of the weights and no bound; what is far by rows has a similarity below 0.63."""
+    stored, asked = (describe(draw_shapes([1] * 40, seed=seed, spread=1.0)) for seed in (1, 2))
+    weights = np.array([2.0, 1.0, 2.0, 1.0, 2.0])
+    widths = np.array([1e-3, 1e-3, 1.0, 1.0, 1.0])
+    similarity = AveragedSimilarity(stored.procrustes, widths, "arithmetic", weights / 8)
+    inner, calls = module.pair_bounds, []
+    monkeypatch.setattr(module, "pair_bounds", lambda *given: calls.append(1) or inner(*given))
+    nearest_above(similarity, asked, stored, np.arange(0, 40, 2), np.full(20, bar))
+    assert len(calls) == bounded
+
+
 @pytest.mark.parametrize("choice", ["never", "always"])
 @pytest.mark.parametrize("classifier", ["auto", "nearest", "prototype"])
 def test_few_pairs_are_compared_completely(choice, classifier, monkeypatch):

@@ -27,7 +27,7 @@ from kineme.recognition.compared_windows import (
     rarity_weights,
     size_and_slowness,
 )
-from kineme.recognition.spotting import Spotted, _left_over, best_chain
+from kineme.recognition.spotting import Spotted, _complete_scores, _left_over, best_chain
 from kineme.recognition.window_scores import Expected, Manner, closest_classes, far
 from movement_samples import draw_shapes
 
@@ -267,6 +267,9 @@ def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(m
     assert (scores[~within] > reach).all()
     assert (scores <= exact * (1 + 1e-5)).all()
     assert not np.allclose(scores, exact)
+    chosen = np.arange(0, len(windows), 7)
+    complete = _complete_scores(known, windows.motion, some, chosen)
+    np.testing.assert_allclose(complete, every.compared.scores[chosen], rtol=1e-5)
     for name in ("rows", "log_durations", "log_sizes", "slowness"):
         np.testing.assert_allclose(getattr(some.compared, name), getattr(every.compared, name))
 

@@ -60,7 +60,7 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
     bars : ndarray of shape (C,)
         Averaged kernels K, from 0 to 1.
     """
-    if not _can_skip(similarity, A, B):
+    if not _can_skip(similarity, A, B) or (bars <= _never_bounded(similarity, B)).all():
         return _nearest(similarity, A, B, first)
     search, known = _by_rows(similarity, A, B)
     classes = np.repeat(np.arange(len(first)), np.diff(first, append=len(B)))
@@ -84,6 +84,18 @@ def nearest_above(similarity: AveragedSimilarity, A: Described, B: Described, fi
 def _nearest(similarity: AveragedSimilarity, A: Described, B: Described, first: Indices) -> Array:
     """By comparing all."""
     return np.asarray(np.maximum.reduceat(similarity.log_average(A, B), first, axis=1))
+
+
+def _never_bounded(similarity: AveragedSimilarity, B: Described) -> float:
+    """Weighted kernel of point clouds, for which there is no bound: no K below it can be ruled out."""
+    assert B.pairs is not None
+    clouds = np.array(B.pairs.measures) == PAIR_QUANTITIES.index("cloud")
+    return float(_shares(similarity)[len(B.blocks) :][clouds].sum())
+
+
+def _shares(similarity: AveragedSimilarity) -> Single:
+    """Weights (R,) of the kernels, which add up to 1."""
+    return (np.exp(similarity.log_weights()) / len(similarity.widths)).astype(np.float32)
 
 
 def _rounded(bars: Array) -> Array:
@@ -115,7 +127,7 @@ class _Search:
     ) -> None:
         self._similarity, self._a, self._b = similarity, a, b
         self._squares, self._rotations = squares, rotations
-        self._shares = (np.exp(similarity.log_weights()) / len(similarity.widths)).astype(np.float32)
+        self._shares = _shares(similarity)
 
     def kernels(self, squares: NDArray[np.floating], first: int) -> Single:
         """Weighted sum (n, m) of the kernels of some representations, from number `first` on."""
