@@ -2,6 +2,7 @@
 # make test   formatter, linter, type checker, tests
 # make test-pythons  the same with every Python that is found here
 # make test-lowest   the tests with the lowest versions of what kineme depends on
+# make ros2   messages of ROS 2 itself, in .venv-ros2; the tests that need them are skipped where it is not there
 # make soak   faults of the action library, many times: minutes
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
@@ -16,7 +17,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest always soak fuzz bench evaluate figures reference tables lock clean
+.PHONY: demo test test-pythons test-lowest ros2 always soak fuzz bench evaluate figures reference tables lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -25,7 +26,7 @@ test: $(DEV)/ready
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
-	$(DEV)/bin/pytest -n 2 --dist loadscope
+	$(DEV)/bin/pytest -n 2 --dist loadscope -rs
 
 # Each Python with an environment of its own; all are tried, though one fails.
 test-pythons:
@@ -40,6 +41,16 @@ test-pythons:
 
 test-lowest: .venv-lowest/ready
 	.venv-lowest/bin/pytest -p no:cacheprovider
+
+ros2: .venv-ros2/ready
+
+# Wheels that others build, for Linux and the Pythons they chose. What only builds packages of ROS is not in the list,
+# so the dependencies are not followed.
+.venv-ros2/ready: requirements/ros2.txt
+	$(PYTHON) -m venv --clear .venv-ros2
+	.venv-ros2/bin/pip install --quiet --no-deps --only-binary :all: --require-hashes -r requirements/ros2.txt
+	.venv-ros2/bin/python -c 'import rclpy.serialization, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, trajectory_msgs.msg'
+	touch $@
 
 soak: $(DEV)/ready
 	$(DEV)/bin/pytest soak -p no:cacheprovider
@@ -103,9 +114,10 @@ lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
 	uv pip compile pyproject.toml --group lowest --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
+	uv pip compile requirements/ros2.in --universal --python-version 3.11 --no-emit-package empy --generate-hashes --no-annotate --no-emit-index-url --no-header --quiet -o requirements/ros2.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
 	uv pip compile bench/peers.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-bench .venv-rivals out
+	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-ros2 .venv-bench .venv-rivals out

@@ -111,19 +111,19 @@ class Maker:
         return self.make("std_msgs/msg/Float64MultiArray", layout=layout, data=np.asarray(row, float))
 
 
-def write_bag(folder, kind, messages, name="run", compress=False):
+def write_bag(folder, kind, messages, name="run", compress=False, writer=None):
     """Write (topic, time of recording [ns], message or bytes with their type) as a bag; its path.
 
     A topic with None for the message is there without messages, and of the type that stands for the time.
     """
     known = store(kind)
     path = Path(folder) / (f"{name}.bag" if kind == "ros1" else name)
-    with _writer(path, kind, compress) as writer:
+    with writer or _writer(path, kind, compress) as open_writer:
         connections = {}
         for topic, recorded, message in messages:
             typename = recorded if message is None else message[0] if _is_raw(message) else message.__msgtype__
             if (topic, typename) not in connections:
-                connections[topic, typename] = writer.add_connection(topic, typename, typestore=known)
+                connections[topic, typename] = open_writer.add_connection(topic, typename, typestore=known)
             if message is None:
                 continue
             if _is_raw(message):
@@ -132,7 +132,24 @@ def write_bag(folder, kind, messages, name="run", compress=False):
                 raw = known.serialize_ros1(message, typename)
             else:
                 raw = known.serialize_cdr(message, typename)
-            writer.write(connections[topic, typename], recorded, raw)
+            open_writer.write(connections[topic, typename], recorded, raw)
+    return path
+
+
+def write_mcap(path, messages, profile="ros2", encoding="ros2msg", **options):
+    """Write (topic, type, time of recording [ns], bytes) as one file by the package mcap; its path."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, **options)
+        writer.start(profile=profile, library="test")
+        channels = {}
+        for topic, name, recorded, raw in messages:
+            if topic not in channels:
+                schema = writer.register_schema(name, encoding, b"# of the test")
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], recorded, raw, recorded)
+        writer.finish()
     return path
 
 

@@ -31,6 +31,10 @@ from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicDMP as RhythmicDMP
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives as RhythmicPrimitives
 from kineme import orientation as orientation
 from kineme import styles as styles
+from kineme.primitives.discrete.choose import BasisSelection as BasisSelection
+from kineme.primitives.contextual.contextual import Contextual as Contextual
+from kineme.primitives.improvement.improve import improve as improve
+from kineme.primitives.improvement.improve import Improvement as Improvement
 
 # Features and kernels
 from kineme.features.dmp_features import DMPFeatures as DMPFeatures
@@ -48,6 +52,7 @@ from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library
 from kineme import anchoring as anchoring
+from kineme import robots as robots
 from kineme.library.library import ActionLibrary as ActionLibrary
 
 # Errors and warnings
@@ -57,6 +62,7 @@ from kineme.errors import DegenerateMovementError as DegenerateMovementError
 from kineme.errors import SpecificationError as SpecificationError
 from kineme.errors import DataError as DataError
 from kineme.errors import DegenerateMovementWarning as DegenerateMovementWarning
+from kineme.errors import ExtrapolationWarning as ExtrapolationWarning
 
 __version__: str
 __all__: list[str]

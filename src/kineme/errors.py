@@ -27,3 +27,7 @@ class DataError(KinemeError, OSError):
 
 class DegenerateMovementWarning(UserWarning):
     """Some movements almost end where they start: their weights are huge and fragile."""
+
+
+class ExtrapolationWarning(UserWarning):
+    """Something is asked for that lies outside what was demonstrated: it is done, and how well is a guess."""

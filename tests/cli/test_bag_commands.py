@@ -46,6 +46,22 @@ def test_inspect_as_data(bag):
     assert data["detected"][0]["columns"] == ["a", "b"]
 
 
+def test_inspect_lists_the_topics_of_several_bags(tmp_path):
+    m = Maker("ros1")
+    for name, topic in (("one", "/arm"), ("two", "/leg")):
+        messages = [(topic, ns, m.joint_state(ns, ["a"], [k / 9])) for k, ns in enumerate(stamps())]
+        write_bag(tmp_path, "ros1", messages, name)
+    several = [f"{tmp_path}/one.bag", f"{tmp_path}/two.bag"]
+    for given in ([tmp_path], several, [f"{tmp_path}/*.bag"]):
+        topics = answer("inspect", *given)["contents"]["topics"]
+        folder = "" if given == [tmp_path] else f"{tmp_path}/"
+        assert [(one["file"], one["topic"]) for one in topics] == [
+            (f"{folder}one.bag", "/arm"),
+            (f"{folder}two.bag", "/leg"),
+        ]
+    assert "file" not in answer("inspect", several[0])["contents"]["topics"][0]
+
+
 def test_what_is_read_is_said(bag):
     done = run("inspect", bag, "--frame", "base:tool")
     assert "frames base:tool: time 'header.stamp' in s (stamps of headers)" in done.stdout

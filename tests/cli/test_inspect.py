@@ -72,7 +72,7 @@ def test_samples_may_be_left_out_alone_and_units_be_a_number():
     ("arguments", "data", "words"),
     [
         (["nowhere"], "", "kineme: expected a file or folder of recordings, found nothing at 'nowhere'"),
-        (["-"], "", "kineme: expected recordings in standard input.csv, found none; 1 could not be read"),
+        (["-"], "", "kineme: standard input.csv: expected samples, got an empty file"),
         (["-", "--columns", "z"], "time,x\n0,1\n", r"expected a column 'z', got the columns ['time', 'x']"),
         (["-", "--units", "h"], "time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
         (["-", "--plot", "a.gif"], "0 1\n1 2\n2 3\n3 4\n", "kineme: expected a picture ending in one of png"),

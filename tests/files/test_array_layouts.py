@@ -78,7 +78,7 @@ def test_dates_and_durations_keep_their_unit():
     ("arrays", "words"),
     [
         ({"times": T}, r"expected arrays times and positions, got no entry 'positions' but \['times'\]"),
-        ({"positions": X}, r"expected times beside the positions, got \['positions'\]"),
+        ({"positions": X}, r"expected times beside the positions, got positions of shape \(5, 3\) alone"),
         ({"positions": X, "times": T[:4]}, r"each of the 5 samples, got times of shape \(4,\)"),
         ({"positions": np.zeros((2, 2, 5, 3)), "times": T}, r"of shape \(T, d\) or \(n, T, d\), got \(2, 2, 5, 3\)"),
         ({"positions": np.stack((X, X)), "times": T[:4]}, r"times of shape \(5,\) or \(2, 5\), got \(4,\)"),

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import kineme
+from kineme.files.lerobot import text_column
 from kineme.files.lerobot.copy import copy_with_motions
-from kineme.files.lerobot.language import COLUMN, Motion
+from kineme.files.lerobot.language import COLUMN
+from kineme.files.lerobot.motions import OWN, Motion
 from lerobot_sets import write_v2, write_v3
 
 pa = pytest.importorskip("pyarrow")
@@ -200,10 +202,67 @@ def test_a_folder_of_links_as_a_cache_has_them(tmp_path, source):
     assert all(rows == EXPECTED[k] for k, rows in lists(target))
 
 
-def test_version_2_is_refused_with_what_to_do(tmp_path):
-    """Its programs read no lists of texts: a frame with them could not be loaded."""
+def ours(symbol):
+    return f'{OWN}, "symbol": "{symbol}"}}'
+
+
+def test_a_second_copy_replaces_the_texts_of_the_first_and_keeps_those_of_others(tmp_path, source):
+    alien = {**SUBTASK, "style": "motion", "content": "to the left", "tool_calls": None}
+    empty = {**SUBTASK, "content": None, "tool_calls": None}
+    with_rows(source, lambda k: [alien, empty] if k % 2 else None)
+    first = copied(source, tmp_path / "first", {0: [Motion(0.0, ours("wave"))], 1: [Motion(0.1, ours("nod"))]})
+    both = copied(first, tmp_path / "second", {0: [Motion(0.2, ours("bow"))], 2: [Motion(0.0, ours("nod"))]})
+    assert [len(rows) for _, rows in lists(first)] == [1, 3] * 25 + [0] * 25
+    for k, (episode, rows) in enumerate(lists(both)):
+        said = {0: [row(0.2, ours("bow"))], 1: [], 2: [row(0.0, ours("nod"))]}[episode]
+        assert rows == ([alien, empty] if k % 2 and episode < 2 else []) + said
+    again = copied(both, tmp_path / "third", {0: [Motion(0.2, ours("bow"))], 2: [Motion(0.0, ours("nod"))]})
+    assert lists(again) == lists(both)
+
+
+def texts_of(folder, k):
+    return pd.read_parquet(folder / f"data/chunk-000/episode_{k:06d}.parquet")[text_column.COLUMN].tolist()
+
+
+def test_version_2_takes_texts_in_json(tmp_path):
+    """Its programs fail on lists of rows: a frame with them could not be loaded."""
     source = write_v2(tmp_path / "set")
-    with pytest.raises(kineme.DataError, match=r"version 3.* got version 2; convert it with LeRobot, or write a table"):
+    before = digests(source)
+    target = copied(source, tmp_path / "named")
+    for k, expected in EXPECTED.items():
+        (text,) = set(texts_of(target, k))
+        assert json.loads(text) == expected
+    after = digests(target)
+    same = {name for name in before if after[name] == before[name]}
+    assert digests(source) == before
+    assert set(after) == set(before)
+    assert {"meta/episodes.jsonl", "meta/tasks.jsonl"} == same
+    old, new = (parquet.read_table(folder / "data/chunk-000/episode_000001.parquet") for folder in (source, target))
+    assert new.drop_columns([text_column.COLUMN]).equals(old, check_metadata=True)
+    old, new = (json.loads((folder / "meta" / "info.json").read_text()) for folder in (source, target))
+    assert new["features"].pop(text_column.COLUMN) == {"dtype": "string", "shape": [1], "names": None}
+    assert new == old
+    assert kineme.read_recordings(target).labels.tolist() == kineme.read_recordings(source).labels.tolist()
+
+
+def test_a_second_copy_of_version_2_replaces_the_texts_of_the_first(tmp_path):
+    source = write_v2(tmp_path / "set")
+    target = copied(source, tmp_path / "one", {0: [Motion(0.0, ours("wave"))], 1: [Motion(0.0, "of another")]})
+    target = copied(target, tmp_path / "two", {0: [Motion(0.1, ours("bow"))], 1: [Motion(0.0, ours("nod"))]})
+    assert [json.loads(text) for text in set(texts_of(target, 0))] == [[row(0.1, ours("bow"))]]
+    assert json.loads(texts_of(target, 1)[0]) == [row(0.0, "of another"), row(0.0, ours("nod"))]
+    assert set(texts_of(target, 2)) == {"[]"}
+
+
+@pytest.mark.parametrize(
+    ("values", "words"), [(["["], "lists in JSON"), (['{"a": 1}'], "lists in JSON"), ([1], "texts in")]
+)
+def test_another_column_of_that_name_in_version_2_is_refused(tmp_path, values, words):
+    source = write_v2(tmp_path / "set")
+    path = source / "data/chunk-000/episode_000001.parquet"
+    table = parquet.read_table(path)
+    parquet.write_table(table.append_column(text_column.COLUMN, pa.array(values * len(table))), path)
+    with pytest.raises(kineme.DataError, match=rf"episode_000001\.parquet: expected {words}"):
         copied(source, tmp_path / "named")
 
 

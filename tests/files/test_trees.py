@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kineme.errors import DataError
-from kineme.files.recordings import read_recordings_from_bytes
+from kineme.files.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 
 T = np.arange(10) / 10
@@ -94,7 +94,7 @@ def test_a_missing_number_costs_its_movement_or_its_sample():
         ("[[1, 2], [3]]", "differ in length"),
         ('[{"t": 1, "x": 2}, 3]', "objects beside other values"),
         ('{"a": {"b": 1}}', "got no entry 'positions' but"),
-        ("[[0, 1], [1, 2], [2, 3], [3, 4]]", "their step with units="),
+        ("[[0, 1], [1, 2], [2, 3], [3, 4]]", "the seconds between two samples with units="),
     ],
 )
 def test_other_json_is_refused(text, words):
@@ -111,7 +111,7 @@ def test_an_npy_file_is_one_movement_or_many():
     np.testing.assert_allclose(read(npy(X), "a.npy", units=0.1).demonstrations.times, T)
     assert len(read(npy(np.stack((X, X))), "a.npy").demonstrations) == 2
     assert read(npy(X), "a.npy", units=0.1, columns="y").demonstrations.dimensions == ("y",)
-    with pytest.raises(DataError, match="say their step with units="):
+    with pytest.raises(DataError, match="say the seconds between two samples with units="):
         read(npy(X), "a.npy")
     with pytest.raises(DataError, match="foreign, truncated or damaged"):
         read(npy(X)[:-3], "a.npy")
@@ -157,3 +157,28 @@ def test_movements_of_other_dimensions_cost_themselves_alone():
     found = read(npz(wave=X, nod=X[:7], bow=np.ones((6, 3))), "a.npz")
     assert [source.place for source in found.sources] == ["wave", "nod"]
     assert "movement bow: 3 dimensions where most have 2" in str(found.problems[0])
+
+
+def test_a_named_movement_with_its_own_times_is_one_movement_however_few_there_are(tmp_path):
+    t, x = np.linspace(0, 3, 20), np.random.default_rng(0).normal(size=(20, 3))
+    np.savez(tmp_path / "one.npz", wave=x, wave_t=t)
+    np.savez(tmp_path / "two.npz", wave=x, wave_t=t, nod=x + 1, nod_t=2 * t)
+    one, two = (read_recordings(tmp_path / f"{name}.npz") for name in ("one", "two"))
+    assert (list(one.labels), list(two.labels)) == (["wave"], ["wave", "nod"])
+    assert one.demonstrations.dimensions == two.demonstrations.dimensions == ("x", "y", "z")
+    assert [round(float(each.times[-1]), 9) for each in [*one, *two]] == [3.0, 3.0, 6.0]
+
+
+def test_columns_of_a_movement_beside_times_of_their_own_name_stay_together(tmp_path):
+    t, x = np.linspace(0, 3, 20), np.random.default_rng(0).normal(size=(20, 3))
+    np.savez(tmp_path / "a.npz", t=t, q=x, gripper=np.round(t / 3))
+    (one,) = read_recordings(tmp_path / "a.npz")
+    assert [channel.name for channel in one.channels] == ["q.0", "q.1", "q.2", "gripper"]
+
+
+def test_one_file_that_cannot_be_read_is_named_once(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((20, 3)))
+    with pytest.raises(DataError) as caught:
+        read_recordings(tmp_path / "a.npy")
+    assert str(caught.value).count("a.npy") == 1
+    assert "got positions of shape (20, 3) alone" in str(caught.value)

@@ -161,6 +161,16 @@ def rollout_of(demos: Demonstrations) -> list[dict[str, Any]]:
     return moved(demos, primitives.rollout(**options, velocity=0.5 * ends / tau[:, None]))
 
 
+def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Through a point of its own, with one dimension free, and on at the goal; as primitives of their own."""
+    primitives = DMP("decoupled", n_basis=20).learn(demos)
+    ends, tau = primitives.goals - primitives.starts, primitives.durations
+    points = primitives.starts + 0.4 * ends
+    points[ends[:, 0] > 0, 1] = np.nan
+    path = primitives.rollout(via=[(0.4, points)], end_velocity=0.2 * ends / tau[:, None])
+    return moved(demos, Primitives.from_rollout(path).rollout())
+
+
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         path = DMP(n_basis=20).learn(demos).save(f"{folder}/primitives.npz")
@@ -490,6 +500,7 @@ TABLE = [
     *(feature_row(formulation, feature, fit) for formulation in FORMULATIONS for feature in FEATURES for fit in FITS),
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
+    Batched("Primitives.rollout via", modulated, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),
     step_row(Resample(60), 1e-10),

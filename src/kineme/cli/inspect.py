@@ -22,23 +22,25 @@ def inspect(recordings: tuple[Path, ...], plot: Path | None, as_json: bool, **op
 
     Shows, per label: how many movements, how long, sampled how fast and how evenly, with which gaps. Below: how the
     files were understood, movements that occur twice, and what could not be read and why. In a folder, the name of
-    the innermost folder is the label. Of one ROS bag, its topics and frames are listed first.
+    the innermost folder is the label. Topics and frames of ROS bags are listed first.
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
     from kineme.errors import DataError
-    from kineme.files.inspection.contents import contents_as_data, contents_as_words, contents_of
+    from kineme.files.entries import in_words
+    from kineme.files.inspection.contents import contents_as_data, contents_as_words, contents_of_all
     from kineme.files.inspection.inspect import inspect as summarize
     from kineme.files.inspection.inspect import nothing_read
     from kineme.files.inspection.report import as_data, as_words
 
-    contents = contents_of(recordings[0]) if len(recordings) == 1 else []
+    files = [one for one in recordings if str(one) != "-"]
+    contents = contents_of_all(files, options["follow_links"])
     try:
         recorded = read(recordings, options)
     except DataError as error:
         if not contents or plot is not None:
             raise
-        summary = nothing_read(str(recordings[0]), str(error))
+        summary = nothing_read(in_words(recordings), str(error))
         text = f"not read: {error}"
     else:
         if plot is not None:

@@ -13,7 +13,7 @@ from kineme.files.check_block import movement_of, take_movements
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels, is_plain
-from kineme.movements.channels.coordinates import canonical, off_norm
+from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.parsed import Block
 
@@ -42,7 +42,7 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
         for one in files
         if one.detected and one.detected.columns != heads
     ]
-    checked = [_check_orientations(one, channels) for one in same]
+    checked = [_check_orientations(_in_order(one, channels), channels) for one in same]
     return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]
 
 
@@ -79,6 +79,12 @@ def _without_wraps(files: Sequence[FileRead], given: Given) -> list[FileRead]:
             block = replace(block, positions=canonical(block.positions, block.offsets, channels))
         result.append(one._replace(block=block))
     return result
+
+
+def _in_order(one: FileRead, channels: Channels) -> FileRead:
+    """A file with the columns of each of its channels side by side."""
+    block, heads = _block(one), one.detected.columns if one.detected else ()
+    return one._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
 
 
 def _check_orientations(one: FileRead, channels: Channels) -> tuple[FileRead, list[Problem]]:

@@ -17,6 +17,7 @@ VARIABLE = "KINEME_MAX_FILE_BYTES"
 
 _MOST = 4 * 2**30
 _CHUNK = 2**20
+_IN_PASSING = 2**26
 
 
 def max_file_bytes() -> int:
@@ -38,6 +39,11 @@ def max_file_bytes() -> int:
     return int(given)
 
 
+def most_in_passing() -> int:
+    """The limit on what is in memory on the way only, such as a chunk of a bag [bytes]: at least 64 MiB."""
+    return max(max_file_bytes(), _IN_PASSING)
+
+
 def check_expanded(n_bytes: int, what: str = "a file") -> None:
     """Refuse a size in memory above the limit.
 
@@ -46,7 +52,22 @@ def check_expanded(n_bytes: int, what: str = "a file") -> None:
     DataError
         The message names the limit and how to raise it.
     """
-    if n_bytes > (most := max_file_bytes()):
+    _check(n_bytes, max_file_bytes(), what)
+
+
+def check_in_passing(n_bytes: int, what: str) -> None:
+    """Refuse what is in memory on the way only, and above the limit on that.
+
+    Raises
+    ------
+    DataError
+        As of `check_expanded`.
+    """
+    _check(n_bytes, most_in_passing(), what)
+
+
+def _check(n_bytes: int, most: int, what: str) -> None:
+    if n_bytes > most:
         raise DataError(
             f"expected {what} that takes at most {most:,} bytes of memory, got one that takes {n_bytes:,}; "
             f"split it, or, if you trust it, set the environment variable {VARIABLE} to more"

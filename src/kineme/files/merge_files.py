@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,6 +131,8 @@ def merge_files(
     listed = [*problems, *(problem for one in files for problem in one.problems)]
     full = [one for one in files if one.block is not None and len(one.block.labels)]
     if not full:
+        if len(listed) == 1 and listed[0].file == Path(where).name:  # one file alone: it is named once
+            raise DataError(str(listed[0]._replace(file=where)))
         first = f"; {len(listed)} could not be read, the first {listed[0]}" if listed else ""
         raise DataError(f"expected recordings in {where}, found none{first}")
     dims: Counter[int] = Counter()

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.batch import Batch
+from kineme.primitives.recorded_as import RecordedAs, with_recorded
 from kineme.validation import Array
 
 if TYPE_CHECKING:
@@ -52,6 +54,15 @@ class BaseRollout(ABC):
         """Accelerations, per second squared."""
 
     @property
+    def _shares(self) -> Array:
+        """When the samples are, as a share of the duration (T,)."""
+        return np.asarray(self.times[0] / self.times[0, -1])
+
+    @property
+    def _to_recording(self) -> RecordedAs | None:
+        return self._batch.to_recording
+
+    @property
     @abstractmethod
     def _batch(self) -> Batch:
         """The primitives that move, one for each movement or one for all."""
@@ -66,7 +77,19 @@ class BaseRollout(ABC):
     @property
     def axis_names(self) -> list[str]:
         """What the d columns of `positions` are called, in tables and figures."""
-        return axis_names(self.positions.shape[2])
+        about = self._to_recording
+        return axis_names(self.positions.shape[2]) if about is None else list(about.column_names)
+
+    @property
+    def rate_names(self) -> list[str]:
+        """What the columns of `velocities` and `accelerations` are called."""
+        about = self._to_recording
+        return axis_names(self.velocities.shape[2]) if about is None else list(about.rate_names)
+
+    @property
+    def channels(self) -> Channels | None:
+        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        return self._batch.channels
 
     @property
     def labels(self) -> NDArray[Any] | None:
@@ -82,14 +105,21 @@ class BaseRollout(ABC):
 
     @cached_property
     def demonstrations(self) -> Demonstrations:
-        """The movements as `Demonstrations`, with the labels and names of their primitives.
+        """The movements as `Demonstrations`, with the labels, names and channels of their primitives.
+
+        Of primitives that were learned from recordings with named columns they are what a recording of the movement
+        would be: orientations in the recorded order, and discrete channels that step where they did.
 
         Raises
         ------
         TrajectoryError
             Movements that are none, as of fewer than four samples.
         """
-        return Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+        made = Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
+        about = self._to_recording
+        if about is None:
+            return made
+        return Demonstrations.of_movements(with_recorded(made.movements, about, self._shares, len(self._batch)))
 
     @property
     def trajectories(self) -> Demonstrations:

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Names
+from kineme.primitives.recorded_as import RecordedAs, merged
 
 if TYPE_CHECKING:
     from kineme.primitives.persistence import Arrays
@@ -25,7 +28,7 @@ class Batch:
     A subclass lists its arrays once, in `ROWS`; write protection, indexing, concatenation and files use that list.
     """
 
-    #: Name of an array -> its shape in the letters n, d, N.
+    #: Name of an array -> its shape in the letters n, d, N, and q for what the array itself says.
     ROWS: ClassVar[dict[str, str]]
     #: The class of `dmp`.
     SPECIFICATION: ClassVar[type]
@@ -46,6 +49,10 @@ class Batch:
         def names(self) -> tuple[str | None, ...] | None:
             """Where each demonstration comes from, or None."""
 
+        @property
+        def recorded_as(self) -> RecordedAs | None:
+            """Channels of the recordings and the steps of discrete ones, or None."""
+
     def __post_init__(self) -> None:
         for name in self.ROWS:
             view = getattr(self, name).view()
@@ -64,6 +71,7 @@ class Batch:
             {name: self._row(name)[chosen] for name in self.ROWS},
             None if self.labels is None else self.labels[chosen],
             None if self.names is None else tuple(self.names[i] for i in chosen),
+            None if self.recorded_as is None else self.recorded_as.take(chosen),
         )
 
     def __iter__(self) -> Iterator[Self]:
@@ -77,6 +85,20 @@ class Batch:
     def n_dims(self) -> int:
         """Number of dimensions d."""
         return int(self._row(next(iter(self.ROWS))).shape[1])
+
+    @property
+    def channels(self) -> Channels | None:
+        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        return None if self.recorded_as is None else self.recorded_as.channels
+
+    @property
+    def to_recording(self) -> RecordedAs | None:
+        """`recorded_as`, if the movements can be written in the columns of the recording; else None.
+
+        An orientation that was learned as its integrated rotation cannot: it does not know where it started.
+        """
+        about = self.recorded_as
+        return None if about is None or about.orientations or not about.has_steps else about
 
     @classmethod
     def concatenate(cls, batches: Iterable[Self]) -> Self:
@@ -109,6 +131,7 @@ class Batch:
             {name: np.concatenate([batch._row(name) for batch in batches]) for name in cls.ROWS},
             np.concatenate(labels) if labels else None,
             tuple(name for batch in batches for name in batch.names or (None,) * len(batch)) if named else None,
+            merged([batch.recorded_as for batch in batches]),
         )
 
     def save(self, path: str | Path) -> Path:
@@ -122,9 +145,10 @@ class Batch:
             The file cannot be written; what was there before stays.
         """
         rows = {name: self._row(name) for name in self.ROWS}
-        from kineme.primitives.persistence import header_of, save_as  # files load when they are used
+        from kineme.primitives.persistence import header_of, save_as, step_arrays  # files load when they are used
 
-        return save_as(self.KIND, path, header_of(self.dmp, self.labels, self.names), rows)
+        header = header_of(self.dmp, self.labels, self.names, self.channels)
+        return save_as(self.KIND, path, header, rows | step_arrays(self.recorded_as))
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -151,23 +175,31 @@ class Batch:
         """The array of that name in `ROWS`."""
         return np.asarray(getattr(self, name))
 
-    def _with(self, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None) -> Self:
-        return self._of_rows(self.dmp, arrays, labels, names)
+    def _with(
+        self, arrays: dict[str, Any], labels: NDArray[Any] | None, names: Names, about: RecordedAs | None
+    ) -> Self:
+        return self._of_rows(self.dmp, arrays, labels, names, about)
 
     @classmethod
     def _of_rows(
-        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None
+        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: Names, about: RecordedAs | None
     ) -> Self:
         build: Callable[..., Self] = cls
-        return build(dmp, **arrays, labels=labels, names=names)
+        return build(dmp, **arrays, labels=labels, names=names, recorded_as=about)
 
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> Self:
-        from kineme.primitives.persistence import checked_rows, labels_and_names, specification_from_dict
+        from kineme.primitives.persistence import (
+            checked_rows,
+            labels_and_names,
+            recorded_as_from,
+            specification_from_dict,
+        )
 
         dmp: Any = specification_from_dict(cls.SPECIFICATION, header["dmp"])
         rows = checked_rows(cls.ROWS, arrays, dmp.n_basis)
-        return cls._of_rows(dmp, rows, *labels_and_names(header, len(next(iter(rows.values())))))
+        n, d = next(iter(rows.values())).shape[:2]
+        return cls._of_rows(dmp, rows, *labels_and_names(header, n), recorded_as_from(header, arrays, n, d))
 
 
 def _check_alike(first: Batch, batch: Batch, i: int) -> None:

@@ -11,14 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, KinemeError
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
 from kineme.movements.preparation.resample import Resample
 from kineme.movements.preparation.smooth import Smooth
 from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements import Names
+from kineme.primitives.discrete_steps import DiscreteSteps
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import as_path
 
 #: The preprocessing steps in files, by names of this table; files never contain names of classes.
 STEPS = {"trim-rest": TrimRest, "smooth": Smooth, "resample": Resample}
+
+#: Name of an array in files -> field of `DiscreteSteps`.
+_STEPS_OF = {"step_values": "values", "step_shares": "shares", "step_offsets": "offsets"}
 
 _LABEL_TYPES = (str, int, float, bool)
 
@@ -52,8 +60,8 @@ def load_as(kind: str, path: str | Path, build: Callable[[dict[str, Any], Arrays
         ) from error
 
 
-def header_of(dmp: Any, labels: NDArray[Any] | None, names: tuple[str | None, ...] | None) -> dict[str, Any]:
-    """Specification, labels and names of a batch as plain data."""
+def header_of(dmp: Any, labels: NDArray[Any] | None, names: Names, channels: Channels | None) -> dict[str, Any]:
+    """Specification, labels, names and channels of a batch as plain data."""
     plain = None if labels is None else np.asarray(labels).tolist()
     if plain is not None and not all(isinstance(label, _LABEL_TYPES) for label in plain):
         raise DataError(f"expected labels that are text or numbers, to save them, got {type(plain[0]).__name__}")
@@ -61,6 +69,7 @@ def header_of(dmp: Any, labels: NDArray[Any] | None, names: tuple[str | None, ..
         "dmp": specification_to_dict(dmp),
         "labels": plain,
         "names": None if names is None else list(names),
+        "channels": None if channels is None else channels_to_data(channels),
     }
 
 
@@ -70,11 +79,40 @@ def labels_and_names(header: dict[str, Any], n: int) -> tuple[NDArray[Any] | Non
     return None if labels is None else label_array(labels, n), None if names is None else tuple(names)
 
 
+def step_arrays(about: RecordedAs | None) -> dict[str, NDArray[Any]]:
+    """The steps of discrete channels as arrays of a file."""
+    steps = None if about is None else about.steps
+    return {} if steps is None else {name: getattr(steps, field) for name, field in _STEPS_OF.items()}
+
+
+def recorded_as_from(header: dict[str, Any], arrays: Arrays, n: int, n_dims: int) -> RecordedAs | None:
+    """What n movements were recorded as, checked; files of earlier versions do not say it."""
+    if header.get("channels") is None:
+        return None
+    channels = channels_from_data(header["channels"], n_dims)
+    n_discrete = sum(one.kind == "discrete" for one in channels)
+    if not n_discrete or not set(_STEPS_OF) <= set(arrays):
+        return RecordedAs(channels)
+    steps = DiscreteSteps(**{field: arrays[name] for name, field in _STEPS_OF.items()})
+    check_array("step_values", steps.values, (len(steps.shares), n_discrete))
+    check_array("step_shares", steps.shares, (len(steps.shares),))
+    check_array("step_offsets", steps.offsets, (n + 1,))
+    lengths = np.diff(steps.offsets)
+    if steps.offsets[0] != 0 or steps.offsets[-1] != len(steps.shares) or (lengths < 1).any():
+        raise ValueError("step_offsets should say where the steps of each movement begin")
+    later = np.diff(steps.shares) > 0
+    later[steps.offsets[1:-1] - 1] = True
+    if (steps.shares[steps.offsets[:-1]] != 0).any() or not later.all() or steps.shares.max() > 1:
+        raise ValueError("step_shares should rise from 0 to at most 1 in each movement")
+    return RecordedAs(channels, steps)
+
+
 def checked_rows(rows: Mapping[str, str], arrays: Arrays, n_basis: int) -> dict[str, NDArray[Any]]:
-    """The arrays of a batch, refused unless they have the shapes of `rows`, in the letters n, d, N and digits."""
+    """The arrays of a batch, refused unless they have the shapes of `rows`, in the letters n, d and N; q is any."""
     sizes = {"N": n_basis} | dict(zip("nd", arrays[next(iter(rows))].shape, strict=False))
     for name, letters in rows.items():
-        shape = tuple(int(letter) if letter.isdigit() else sizes[letter] for letter in letters)
+        found = dict(zip(letters, arrays[name].shape, strict=False))
+        shape = tuple(found.get("q", 0) if letter == "q" else sizes[letter] for letter in letters)
         check_array(name, arrays[name], shape)
     return {name: arrays[name] for name in rows}
 

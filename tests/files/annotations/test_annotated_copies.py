@@ -105,7 +105,12 @@ def test_a_lerobot_set_says_it_on_the_frames(tmp_path):
         assert [json.loads(row["content"])["symbol"] for row in rows] == (["wave"] if episode == 0 else [])
         assert [(row["style"], row["camera"]) for row in rows] == [("motion", None)] * len(rows)
     assert len(kineme.read_recordings(tmp_path / "named").demonstrations) == 3
-    with pytest.raises(kineme.DataError, match="version 3"):
-        write_annotations(tmp_path / "two", annotations, [write_v2(tmp_path / "old")])
+    again = write_annotations(tmp_path / "again", annotations[:1], [tmp_path / "named"])[0]
+    frames = pandas.read_parquet(again / "data" / "chunk-000" / "file-000.parquet")
+    assert [len(rows) for rows in frames.language_persistent] == [1] * 20 + [0] * 30
+    two = write_annotations(tmp_path / "two", annotations, [write_v2(tmp_path / "old")])[0]
+    frames = pandas.read_parquet(two / "data" / "chunk-000" / "episode_000000.parquet")
+    (text,) = set(frames["annotation.motion"])
+    assert [json.loads(row["content"])["symbol"] for row in json.loads(text)] == ["wave"]
     with pytest.raises(kineme.DataError, match="expected annotations of episodes, got one of 'run 3'"):
         write_annotations(tmp_path / "three", [one(0, 1, "a", "run 3")], [source])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from kineme.errors import SpecificationError
-from kineme.movements.channels.channel import learned_names
+from kineme.movements.channels.channel import learned_names, recorded_names
+from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels, unit_of
 
 T = 50
@@ -156,13 +157,28 @@ def test_a_quaternion_keeps_the_columns_of_the_file_however_the_caller_lists_the
 
 
 @pytest.mark.parametrize(
+    ("given", "columns", "order"),
+    [
+        ({"a,b,d,e": "wxyz"}, ("a", "b", "d", "e"), "wxyz"),
+        ({"a,c,d,e": "xyzw"}, ("a", "c", "d", "e"), "xyzw"),
+        ({"b,a,c,d": "wxyz"}, ("b", "a", "c", "d"), "wxyz"),
+        ({"d,c,b,a": "xyzw"}, ("a", "d", "c", "b"), "wxyz"),
+    ],
+)
+def test_the_columns_of_a_quaternion_may_stand_apart_and_in_any_order(given, columns, order):
+    (one,) = [one for one in find_channels(list("abcde"), BLOCK, np.array([0, T]), given) if one.kind == "orientation"]
+    assert (one.columns, one.order) == (columns, order)
+
+
+BLOCK = np.column_stack([U] * 5)
+
+
+@pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"a,b,d,e": "wxyz"}, "side by side"),
         ({"a,b,c,d": "wxyz", "b,c,d,e": "wxyz"}, "several of 'b'"),
         ({"a,b,c,d": "wxyz", "c": "angle"}, "several of 'c'"),
         ({"a,a,b,c": "wxyz"}, "several of 'a'"),
-        ({"b,a,c,d": "wxyz"}, "in the order wxyz or xyzw"),
     ],
 )
 def test_quaternions_that_cannot_be_are_refused(given, words):
@@ -173,3 +189,75 @@ def test_quaternions_that_cannot_be_are_refused(given, words):
 @pytest.mark.parametrize(("n_levels", "kind"), [(8, "discrete"), (9, "position")])
 def test_a_discrete_channel_has_eight_values_at_most(n_levels, kind):
     assert found("x", "gripper", columns=np.column_stack([U, np.arange(T) % n_levels]))[1].kind == kind
+
+
+HEADS_APART = ["qw", "x", "y", "z", "qx", "qy", "qz", "gripper"]
+
+
+def test_columns_of_a_quaternion_between_and_around_others():
+    """Names say enough: x, y, z, qx, qy, qz, qw, gripper as well as qw, x, y, z, qx, qy, qz."""
+    one, *others = found(*HEADS_APART)
+    assert (one.columns, one.order) == (("qw", "qx", "qy", "qz"), "wxyz")
+    assert [other.name for other in others] == ["x", "y", "z", "gripper"]
+    one, other, _ = found(
+        "right_qx", "left_qx", "right_qy", "left_qy", "right_qz", "left_qz", "right_qw", "left_qw", "x"
+    )
+    assert (one.columns, other.name) == (("right_qx", "right_qy", "right_qz", "right_qw"), "left_q")
+
+
+def test_recorded_columns_are_in_the_order_of_the_channels():
+    block = np.column_stack([values(head) for head in HEADS_APART])
+    channels = find_channels(HEADS_APART, block, np.array([0, T]), {})
+    names = list(recorded_names(channels))
+    assert names == ["qw", "qx", "qy", "qz", "x", "y", "z", "gripper"]
+    np.testing.assert_array_equal(
+        in_order(block, HEADS_APART, channels), block[:, [HEADS_APART.index(n) for n in names]]
+    )
+
+
+def numbered(scalar, sign=1.0):
+    """Turning through half a turn, the scalar in this column; with signs such that it never is negative."""
+    angle = np.linspace(1.2, 1.9, T)
+    q = np.column_stack([np.cos(angle), np.sin(angle), np.zeros((T, 2))])
+    q[:, 2] = 0.3
+    q[:, :2] *= np.sqrt(1 - 0.09)
+    q *= np.where(q[:, :1] < 0, -1, 1) * sign
+    return q if scalar == 0 else q[:, [1, 2, 3, 0]]
+
+
+@pytest.mark.parametrize(
+    "heads", [["q0", "q1", "q2", "q3"], ["q1", "q2", "q3", "q4"], [f"quat[{k}]" for k in range(4)]]
+)
+@pytest.mark.parametrize(("scalar", "order"), [(0, "wxyz"), (3, "xyzw")])
+def test_the_scalar_of_a_numbered_quaternion_is_where_no_sign_changes(heads, scalar, order):
+    (one,) = found(*heads, columns=numbered(scalar))
+    assert (one.kind, one.order, one.columns) == ("orientation", order, tuple(heads))
+
+
+def test_a_numbered_quaternion_whose_scalar_nothing_tells_is_asked_for():
+    steady = np.abs(numbered(0))  # no change of sign
+    with pytest.raises(SpecificationError, match="in the shell --kind q0,q1,q2,q3=wxyz"):
+        found("q0", "q1", "q2", "q3", columns=steady)
+    (one,) = found("q0", "q1", "q2", "q3", columns=steady, **{"q0,q1,q2,q3": "xyzw"})
+    assert one.order == "xyzw"
+    joints = found(*(f"q{k}" for k in range(4)), columns=2 * steady)
+    assert {one.kind for one in joints} == {"position"}
+    seven = found(*(f"q{k}" for k in range(5)), columns=np.column_stack([steady, U]))
+    assert {one.kind for one in seven} == {"position"}
+
+
+def test_movements_one_after_the_other_do_not_change_the_sign_of_a_quaternion():
+    steady = np.abs(numbered(0))
+    heads, both = ["q0", "q1", "q2", "q3"], np.concatenate([steady, -steady])
+    both[T:, 3] = 0.0
+    with pytest.raises(SpecificationError, match="expected heads that say"):
+        find_channels(heads, both, np.array([0, T, 2 * T]), {})
+
+
+@pytest.mark.parametrize("given", [{"tool.rot": "xyzw"}, {"tool.rot.0,tool.rot.1,tool.rot.2,tool.rot.3": "xyzw"}])
+def test_what_several_heads_begin_with_names_them_all(given):
+    heads = ["x", *(f"tool.rot.{k}" for k in range(4))]
+    channels = find_channels(heads, np.column_stack([U, np.abs(numbered(0))]), np.array([0, T]), given)
+    assert [(one.kind, one.order) for one in channels] == [("position", ""), ("orientation", "xyzw")]
+    joints = find_channels(["arm.a", "arm.b", "x"], np.column_stack([U] * 3), np.array([0, T]), {"arm": "angle"})
+    assert [one.kind for one in joints] == ["angle", "angle", "position"]

@@ -11,9 +11,9 @@ from kineme.errors import DataError
 from kineme.files.annotations.annotation import Annotation
 from kineme.files.annotations.tables import as_row
 from kineme.files.formats import FORMATS, data_set_of
-from kineme.files.lerobot.copy import check_takes_texts, copy_with_motions
-from kineme.files.lerobot.info import MARKER
-from kineme.files.lerobot.language import Motion
+from kineme.files.lerobot.copy import copy_with_motions
+from kineme.files.lerobot.info import MARKER, read_info
+from kineme.files.lerobot.motions import OWN, Motion
 from kineme.files.ros.add_topic import copy_with_topic
 from kineme.files.ros.read_bag import read_bag
 from kineme.output.atomic import whole_file, whole_folder
@@ -68,13 +68,13 @@ def write_bag(path: Path, annotations: Sequence[Annotation], source: Path | None
 def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
     """Write a copy of a data set of LeRobot whose frames carry the annotations of their episode.
 
-    They are rows of the style `motion` in the column `language_persistent`, stamped with the start of their movement,
-    with JSON as content. All else is as it was: see `copy_with_motions`.
+    They are rows of the style `motion`, stamped with the start of their movement, with JSON as content. Those that an
+    earlier call has written are replaced. All else is as it was: see `copy_with_motions`.
 
     Raises
     ------
     DataError
-        A data set of version 2, or a damaged one, or `path` is there.
+        A damaged data set, or `path` is there.
     """
     source = _of_one(path, source)
     check_lerobot(path, source)
@@ -83,7 +83,7 @@ def write_lerobot(path: Path, annotations: Sequence[Annotation], source: Path | 
         number = one.place.removeprefix(_EPISODE)
         if not number.isdecimal():
             raise DataError(f"expected annotations of episodes, got one of {one.place!r}")
-        motions.setdefault(int(number), []).append(Motion(one.start, _json(one)))
+        motions.setdefault(int(number), []).append(Motion(one.start, OWN + ", " + _json(one)[1:]))
     with whole_folder(path) as beside:
         copy_with_motions(source, beside, motions)
     return path
@@ -102,10 +102,10 @@ def check_bag(path: Path, source: Path) -> None:
 
 
 def check_lerobot(path: Path, source: Path) -> None:
-    """Refuse a path where no copy of that data set can be written, or a version that takes no texts."""
+    """Refuse a path where no copy of that data set can be written, or a data set that is damaged."""
     _check_apart(path, source)
     _check_new_folder(path, source)
-    check_takes_texts(source)
+    read_info(source)
 
 
 def _of_one(path: Path, source: Path | None) -> Path:

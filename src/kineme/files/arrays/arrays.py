@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.tables.columns import column_numbers
+from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
@@ -109,8 +109,13 @@ def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:
 
 
 def has_known_names(names: Collection[str]) -> bool:
-    """Whether arrays have the names of `arrays_movements`, or none that could be other movements."""
+    """Whether arrays have the names of `arrays_movements`, or none that could be other movements.
+
+    They have not where their times go by another name, such as ``stamp``.
+    """
     known = any(name in names or f"{name}_0" in names for name in POSITIONS)
+    if known and not {*TIMES, "offsets"} & set(names) and any(is_time(name) or is_header_stamp(name) for name in names):
+        return False
     return known or not set(names) - {*TIMES, *LABELS, "offsets"}
 
 
@@ -185,8 +190,9 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     if x.ndim != 2:
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
     if t is None and not isinstance(layout.units, float | int):
+        got = listed(arrays) if len(arrays) > 1 else f"positions of shape {x.shape} alone"
         raise DataError(
-            f"expected times beside the positions, got {listed(arrays)}; say their step with units=, "
+            f"expected times beside the positions, got {got}; say the seconds between two samples with units=, "
             "in the shell --units"
         )
     if t is not None and t.shape != x.shape[:1]:

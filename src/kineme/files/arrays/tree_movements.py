@@ -60,7 +60,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
             "in the shell --columns"
         )
     roles = choose_roles(heads, kinds, layout)
-    needed = {owners[k] for k in chain(roles.positions, roles.movement, [roles.time, roles.label]) if k is not None}
+    others = [roles.time, roles.nanoseconds, roles.label]
+    needed = {owners[k] for k in chain(roles.positions, roles.movement, others) if k is not None}
     table = _table(found, (heads, owners), needed)
     return table_movements(table, roles, layout, kind)
 
@@ -69,7 +70,8 @@ def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     """Movements that are arrays alone, without times."""
     if len(found) == 1 and not found[0].place and not isinstance(layout.units, float | int):
         raise DataError(
-            "expected times beside the positions, got one array alone; say their step with units=, in the shell --units"
+            "expected times beside the positions, got one array alone; say the seconds between two samples with "
+            "units=, in the shell --units"
         )
     check_expanded(8 * sum(int(np.prod(one.entries[""].shape)) for one in found if "" in one.entries))
     xs = [numbers_of(np.asarray(next(iter(one.entries.values())))) for one in found]

@@ -86,13 +86,14 @@ def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | No
     label = _own_label(tree) or label
     arrays = {name: one for name, one in tree.items() if is_array(one) and one.dtype.kind != "O"}
     groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list))}
-    if arrays and (_are_columns(arrays, style) or _continues(arrays, groups)):
+    times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
+    own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
+    if arrays and not own_times and (_are_columns(arrays, style) or _continues(arrays, groups)):
         entries = dict(_flat(tree, style.separator))
         yield Found(place, label, {name: one for name, one in entries.items() if _fits(one)}, _rate(tree))
         return
-    times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
     for name, one in arrays.items():
-        if (match := _TIMES_OF.fullmatch(name)) and (match[1] or match[2]) in arrays:
+        if _is_stamp_of(name, arrays):
             continue
         own = f"{place}/{name}" if place else name
         for found in _of_array(one, own, label or label_of(name)):
@@ -100,6 +101,12 @@ def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | No
             yield found._replace(entries=stamps | found.entries, rate=_rate(tree))
     for name, one in groups.items():
         yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name))
+
+
+def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
+    """Whether an array is the times of another one: ``wave_t`` of ``wave``."""
+    match = _TIMES_OF.fullmatch(name)
+    return match is not None and (match[1] or match[2]) in arrays
 
 
 def _are_columns(arrays: Mapping[str, Any], style: Style) -> bool:

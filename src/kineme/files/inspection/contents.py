@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from kineme.errors import DataError
 from kineme.files.contents import Contents
+from kineme.files.entries import entries_of
 from kineme.files.formats import FORMATS, data_set_of
 from kineme.output.table import Table, to_text
 from kineme.output.text import printable
+
+
+def contents_of_all(paths: Sequence[Path], follow_links: bool = False) -> list[Contents]:
+    """The contents of all recordings at these paths; of several that have some, each row begins with its file."""
+    try:
+        entries, _ = entries_of(paths, follow_links) if paths else ([], [])
+    except (DataError, OSError):  # reading gives the reason
+        return []
+    listed = {entry.name: found for entry in entries if (found := contents_of(entry.path))}
+    if len(listed) < 2:
+        return next(iter(listed.values()), [])
+    merged: dict[tuple[str, tuple[str, ...]], Contents] = {}
+    for name, several in listed.items():
+        for one in several:
+            before = merged.get((one.name, one.heads), Contents(one.name, ("file", *one.heads), (), one.note))
+            rows = tuple((name, *row) for row in one.rows)
+            merged[one.name, one.heads] = before._replace(rows=before.rows + rows, note=before.note or one.note)
+    return list(merged.values())
 
 
 def contents_of(path: Path) -> list[Contents]:

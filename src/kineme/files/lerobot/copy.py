@@ -10,28 +10,20 @@ from pathlib import Path
 
 from kineme.errors import DataError
 from kineme.files.lerobot.episodes import read_episodes
-from kineme.files.lerobot.info import MARKER, Info, read_info, read_json
-from kineme.files.lerobot.language import COLUMN, FEATURE, Motion, write_shard
+from kineme.files.lerobot.info import MARKER, read_info, read_json
+from kineme.files.lerobot.motions import Motion
+from kineme.files.lerobot.write_shard import COLUMNS, Column, write_shard
 
 _OWN = ("meta", "data")  # folders whose files other programs write over; other ones hold videos
 
 
-def check_takes_texts(source: Path) -> Info:
-    """What a data set says of itself; a `DataError` if its version has no texts on frames."""
-    info = read_info(source)
-    if info.version != 3:
-        raise DataError(
-            f"expected a LeRobot data set of version 3, whose frames can carry texts, got version {info.version}; "
-            "convert it with LeRobot, or write a table: .csv or .json"
-        )
-    return info
-
-
 def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence[Motion]]) -> None:
-    """Copy a data set of version 3 into a folder, with texts in the column `language_persistent`.
+    """Copy a data set into a folder, with texts about the movements of its episodes on each of their frames.
 
-    Shards are written anew, each with the column; meta/info.json gets an entry for it if it has none. All else is
-    copied; videos and pictures are hard links where the file system has them.
+    They stand in the column that `COLUMNS` has for the version: `language_persistent` of version 3, whose programs know
+    it, and `annotation.motion` of version 2, whose programs read texts but fail on lists of rows. Shards are written
+    anew, each with the column; meta/info.json gets an entry for it if it has none. All else is copied; videos and
+    pictures are hard links where the file system has them.
 
     Parameters
     ----------
@@ -43,9 +35,10 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
     Raises
     ------
     DataError
-        Another version, an episode that is not there, or a damaged shard; the message names it.
+        An episode that is not there, or a damaged shard; the message names it.
     """
-    info = check_takes_texts(source)
+    info = read_info(source)
+    column = COLUMNS[info.version]
     declared = read_episodes(source, info)
     if unknown := set(motions) - set(declared.numbers.tolist()):
         raise DataError(f"expected an episode of the data set, got {min(unknown)}")
@@ -55,8 +48,8 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
         source, target, dirs_exist_ok=True, copy_function=lambda old, new: _take(source, Path(old), Path(new), changed)
     )
     for shard in shards:
-        write_shard(source / shard, target / shard, motions)
-    _declare(source / MARKER, target / MARKER)
+        write_shard(source / shard, target / shard, motions, column)
+    _declare(source / MARKER, target / MARKER, column)
 
 
 def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
@@ -73,10 +66,10 @@ def _take(source: Path, old: Path, new: Path, changed: set[Path]) -> None:
     shutil.copy2(old, new)
 
 
-def _declare(source: Path, target: Path) -> None:
+def _declare(source: Path, target: Path, column: Column) -> None:
     known = read_json(source, MARKER)
-    if COLUMN in known["features"]:
+    if column.name in known["features"]:
         shutil.copy2(source, target)
         return
-    known["features"][COLUMN] = FEATURE
+    known["features"][column.name] = column.feature
     target.write_text(json.dumps(known, indent=4, ensure_ascii=False), encoding="utf-8")

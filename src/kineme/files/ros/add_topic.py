@@ -13,10 +13,9 @@ from kineme.files.ros.add_to_bag import copy_bag
 from kineme.files.ros.add_to_mcap import copy_mcap
 from kineme.files.ros.add_to_sqlite import copy_sqlite
 from kineme.files.ros.added_topic import TEXT, AddedTopic, added_topic
-from kineme.files.ros.bags import Bag, open_bag, refused
-
-_METADATA = "metadata.yaml"
-_INFORMATION = "rosbag2_bagfile_information"
+from kineme.files.ros.bags import Bag, open_bag, storages_of
+from kineme.files.ros.damage import refused
+from kineme.files.ros.expanded_folder import INFORMATION, METADATA
 
 _COPY: dict[str, Callable[[Path, Path, AddedTopic], None]] = {
     ".bag": copy_bag,
@@ -65,15 +64,15 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
 
     yaml = YAML()
     yaml.width, yaml.preserve_quotes = 2**20, True
-    if bag.reader.compression_mode == "file":
+    if bag.compression == "file":
         raise DataError("expected a bag whose files are not compressed as a whole, to add a topic to; ros2 bag convert")
-    if bag.reader.compression_mode == "message":
+    if bag.compression == "message":
         added = added._replace(messages=tuple((stamp, _compressed(raw)) for stamp, raw in added.messages))
-    with refused(f"expected {_METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
-        whole = yaml.load((source / _METADATA).read_text(encoding="utf-8"))
-        about = whole[_INFORMATION]
+    with refused(f"expected {METADATA} of a bag of ROS 2", "run ros2 bag reindex"):
+        whole = yaml.load((source / METADATA).read_text(encoding="utf-8"))
+        about = whole[INFORMATION]
         names = [PurePath(one).name for one in about["relative_file_paths"]]
-        parts = _divided(added, [one.metadata.start_time for one in bag.reader.storage.storages])
+        parts = _divided(added, [one.metadata.start_time for one in storages_of(bag)])
         changed = {names[k]: part for k, part in parts.items()}
         if added.messages:
             _count(about, added)
@@ -89,7 +88,7 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
             raise DataError(f"expected files of a bag that end in .mcap or .db3, got {one}")
         copy(source / one, target / one, part)
     if changed:
-        with (target / _METADATA).open("w", encoding="utf-8") as file:
+        with (target / METADATA).open("w", encoding="utf-8") as file:
             yaml.dump(whole, file)
 
 

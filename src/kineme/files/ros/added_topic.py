@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any, BinaryIO, NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.ros.bags import Bag, standard_types
+from kineme.files.ros.bags import Bag
+from kineme.files.ros.decode import standard_types
 
 TEXT = "std_msgs/msg/String"  # every version of ROS knows it
 _AT_ONCE = 2**20  # bytes that are copied at a time

@@ -8,7 +8,8 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from kineme.errors import DataError
-from kineme.files.ros.bags import Bag, Topic, decoder_of, messages_of
+from kineme.files.ros.bags import Bag, Topic, messages_of
+from kineme.files.ros.decode import decoder_of
 from kineme.files.ros.message_types import TRANSFORMS
 from kineme.movements.tables.parsed import listed
 

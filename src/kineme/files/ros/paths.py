@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
-from kineme.files.ros.bags import Bag, Topic, decoder_of, messages_of
+from kineme.files.ros.bags import Bag, Topic, messages_of
+from kineme.files.ros.decode import decoder_of
 from kineme.files.ros.message_types import TYPES, Heads
 from kineme.files.ros.streams import Stream, with_rotations
 from kineme.movements.tables.parsed import listed

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.ros.bags import Bag, logs_beside, open_bag
+from kineme.files.ros.bags import Bag, open_bag
 from kineme.files.ros.choose import Choice, choose
 from kineme.files.ros.compose import read_transforms
+from kineme.files.ros.databases import logs_beside
 from kineme.files.ros.merge_streams import SECOND, clock_of, merge_streams
 from kineme.files.ros.message_types import TYPES
 from kineme.files.ros.paths import Paths, read_paths

@@ -7,48 +7,33 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.library.storage.rows import Row, strange
-from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels, is_plain, learned_names
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
 from kineme.movements.channels.coordinates import canonical, columns_of
+from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
 from kineme.movements.trajectories.movements import Movements
 from kineme.validation import Array
 
 
 def channels_to_text(channels: Channels) -> str:
     """JSON: a list of objects with the fields of `Channel`."""
-    return json.dumps([one._asdict() for one in channels], ensure_ascii=True)
+    return json.dumps(channels_to_data(channels), ensure_ascii=True)
 
 
 def channels_of_text(text: str, n_dims: int, path: Path) -> Channels:
     """The inverse, for the library at `path`; refused unless it is channels of so many dimensions."""
     try:
-        channels = tuple(_channel(one) for one in json.loads(text))
-        good = sum(len(one.coordinates) for one in channels) == n_dims
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        good = False
-    if not good:
+        return channels_from_data(json.loads(text), n_dims)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise DataError(
             f"expected {path} to say what the {n_dims} dimensions of its movements were recorded as, got "
             f"{text[:40]!r}; take the file from a backup or an export that you trust"
-        )
-    return channels
-
-
-def _channel(one: dict[str, Any]) -> Channel:
-    columns, unit = tuple(one["columns"]), one["unit"]
-    channel = Channel(one["name"], one["kind"], columns, unit, one["order"])
-    texts = [channel.name, *columns, *([] if unit is None else [unit])]
-    sized = len(columns) == (4 if channel.kind == "orientation" else 1)
-    ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
-    if channel.kind not in KINDS or not sized or not ordered or not all(isinstance(text, str) for text in texts):
-        raise ValueError("no channel")
-    return channel
+        ) from error
 
 
 def other_columns(channels: Channels) -> list[int]:

@@ -25,7 +25,8 @@ class Channel(NamedTuple):
           beside positions times 0.2 m.
         - ``"discrete"``: a gripper or a button; kept as the steps that were recorded, and never learned.
     columns : tuple of str
-        Heads of its columns, in the order of the file: four of an orientation, one of the others.
+        Heads of its columns: four of an orientation, one of the others. Side by side in what is recorded, in the order
+        of the file as far as `order` can say it.
     unit : str or None
         From the head, such as ``"deg"``; None if the file does not say.
     order : str
@@ -55,7 +56,7 @@ def learned_names(channels: Channels) -> tuple[str, ...]:
 
 
 def recorded_names(channels: Channels) -> tuple[str, ...]:
-    """Heads of all columns, in the order of the file."""
+    """Heads of all columns, channel after channel."""
     return tuple(name for one in channels for name in one.columns)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
-from kineme.movements.channels.channel import Channel, Channels
+from kineme.movements.channels.channel import Channel, Channels, recorded_names
 from kineme.movements.channels.wraps import period_of, without_wraps
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, product
 from kineme.movements.rotations.rotation_vectors import log
@@ -23,6 +23,13 @@ def columns_of(channels: Channels) -> list[slice]:
     """The columns of each channel."""
     ends = np.cumsum([len(one.columns) for one in channels]).tolist()
     return [slice(end - len(one.columns), end) for end, one in zip(ends, channels, strict=True)]
+
+
+def in_order(columns: Array, heads: Sequence[str], channels: Channels) -> Array:
+    """Columns (total, m) of a file in the order of its channels: those of a quaternion side by side."""
+    number = {head: k for k, head in enumerate(heads)}
+    order = [number[head] for head in recorded_names(channels)]
+    return columns if order == sorted(order) else columns[:, order]
 
 
 def off_norm(columns: Array, channels: Channels) -> Iterator[tuple[Channel, NDArray[np.intp], Array]]:

@@ -24,19 +24,25 @@ _BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relati
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
 _BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
-_ROS_HEADER = re.compile(r"(.*[./])?header[./](seq|stamp|frame_id)\b.*")  # of a message
+_ROS_HEADER = re.compile(r"(.*[./_])?header[./_](seq|stamp|frame_id)(?![^\W_]).*", re.IGNORECASE)  # of a message
+_ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECASE)
+_WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
 _TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
 class Roles(NamedTuple):
-    """Column numbers by role, and the columns that are ignored."""
+    """Column numbers by role, and the columns that are ignored.
+
+    `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``.
+    """
 
     time: int | None
     positions: tuple[int, ...]
     movement: tuple[int, ...]
     label: int | None
     ignored: tuple[int, ...]
+    nanoseconds: int | None = None
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
@@ -62,7 +68,9 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     movement = _movement(heads, layout, named, label)
     taken = {*movement, label}
     time = _time(heads, kinds, layout, named, taken)
-    taken.add(time)
+    beside = _nanoseconds(heads, kinds) if named else {}
+    nanoseconds = None if time is None else beside.get(time)
+    taken |= {time, *beside, *beside.values()}
     if layout.coordinates is not None:
         positions = column_numbers(heads, layout.coordinates)
     else:
@@ -73,9 +81,9 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
-    taken.update(positions)
-    ignored = tuple(k for k in range(len(heads)) if k not in taken)
-    return Roles(time, positions, movement, label, ignored)
+    used = {time, nanoseconds, label, *movement, *positions}
+    ignored = tuple(k for k in range(len(heads)) if k not in used)
+    return Roles(time, positions, movement, label, ignored, nanoseconds)
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
@@ -134,7 +142,7 @@ def _time(
     if layout.time is not None:
         return _number(heads, layout.time)
     free = [k for k in range(len(heads)) if k not in taken]
-    of_time = [k for k in free if is_time(heads[k])] if named else [k for k in free if kinds[k] != "text"][:1]
+    of_time = _of_time(heads, kinds, free) if named else [k for k in free if kinds[k] != "text"][:1]
     if len(of_time) == 1:
         return of_time[0]
     if isinstance(layout.units, float | int) and not of_time:
@@ -148,12 +156,42 @@ def _time(
     )
 
 
+def _of_time(heads: Sequence[str], kinds: Sequence[str], free: Sequence[int]) -> list[int]:
+    """The columns of times; the stamp in the header of a message counts if no other column is one."""
+    later = set(_nanoseconds(heads, kinds).values())
+    rest = [k for k in free if k not in later and heads[k]]
+    of_time = [k for k in rest if is_time(heads[k])]
+    if len(of_time) > 1:  # a stamp without values, as of a nested message whose parts follow
+        of_time = [k for k in of_time if kinds[k] != "text"] or of_time
+    return of_time or [k for k in rest if is_header_stamp(heads[k]) and kinds[k] != "text"]
+
+
+def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
+    """Columns of whole seconds -> those of the nanoseconds beside them: ``stamp.sec`` and ``stamp.nanosec``."""
+    plain = {head.lower(): k for k, head in enumerate(heads)}
+    found = {}
+    for k, head in enumerate(heads):
+        match = _WHOLE_SECONDS.fullmatch(head) if kinds[k] == "number" else None
+        if match is None or match[1][-1:].isalpha():
+            continue
+        names = [f"{match[1]}{name}".lower() for name, unit in PER_SECOND.items() if unit == PER_SECOND["ns"]]
+        beside = [plain[name] for name in names if name in plain and kinds[plain[name]] == "number"]
+        if len(beside) == 1:
+            found[k] = beside[0]
+    return found
+
+
 def is_time(head: str) -> bool:
     """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
     words = words_of(head)
     if len(words) <= 1 and words != ("s",) and set(words) & set(PER_SECOND):
         return True
     return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
+
+
+def is_header_stamp(head: str) -> bool:
+    """Whether a head names the stamp in the header of a message: ``.header.stamp``, ``header.stamp.sec``."""
+    return _ROS_STAMP.fullmatch(head) is not None
 
 
 def _named_as(head: str, kind: frozenset[str]) -> bool:

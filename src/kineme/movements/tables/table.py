@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct
-from kineme.movements.tables.time_stamps import in_seconds, unit_by_size, unit_in_head
+from kineme.movements.tables.time_stamps import PER_SECOND, in_seconds, unit_by_size, unit_in_head
 from kineme.validation import Array
 
 
@@ -90,7 +90,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         f"{table.maker} {kind}".strip(),
         "long" if roles.movement or roles.label is not None or table.segments is not None else "wide",
         distinct([heads[k] for k in roles.positions]),
-        None if roles.time is None else heads[roles.time],
+        _time_heads(heads, roles),
         units,
         units_from,
         tuple(heads[k] for k in roles.movement),
@@ -107,6 +107,8 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     if roles.time is None:
         return np.zeros(table.n_rows), layout.units or 1.0, "given"
     stamps, head = table.columns[roles.time], table.heads[roles.time]
+    if roles.nanoseconds is not None:
+        return stamps + table.columns[roles.nanoseconds] / PER_SECOND["ns"], "s", "head"
     if table.dates_in is not None:
         return in_seconds(stamps, table.dates_in), table.dates_in, "dates"
     if layout.units is not None:
@@ -114,6 +116,13 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     named = unit_in_head(head) or (unit_in_head(table.measured_in[roles.time]) if table.measured_in else None)
     units, known = (named, "head") if named else unit_by_size(stamps)
     return in_seconds(stamps, units), units, known
+
+
+def _time_heads(heads: Sequence[str], roles: Roles) -> str | None:
+    """The column of times, or the two whose sum they are."""
+    if roles.time is None or roles.nanoseconds is None:
+        return None if roles.time is None else heads[roles.time]
+    return f"{heads[roles.time]} + {heads[roles.nanoseconds]}"
 
 
 def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], list[str], list[str | None]]:

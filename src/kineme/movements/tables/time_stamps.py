@@ -21,7 +21,7 @@ _ALSO = {
     "s": "sec secs second seconds",
     "ms": "msec msecs millis millisecond milliseconds",
     "us": "µs μs usec usecs micros microsecond microseconds",
-    "ns": "nsec nsecs nanos nanosecond nanoseconds",
+    "ns": "nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
 }
 _NAMES = {name: unit for unit, names in _ALSO.items() for name in (unit, *names.split())}
 

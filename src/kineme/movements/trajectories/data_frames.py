@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kineme.errors import DataError, TrajectoryError
-from kineme.movements.channels.coordinates import off_norm
+from kineme.movements.channels.coordinates import in_order, off_norm
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.collect import collect_arrays
@@ -61,6 +62,7 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
         copy=True,
     )
     channels = find_channels(dimensions, movements.positions, movements.offsets, layout.kinds or {})
+    movements = replace(movements, positions=in_order(movements.positions, dimensions, channels))
     for channel, rows, norms in off_norm(movements.positions, channels):
         raise TrajectoryError(
             f"{_place(movements, int(rows[0]))}: expected unit quaternions in {', '.join(channel.columns)}, got norm "

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
 from kineme.primitives.discrete.formulations import safe_amplitudes
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import forcing_matrix
@@ -20,7 +19,9 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.movements_like import MovementsLike
     from kineme.primitives.control.controller import Controller
     from kineme.primitives.control.obstacles import ObstacleAvoidance
+    from kineme.primitives.discrete.choose import BasisSelection
     from kineme.primitives.discrete.rollout import Rollout
+    from kineme.primitives.discrete.via_points import ViaLike
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,58 @@ class DMP(Specification):
 
         return Primitives(self, **encode(self, movements))
 
+    def choose(
+        self,
+        movements: MovementsLike,
+        *,
+        n_basis: Sequence[int] | None = None,
+        ridge: Sequence[float] | None = None,
+        tolerance: float = 0.005,
+        negligible: float = 1e-4,
+    ) -> BasisSelection[Self]:
+        """Choose the number of basis functions and the ridge by generalized cross-validation.
+
+        ``mean (y - H y)^2 / (1 - trace(H) / T)^2`` estimates the mean squared error of predicting a sample of a path
+        from all its others (Golub, Heath and Wahba 1979, Eq. 1.4). Chosen for all movements together are the
+        fewest basis functions that are good enough, with their best ridge; all else stays as in this specification.
+
+        Parameters
+        ----------
+        movements : as `learn` takes them
+            Noise is assumed to be independent from sample to sample; smoothed recordings are followed too closely. More
+            than 2,000 movements are represented by 2,000 of them.
+        n_basis : sequence of int, optional
+            Numbers to try; by default from 6 to 100, at most as many as samples.
+        ridge : sequence of float, optional
+            Ridges to try; by default powers of ten from 1e-12 to 100.
+        tolerance : float, default 0.005
+            Good enough is an error within this share of the smallest one; the noise of the samples is part of both,
+        negligible : float, default 1e-4
+            or below this share of the movements' extents.
+
+        Returns
+        -------
+        BasisSelection
+            With ``dmp``, the specification to learn with, and the error of all that was tried.
+
+        Raises
+        ------
+        SpecificationError
+            ``fit="forcing"``; numbers or ridges out of range.
+        TrajectoryError
+            Movements that cannot be used: see `learn`.
+
+        Examples
+        --------
+        >>> import kineme
+        >>> demos = kineme.load_lasa(["CShape"])
+        >>> selection = kineme.DMP().choose(demos)
+        >>> primitives = selection.dmp.learn(demos)
+        """
+        from kineme.primitives.discrete.choose import choose  # only who chooses needs it
+
+        return choose(self, movements, n_basis, ridge, tolerance, negligible)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Primitives(Learned):
@@ -172,6 +225,8 @@ class Primitives(Learned):
         duration: ArrayLike | None = None,
         *,
         velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
         settle: float | None = None,
@@ -188,6 +243,13 @@ class Primitives(Learned):
             tau [s]; by default the demonstrated one. The path does not depend on it.
         velocity : array_like of shape (d,) or (n, d), optional
             Initial velocity, per second; by default the demonstrated one, in proportion to the tempo.
+        via : sequence of (time, point) or ((begin, end), points), optional
+            Where to pass, and when as a share of the duration, above 0 and below 1. A point (d,) is for all movements,
+            (n, d) for each its own; a stretch of points (m, d) or (n, m, d) is at even times from `begin` to `end`. NaN
+            leaves a dimension free. Points are met exactly, and then the goal too; a stretch as well as the basis
+            functions can.
+        end_velocity : array_like of shape (d,) or (n, d), optional
+            Velocity at the goal, at the end of the duration, per second; the goal is then met exactly.
         rate : float, optional
             Samples per second, at least; all movements of a batch get the same number of samples, at most 50 million
             over the number of basis functions.
@@ -199,29 +261,49 @@ class Primitives(Learned):
         Returns
         -------
         Rollout
-            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``.
+            With ``times``, ``positions``, ``velocities``, ``accelerations`` and ``trajectories``; `from_rollout` makes
+            primitives of it, to keep.
 
         Raises
         ------
         TrajectoryError
-            A start, goal or velocity of the wrong shape; numbers of movements that do not match.
+            A start, goal, velocity or via point of the wrong shape; numbers of movements that do not match.
         SpecificationError
-            A duration of 0 or less, a rate too low to follow the dynamics.
+            A duration of 0 or less, a rate too low to follow the dynamics, a via point outside the duration, two places
+            at one time, more via points than there are basis functions to meet them.
         DegenerateMovementError
             The original formulation asked to move a closed or flat demonstration to another goal.
-        """
-        from kineme.primitives.discrete.rollout import rollout, samples_at_rate, settled_end
 
-        movement = rollout(self, start, goal, duration, velocity)
-        end = 1.0 if settle is None else settled_end(movement, settle)
-        if rate is not None and n_samples is not None:
-            raise SpecificationError("expected either rate or n_samples, got both")
-        if rate is not None:
-            n_samples = samples_at_rate(rate, movement.durations * end, self.dmp)
-        elif n_samples is None:
-            n_samples = math.ceil(end * (self.dmp.n_points - 1)) + 1
-        n_samples = check_samples(check_count("n_samples", n_samples, 2), self.dmp.n_basis, "n_samples")
-        return replace(movement, n_samples=n_samples, end=end)
+        Warns
+        -----
+        ExtrapolationWarning
+            A via point farther from the path than the movement is large; a stretch that is not met.
+
+        Notes
+        -----
+        Via points and end velocity change the weights by one linear solve, ``W += S A' (A S A')^-1 e``, so that the
+        change of the path has the least mean square acceleration; after Y. Zhou, J. Gao, T. Asfour, "Learning
+        Via-Movement Primitives with Inter- and Extrapolation Capabilities", IROS 2019, Eq. (9) to (11).
+        """
+        from kineme.primitives.discrete.modulate import modulated
+        from kineme.primitives.discrete.rollout import rollout
+        from kineme.primitives.discrete.samples import sampled
+
+        movement = modulated(rollout(self, start, goal, duration, velocity), via, end_velocity)
+        return sampled(movement, rate, n_samples, settle)
+
+    @classmethod
+    def from_rollout(cls, movement: Rollout) -> Primitives:
+        """The movements of a rollout as primitives of their own, with its starts, goals, durations and via points.
+
+        They move so without being told; they are saved, recognized, controlled and moved to other goals like any other.
+        """
+        from kineme.primitives.discrete.rollout import own_primitives
+
+        own = own_primitives(movement)
+        return cls._of_rows(
+            own.dmp, {name: getattr(own, name) for name in cls.ROWS}, own.labels, own.names, own.recorded_as
+        )
 
     def controller(  # noqa: PLR0913 - an option per parameter
         self,
@@ -231,6 +313,8 @@ class Primitives(Learned):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
         feedback: str = "state",
         phase_stopping: float | None = None,
         goal_filter: float | None = None,
@@ -245,8 +329,8 @@ class Primitives(Learned):
         ----------
         dt : float
             Time of a step [s], at most the duration.
-        start, goal, duration, velocity : optional
-            As in `rollout`, for one movement.
+        start, goal, duration, velocity, via, end_velocity : optional
+            As in `rollout`, for one movement. Past the duration the goal attracts again, at rest.
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
             What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`.
 
@@ -275,7 +359,7 @@ class Primitives(Learned):
         from kineme.primitives.discrete.plan import plan_of
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
-        return Controller(plan_of(self, start, goal, duration, velocity), dt, options)
+        return Controller(plan_of(self, start, goal, duration, velocity, via, end_velocity), dt, options)
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

@@ -13,6 +13,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.operators import encoder
 from kineme.primitives.discrete.specification import Specification
+from kineme.primitives.recorded_as import recorded_as
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array, describe
 
@@ -21,7 +22,8 @@ _TILE_SAMPLES = 200_000  # in one tile: larger ones do not fit the cache, with s
 
 def encode(dmp: Specification, movements: MovementsLike) -> dict[str, Any]:
     """Learn one primitive per movement; see `DMP.learn`."""
-    demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
+    recorded = Demonstrations.of(movements)
+    demos = preprocess(recorded, dmp.preprocessing)
     n, n_dims = len(demos), demos.n_dims
     n_samples = demos.even_length or dmp.n_points
     operator = encoder(dmp, n_samples)
@@ -48,6 +50,7 @@ def encode(dmp: Specification, movements: MovementsLike) -> dict[str, Any]:
         "extents": extents,
         "labels": demos.labels,
         "names": demos.names,
+        "recorded_as": recorded_as(recorded, dmp.preprocessing),
     }
 
 

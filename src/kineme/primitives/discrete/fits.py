@@ -83,10 +83,24 @@ def trajectory_regression(response: Response, stiffness: float, ridge: float) ->
         From y to v0.
     """
     n_points, n_basis = response.Phi[0].shape
-    columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0]))  # unit: W / K, comparable to y
-    curvature = np.diff(np.eye(n_basis, n_basis + 1), n=2, axis=0)
-    rows = np.vstack((columns / np.sqrt(n_points), np.sqrt(ridge / (n_basis - 2)) * curvature))
+    columns, curvature = trajectory_columns(response, stiffness)
+    rows = np.vstack((columns, math.sqrt(ridge) * curvature))
     data = np.vstack((np.eye(n_points), np.zeros((n_basis - 2, n_points)))) / np.sqrt(n_points)
     data[:n_points, -1] -= response.goal[0] / np.sqrt(n_points)  # the last sample of y is g - x0
     solution = np.linalg.lstsq(rows, data, rcond=None)[0]
     return solution[:-1] * stiffness, solution[-1]
+
+
+def trajectory_columns(response: Response, stiffness: float) -> tuple[Array, Array]:
+    """What `trajectory_regression` fits a path with, and what it keeps small, both per square root of their rows.
+
+    Returns
+    -------
+    columns : ndarray of shape (T, N + 1)
+        Paths of W / K, comparable to y, and of v0.
+    curvature : ndarray of shape (N - 2, N + 1)
+        Second differences of W / K; times the square root of the ridge they are rows of the least-squares problem.
+    """
+    n_points, n_basis = response.Phi[0].shape
+    columns = np.column_stack((response.Phi[0] * stiffness, response.velocity[0])) / np.sqrt(n_points)
+    return columns, np.diff(np.eye(n_basis, n_basis + 1), n=2, axis=0) / np.sqrt(n_basis - 2)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.specification import Specification
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import Array
 
 
@@ -34,3 +35,4 @@ class Learned(Batch):
     extents: Array
     labels: NDArray[Any] | None = None
     names: tuple[str | None, ...] | None = None
+    recorded_as: RecordedAs | None = None

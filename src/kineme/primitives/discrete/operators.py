@@ -15,7 +15,7 @@ from kineme.primitives.discrete.fits import (
     ridge_regression,
     trajectory_regression,
 )
-from kineme.primitives.discrete.response import Response, spring_damper_response
+from kineme.primitives.discrete.response import Response, response_between, spring_damper_response
 from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array
 
@@ -50,6 +50,26 @@ def encoder(dmp: Specification, n_samples: int) -> Encoder:
 def decoder(dmp: Specification, n_samples: int, end: float = 1.0) -> Response:
     """The decode matrices of `dmp` at `n_samples` even times from 0 to `end` durations."""
     return spring_damper_response(dmp.basis, dmp.system, dmp.K, dmp.D, np.linspace(0.0, end, n_samples))
+
+
+@lru_cache(maxsize=32)
+def decoder_at(dmp: Specification, times: tuple[float, ...]) -> Response:
+    """The decode matrices of `dmp` at any times in [0, 1], in durations."""
+    grid = decoder(dmp, max(dmp.n_points, 2 * dmp.n_basis))
+    return response_between(grid, dmp.basis, dmp.system, dmp.K, dmp.D, np.array(times))
+
+
+@lru_cache(maxsize=32)
+def smoothness_factor(dmp: Specification) -> Array:
+    """Factor S (N, N) of a covariance of the weights under which smooth changes of the path are the likely ones.
+
+    ``S' S = (mean_u Phi''(u)' Phi''(u) + 1e-8 m I)^-1`` with m the mean of the diagonal: the least likely changes are
+    those with the largest mean square acceleration, whatever the gating, the fit or the unit of the weights.
+    """
+    bend = decoder(dmp, dmp.n_points).Phi[2]
+    precision = bend.T @ bend / dmp.n_points
+    values, vectors = np.linalg.eigh(precision)
+    return np.asarray((vectors / np.sqrt(np.maximum(values, 0.0) + 1e-8 * np.trace(precision) / dmp.n_basis)).T)
 
 
 @lru_cache(maxsize=32)

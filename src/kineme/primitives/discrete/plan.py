@@ -8,18 +8,22 @@ from numpy.typing import ArrayLike
 from kineme.primitives.control.options import check_one, one_vector
 from kineme.primitives.control.plan import Plan
 from kineme.primitives.discrete.learned import Learned
-from kineme.primitives.discrete.rollout import rollout
+from kineme.primitives.discrete.modulate import modulated
+from kineme.primitives.discrete.rollout import own_primitives, rollout
+from kineme.primitives.discrete.via_points import ViaLike
 from kineme.validation import Array, check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
 
 
-def plan_of(
+def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
     primitive: Learned,
     start: ArrayLike | None = None,
     goal: ArrayLike | None = None,
     duration: float | None = None,
     velocity: ArrayLike | None = None,
+    via: ViaLike | None = None,
+    end_velocity: ArrayLike | None = None,
 ) -> Plan:
     """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
     check_one(len(primitive))
@@ -33,6 +37,10 @@ def plan_of(
         duration,
         one_vector("velocity", velocity, d),
     )
+    if via is not None or end_velocity is not None:
+        movement = modulated(movement, via, one_vector("end_velocity", end_velocity, d))
+        primitive = own_primitives(movement)
+        check_one(len(primitive))
     x0, tau = movement.starts[0].copy(), float(movement.durations[0])
     learned, extents = primitive.goals - primitive.starts, primitive.extents
 

@@ -69,6 +69,34 @@ def spring_damper_response(
             states[done // n_steps, :2] = state
     states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
     states[:, 2, :-1] += _forcing(basis, formulation, stiffness, u)
+    return _parts(states)
+
+
+def response_between(
+    grid: Response, basis: GaussianBasis, formulation: Formulation, stiffness: float, damping: float, u: Array
+) -> Response:
+    """The same at any normalized times u (k,) in [0, 1], from the response at even times that are close enough.
+
+    Each state is carried on from the last even time before it, in one step.
+    """
+    n_steps = grid.goal.shape[1] - 1
+    before = np.minimum(np.floor(u * n_steps).astype(np.intp), n_steps)
+    h = np.maximum(u - before / n_steps, 0.0)[:, None]
+    carry = transitions(stiffness, damping, h[:, 0])
+    impulse = transitions(stiffness, damping, (h * (1.0 - NODES)).ravel())[:, :, 1].reshape(len(u), -1, 2)
+    times = before[:, None] / n_steps + h * NODES
+    forcing = _forcing(basis, formulation, stiffness, times.ravel()).reshape(*times.shape, -1)
+    states = np.empty((len(u), 3, basis.n_basis + 2))
+    there = np.dstack((grid.Phi, grid.goal, grid.velocity))[:2, before].transpose(1, 0, 2)
+    states[:, :2] = carry @ there
+    states[:, :2, :-1] += np.einsum("kqz,kq,kqf->kzf", impulse, h * NODE_WEIGHTS, forcing)
+    states[:, 2] = -stiffness * states[:, 0] - damping * states[:, 1]
+    states[:, 2, :-1] += _forcing(basis, formulation, stiffness, u)
+    return _parts(states)
+
+
+def _parts(states: Array) -> Response:
+    """States (T, 3, N + 2) as the response to weights, goal and initial velocity."""
     by_part = states.transpose(1, 0, 2)
     return Response(np.ascontiguousarray(by_part[:, :, :-2]), by_part[:, :, -2].copy(), by_part[:, :, -1].copy())
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,6 @@ from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import decoder
-from kineme.primitives.discrete.specification import Specification
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import (
     LARGEST,
@@ -22,14 +21,17 @@ from kineme.validation import (
     SHORTEST_STEP,
     Array,
     as_numbers,
-    check_number,
-    check_samples,
     describe,
 )
 
 _TILE_SAMPLES = 100_000  # numbers in one tile of the result
-_LONGEST = 10.0  # durations after which a movement that has not settled is given up
-_SETTLING_SAMPLES = 400
+
+
+class Change(NamedTuple):
+    """A change of the weights of n movements: ``W + coefficients @ directions``."""
+
+    coefficients: Array  # (n, d, k)
+    directions: Array  # (k, N)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,6 +56,7 @@ class Rollout(BaseRollout):
     durations: Array  # (n,), tau
     n_samples: int
     end: float = 1.0  # of the last sample, in durations
+    change: Change | None = None  # of the weights in force: via points, end velocity, limits
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -64,7 +67,7 @@ class Rollout(BaseRollout):
     @property
     def times(self) -> Array:
         """Times of the samples (n, T) [s]."""
-        return self.durations[:, None] * np.linspace(0.0, self.end, self.n_samples)
+        return self.durations[:, None] * self._shares
 
     @cached_property
     def positions(self) -> Array:
@@ -82,13 +85,19 @@ class Rollout(BaseRollout):
         return self._derivative(2)
 
     @property
+    def _shares(self) -> Array:
+        return np.linspace(0.0, self.end, self.n_samples)
+
+    @property
     def _batch(self) -> Batch:
         return self.primitives
 
     def _take(self, chosen: NDArray[np.intp]) -> Rollout:
         rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
+        change = self.change
         return replace(
             self,
+            change=None if change is None else change._replace(coefficients=change.coefficients[chosen]),
             primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
             **{name: getattr(self, name)[chosen] for name in rows},
         )
@@ -97,7 +106,8 @@ class Rollout(BaseRollout):
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
         constant = np.full(self.n_samples, 1.0 if order == 0 else 0.0)
         rows = [response.Phi[order].T, response.goal[order], response.velocity[order], constant]
-        matrix, n_basis = np.vstack(rows), self.primitives.dmp.n_basis
+        change = self.change or Change(np.zeros((len(self), 1, 0)), np.zeros((0, len(response.Phi[order].T))))
+        matrix, n_basis = np.vstack([*rows, change.directions @ rows[0]]), self.primitives.dmp.n_basis
         per_tau = (1.0 / self.durations**order)[:, None, None]
         shared = len(self.primitives) == 1
         weights, d = self.primitives.scaled_weights, self.starts.shape[1]
@@ -105,15 +115,16 @@ class Rollout(BaseRollout):
 
         def tile(start: int, stop: int) -> None:
             chosen = slice(start, stop)
-            numbers = np.empty((stop - start, d, n_basis + 3))
+            numbers = np.empty((stop - start, d, len(matrix)))
             np.multiply(
                 weights if shared else weights[chosen], self.ratio[chosen, :, None], out=numbers[:, :, :n_basis]
             )
             numbers[:, :, n_basis] = self.goals[chosen] - self.starts[chosen]
             numbers[:, :, n_basis + 1] = self.velocities_at_start[chosen] * self.durations[chosen, None]
             numbers[:, :, n_basis + 2] = self.starts[chosen]
+            numbers[:, :, n_basis + 3 :] = change.coefficients[chosen]
             # Two-dimensional on purpose: a stack of matrices would become as many small products.
-            rows = numbers.reshape(-1, n_basis + 3)
+            rows = numbers.reshape(-1, len(matrix))
             np.matmul(rows, matrix, out=result[chosen].reshape(len(rows), -1))
             if order:
                 result[chosen] *= per_tau[chosen]
@@ -152,6 +163,23 @@ def rollout(
     velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
     return Rollout(
         primitives, _ratio(primitives, goals - starts), starts, goals, velocities, durations, primitives.dmp.n_points
+    )
+
+
+def own_primitives(movement: Rollout) -> Learned:
+    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights."""
+    some = movement.primitives
+    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
+    weights = some.scaled_weights * movement.ratio[:, :, None]
+    if movement.change is not None:
+        weights += movement.change.coefficients @ movement.change.directions
+    return replace(
+        some,
+        scaled_weights=weights,
+        starts=movement.starts.copy(),
+        goals=movement.goals.copy(),
+        velocities=movement.velocities_at_start.copy(),
+        durations=movement.durations.copy(),
     )
 
 
@@ -199,13 +227,13 @@ def _first(value: Array, bad: NDArray[np.bool_]) -> str:
     return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
 
 
-def broadcast_length(n_primitives: int, options: dict[str, Array | None]) -> int:
-    """Number of movements from the lengths of all options, which must be 1 or equal."""
-    lengths = {"primitives": n_primitives} | {name: len(value) for name, value in options.items() if value is not None}
+def broadcast_length(n: int, options: dict[str, Array | None], what: str = "primitives") -> int:
+    """Number of movements from n of `what` and the lengths of all options, which must be 1 or equal."""
+    lengths = {what: n} | {name: len(value) for name, value in options.items() if value is not None}
     n = max(lengths.values())
     if any(length not in (1, n) for length in lengths.values()):
         listed = ", ".join(f"{length} {name}" for name, length in lengths.items())
-        raise TrajectoryError(f"expected one or equally many of primitives, starts, goals and so on, got {listed}")
+        raise TrajectoryError(f"expected one or equally many of {what}, starts, goals and so on, got {listed}")
     return n
 
 
@@ -221,31 +249,3 @@ def _ratio(primitives: Learned, amplitudes: Array) -> Array:
             '"bio-inspired" or "amplitude-scaled"'
         )
     return ratio
-
-
-def samples_at_rate(rate: float, durations: Array, dmp: Specification) -> int:
-    """Samples per movement so that none is sampled more coarsely than `rate` [Hz]."""
-    check_number("rate", rate, above=0.0)
-    wanted = float(durations.max()) * rate * (1 - 1e-12) + 1
-    n_samples = check_samples(wanted, dmp.n_basis, "rate times duration")
-    least = math.ceil(2 * math.sqrt(dmp.K)) + 1
-    if n_samples < least:
-        raise SpecificationError(
-            f"expected a rate of at least {(least - 1) / float(durations.max()):.3g} Hz to follow the dynamics, that "
-            f"is two samples in each time constant duration / sqrt(K) of the spring, got {rate:g} Hz"
-        )
-    return n_samples
-
-
-def settled_end(movement: Rollout, tolerance: float) -> float:
-    """Time, in durations from 1 on, at which every movement stays within `tolerance` of its goal."""
-    check_number("settle", tolerance, above=0.0)
-    far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
-    outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))
-    last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
-    if last == _SETTLING_SAMPLES - 1:
-        raise SpecificationError(
-            f"expected the movement to come within {tolerance:g} of its goal in {_LONGEST:g} durations, it does "
-            "not; raise the tolerance, the stiffness or the damping"
-        )
-    return max(1.0, (last + 1) * _LONGEST / (_SETTLING_SAMPLES - 1))

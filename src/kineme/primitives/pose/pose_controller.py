@@ -26,7 +26,8 @@ class PoseState(State):
     """A pose at one moment: a `State` in the columns of the demonstrations.
 
     ``position`` and ``goal`` have shape (4,), a unit quaternion, or (7,), the position before it; ``velocity`` and
-    ``acceleration`` have shape (3,), angular in the world frame, or (6,), the linear ones before them.
+    ``acceleration`` have shape (3,), angular in the world frame, or (6,), the linear ones before them. Of p positions
+    and angles and k orientations they have shapes (p + 4 k,) and (p + 3 k,), the orientations last.
     """
 
     __slots__ = ()
@@ -38,8 +39,8 @@ class PoseState(State):
 
     @property
     def orientation(self) -> Array:
-        """The unit quaternion (4,)."""
-        return self.position[-4:]
+        """The unit quaternion (4,); of k orientations (4 k,)."""
+        return self.position[-4 * (len(self.position) - len(self.velocity)) :]
 
 
 class PoseController(Controller):
@@ -59,7 +60,8 @@ class PoseController(Controller):
     state: PoseState
 
     def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
-        self._reference = reference
+        self._reference = reference.reshape(-1, 4)
+        self._linear = plan.n_positions  # columns before the orientations
         super().__init__(plan, dt, options)
 
     def reset(self) -> PoseState:
@@ -122,12 +124,12 @@ class PoseController(Controller):
 
     def _as_tangent(self, value: Any, near: Array) -> Array | None:
         """Position and the rotation vector closest to that of `near`; None for what is no pose."""
-        array = inputs.vector(value, self._n_dims + 1)
+        array, m = inputs.vector(value, self._n_dims + len(self._reference)), self._linear
         if array is None:
             return None
         try:
-            p = log(product(normalized(array[-4:]), conjugate(self._reference)))
-            return np.concatenate((array[:-4], nearest(p, near[-3:])))
+            p = log(product(normalized(array[m:].reshape(-1, 4)), conjugate(self._reference)))
+            return np.concatenate((array[:m], nearest(p, near[m:].reshape(-1, 3)).ravel()))
         except Exception:  # a quaternion that is none: the motion goes on
             return None
 
@@ -136,29 +138,33 @@ class PoseController(Controller):
         array = inputs.vector(value, self._n_dims)
         if array is None:
             return None
-        rates = np.concatenate((array[:-3], rotation_vector_rate(x[-3:], array[-3:])))
-        return rates if inputs.usable(rates) and np.abs(rates[-3:]).max() <= _FASTEST else None
+        m = self._linear
+        turning = rotation_vector_rate(x[m:].reshape(-1, 3), array[m:].reshape(-1, 3)).ravel()
+        rates = np.concatenate((array[:m], turning))
+        return rates if inputs.usable(rates) and np.abs(turning).max() <= _FASTEST else None
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         super()._move(dt, push, last)
         if Status.STATE_KEPT in self._events:
             motion = self._motion.copy()
-            motion[1:, -3:] = 0.0  # else it would be as fast, and kept, in all later steps
+            motion[1:, self._linear :] = 0.0  # else it would be as fast, and kept, in all later steps
             self._motion = motion
 
     def _usable(self, motion: Array) -> bool:
-        turned = np.abs(motion[:, -3:]).max(axis=1)
+        turned = np.abs(motion[:, self._linear :]).max(axis=1)
         return super()._usable(motion) and bool(turned[0] <= _MOST_TURNED and turned[1:].max() <= _FASTEST)
 
     def _derivatives(self) -> tuple[Array, Array]:
         rate, bend = super()._derivatives()
-        p = self._origin[-3:] + self._motion[0, -3:]
-        velocity = np.concatenate((rate[:-3], angular_velocity(p, rate[-3:])))
-        return velocity, np.concatenate((bend[:-3], angular_acceleration(p, rate[-3:], bend[-3:])))
+        m = self._linear
+        p, dp, ddp = (v.reshape(-1, 3) for v in (self._origin[m:] + self._motion[0, m:], rate[m:], bend[m:]))
+        velocity = np.concatenate((rate[:m], angular_velocity(p, dp).ravel()))
+        return velocity, np.concatenate((bend[:m], angular_acceleration(p, dp, ddp).ravel()))
 
     def _report(self, velocity: Array, acceleration: Array) -> PoseState:
         state = super()._report(velocity, acceleration)
         return PoseState(*state._replace(position=self._as_pose(state.position), goal=self._as_pose(state.goal)))
 
     def _as_pose(self, x: Array) -> Array:
-        return np.concatenate((x[:-3], product(exp(x[-3:]), self._reference)))
+        m = self._linear
+        return np.concatenate((x[:m], product(exp(x[m:].reshape(-1, 3)), self._reference).ravel()))

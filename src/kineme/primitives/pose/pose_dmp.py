@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from kineme.errors import SpecificationError
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP
 from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.primitives.pose.tangent import to_tangent
+from kineme.primitives.recorded_as import recorded_as
 
 
 @dataclass(frozen=True)
 class PoseDMP:
     """A DMP for orientations (w, x, y, z), or for positions and orientations under one canonical system.
 
-    It is an ordinary DMP of the rotation vector from the goal, ``p = 2 log(q conj(q_goal))``, whose goal is 0; with
+    It learns poses, and recordings with any mixture of positions, joint angles and orientations, such as two hands. It
+    is an ordinary DMP of the rotation vector from the goal, ``p = 2 log(q conj(q_goal))``, whose goal is 0; with
     the bio-inspired formulation, in normalized time,
 
         p'' = K (0 - p) - D p' + K f(s) + K s p_0,    q = exp(p) q_goal,    omega = J(p) p' / tau.
@@ -64,6 +67,8 @@ class PoseDMP:
     def learn(self, movements: MovementsLike) -> PosePrimitives:
         """Learn one primitive per movement of 4 (orientation) or 7 columns (position, orientation), all at once.
 
+        Movements with `channels` may have any number of positions, angles and orientations, at least one of these.
+
         Parameters
         ----------
         movements : Demonstrations, Trajectory, sequence of Trajectory or of (T_i, d) arrays, or (n, T, d) array
@@ -77,10 +82,16 @@ class PoseDMP:
             Poses with the amplitude-scaled formulation: it has one scale for all dimensions, and no distance from
             start to goal is common to meters and radians.
         """
-        tangent, references = to_tangent(movements, self.dmp.preprocessing)
+        recorded = Demonstrations.of(movements)
+        tangent, references = to_tangent(recorded, self.dmp.preprocessing)
         if self.dmp.formulation == "amplitude-scaled" and tangent.n_dims > 3:
             raise SpecificationError(
                 'expected the formulation "bio-inspired" or "original" for poses, got "amplitude-scaled", which scales '
                 "by one distance over meters and radians; learn positions and orientations apart to use it"
             )
-        return PosePrimitives(replace(self.dmp, preprocessing=()).learn(tangent), references)
+        about = recorded_as(recorded, self.dmp.preprocessing)
+        return PosePrimitives(
+            replace(self.dmp, preprocessing=()).learn(tangent),
+            references,
+            about if about is not None and about.orientations else None,
+        )

@@ -11,16 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import TrajectoryError
 from kineme.movements.rotations.quaternions import conjugate, normalized, product
 from kineme.movements.rotations.rotation_vectors import exp, log, nearest
+from kineme.movements.trajectories.movements import Names
 from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options, check_one
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.plan import plan_of
 from kineme.primitives.discrete.rollout import broadcast_length, per_movement
-from kineme.primitives.persistence import Arrays
+from kineme.primitives.persistence import Arrays, check_array
 from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout
 from kineme.primitives.pose.rates import rotation_vector_rate
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import Array
 
 
@@ -32,17 +34,21 @@ class PosePrimitives(Batch):
     ----------
     tangent : Primitives
         Of 3 dimensions, the rotation vector from the goal [rad] in the world frame, or 6, the position before it. Its
-        weights, forcing terms and shape-attractors describe the movements.
-    references : ndarray of shape (n, 4)
-        The demonstrated goal orientations, where the rotation vector is 0.
+        weights, forcing terms and shape-attractors describe the movements. Of recordings with p positions and angles
+        and k orientations it has p + 3 k.
+    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
+        The demonstrated goal orientations, where the rotation vectors are 0.
+    recorded_as : RecordedAs or None
+        Channels of the recordings, where they are known; see `channels`.
     """
 
-    ROWS = Primitives.ROWS | {"references": "n4"}
+    ROWS = Primitives.ROWS | {"references": "nq"}
     SPECIFICATION = DMP
     KIND = "pose primitives"
 
     tangent: Primitives
     references: Array
+    recorded_as: RecordedAs | None = None
 
     def __post_init__(self) -> None:
         view = self.references.view()
@@ -50,7 +56,7 @@ class PosePrimitives(Batch):
         object.__setattr__(self, "references", view)
 
     def __repr__(self) -> str:
-        columns = "orientations" if self.n_columns == 4 else "poses"
+        columns = {4: "orientations", 7: "poses"}.get(self.n_columns, f"{self.n_columns} columns")
         return f"PosePrimitives({len(self)} movements of {columns}, {self.tangent.dmp})"
 
     def _row(self, name: str) -> NDArray[Any]:
@@ -58,18 +64,28 @@ class PosePrimitives(Batch):
 
     @classmethod
     def _of_rows(
-        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: tuple[str | None, ...] | None
+        cls, dmp: Any, arrays: dict[str, Any], labels: NDArray[Any] | None, names: Names, about: RecordedAs | None
     ) -> PosePrimitives:
         rows = {name: arrays[name] for name in Primitives.ROWS}
-        return cls(Primitives(dmp, **rows, labels=labels, names=names), arrays["references"])
+        return cls(Primitives(dmp, **rows, labels=labels, names=names), arrays["references"], about)
 
     @classmethod
     def _from_file(cls, header: dict[str, Any], arrays: Arrays) -> PosePrimitives:
         loaded = super()._from_file(header, arrays)
-        if loaded.n_dims not in {3, 6}:
+        k = 1 if loaded.recorded_as is None else len(loaded.recorded_as.orientations)
+        check_array("references", loaded.references, (len(loaded), 4 * k))
+        if loaded.recorded_as is None and loaded.n_dims not in {3, 6}:
             raise ValueError(f"scaled_weights should have 3 or 6 dimensions, have {loaded.n_dims}")
-        normalized(loaded.references)  # refuses what is no rotation; the numbers stay as they were saved
+        for at in range(0, 4 * k, 4):
+            normalized(
+                loaded.references[:, at : at + 4]
+            )  # refuses what is no rotation; the numbers stay as they were saved
         return loaded
+
+    @property
+    def to_recording(self) -> RecordedAs | None:
+        """`recorded_as`, if the movements can be written in the columns of the recording; else None."""
+        return self.recorded_as if self.recorded_as is not None and self.recorded_as.has_steps else None
 
     @property
     def dmp(self) -> DMP:
@@ -92,18 +108,28 @@ class PosePrimitives(Batch):
         return self.tangent.durations
 
     @property
+    def n_orientations(self) -> int:
+        """Number of orientations k."""
+        return self.references.shape[1] // 4
+
+    @property
+    def n_positions(self) -> int:
+        """Number of columns before the orientations: those of a position, or all positions and angles."""
+        return self.tangent.n_dims - 3 * self.n_orientations
+
+    @property
     def n_columns(self) -> int:
         """4 for orientations, 7 for poses."""
-        return self.tangent.n_dims + 1
+        return self.n_positions + 4 * self.n_orientations
 
     @property
     def starts(self) -> Array:
-        """Demonstrated starts, shape (n, 4) or (n, 7)."""
+        """Demonstrated starts, shape (n, 4) or (n, 7), with positions first."""
         return self._poses(self.tangent.starts)
 
     @property
     def goals(self) -> Array:
-        """Demonstrated goals, shape (n, 4) or (n, 7)."""
+        """Demonstrated goals, shape (n, 4) or (n, 7), with positions first."""
         return self._poses(self.tangent.goals)
 
     def rollout(  # noqa: PLR0913 - an option per parameter
@@ -124,6 +150,7 @@ class PosePrimitives(Batch):
         start, goal : array_like of shape (d,) or (n, d), optional
             Orientations (d = 4) or poses (d = 7), as demonstrated; quaternions of either sign. The way from a new
             start to a new goal is the one nearest to the demonstrated way, the long way round if that was shown.
+            Of other recordings the positions and angles, and after them the orientations, each as (w, x, y, z).
         duration, rate, n_samples : optional
             See `Primitives.rollout`.
         velocity : array_like of shape (d - 1,) or (n, d - 1), optional
@@ -150,7 +177,8 @@ class PosePrimitives(Batch):
             n_samples=n_samples,
             settle=settle,
         )
-        return PoseRollout(movement, np.broadcast_to(references, (len(movement), 4)))
+        references = np.broadcast_to(references, (len(movement), references.shape[1]))
+        return PoseRollout(movement, references, self.recorded_as)
 
     def controller(  # noqa: PLR0913 - an option per parameter
         self,
@@ -194,7 +222,7 @@ class PosePrimitives(Batch):
         starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
         check_one(len(starts))
         v = None if velocities is None else velocities[0]
-        plan = replace(plan_of(self.tangent, starts[0], goals[0], duration, v), n_positions=self.n_columns - 4)
+        plan = replace(plan_of(self.tangent, starts[0], goals[0], duration, v), n_positions=self.n_positions)
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return PoseController(plan, dt, options, references[0])
 
@@ -210,34 +238,45 @@ class PosePrimitives(Batch):
         starts, goals = self._as_poses(start, "start"), self._as_poses(goal, "goal")
         starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
         n = broadcast_length(len(self), {"start": starts, "goal": goals})
-        learned = self.tangent.starts[:, -3:]
-        p = learned
+        m, k = self.n_positions, self.n_orientations
+        learned = self.tangent.starts[:, m:].reshape(len(self), k, 3)
+        vectors = learned
         if start is not None or goal is not None:
-            p = nearest(log(product(starts[:, -4:], conjugate(goals[:, -4:]))), learned)
+            q, q_goal = (columns[:, m:].reshape(-1, k, 4) for columns in (starts, goals))
+            vectors = nearest(log(product(q, conjugate(q_goal))), learned)
 
         def joined(positions: Array, vectors: Array) -> Array:
-            return np.concatenate((np.broadcast_to(positions, (n, positions.shape[1])), vectors), axis=1)
+            return np.concatenate((np.broadcast_to(positions, (n, m)), np.broadcast_to(vectors, (n, 3 * k))), axis=1)
 
-        vectors = np.broadcast_to(p, (n, 3))
-        return joined(starts[:, :-4], vectors), joined(goals[:, :-4], np.zeros((n, 3))), goals[:, -4:]
+        flat = vectors.reshape(len(vectors), 3 * k)
+        return joined(starts[:, :m], flat), joined(goals[:, :m], np.zeros((1, 3 * k))), goals[:, m:]
 
     def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
         option = per_movement(velocity, "velocity", self.tangent.n_dims)
         if option is None:
             return None
-        n = broadcast_length(len(starts), {"velocity": option})
-        rates = rotation_vector_rate(starts[:, -3:], option[:, -3:])
-        return np.concatenate((np.broadcast_to(option[:, :-3], (n, option.shape[1] - 3)), rates), axis=1)
+        n, m = broadcast_length(len(starts), {"velocity": option}), self.n_positions
+        vectors, turning = (columns[:, m:].reshape(len(columns), -1, 3) for columns in (starts, option))
+        rates = rotation_vector_rate(vectors, turning).reshape(n, -1)
+        return np.concatenate((np.broadcast_to(option[:, :m], (n, m)), rates), axis=1)
 
     def _as_poses(self, option: ArrayLike | None, name: str) -> Array | None:
         poses = per_movement(option, name, self.n_columns)
         if poses is None:
             return None
         try:
-            return np.concatenate((poses[:, :-4], normalized(poses[:, -4:])), axis=1)
+            m = self.n_positions
+            turned = [normalized(poses[:, at : at + 4]) for at in range(m, self.n_columns, 4)]
+            return np.concatenate((poses[:, :m], *turned), axis=1)
         except TrajectoryError as error:
             raise TrajectoryError(f"{name}: {error}") from error
 
     def _poses(self, tangent: Array) -> Array:
-        q = product(exp(tangent[:, -3:]), self.references)
-        return np.concatenate((tangent[:, :-3], q), axis=1)
+        m = self.n_positions
+        q = product(exp(tangent[:, m:].reshape(len(self), -1, 3)), self._goals)
+        return np.concatenate((tangent[:, :m], q.reshape(len(self), -1)), axis=1)
+
+    @property
+    def _goals(self) -> Array:
+        """The references (n, k, 4)."""
+        return self.references.reshape(len(self), -1, 4)

@@ -9,12 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.movements.channels.channel import Channels
 from kineme.movements.rotations.quaternions import product
 from kineme.movements.rotations.rotation_vectors import exp
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import Array
 
@@ -31,12 +33,15 @@ class PoseRollout(BaseRollout):
     ----------
     tangent : Rollout
         The movement in positions and rotation vectors.
-    references : ndarray of shape (n, 4)
+    references : ndarray of shape (n, 4), or (n, 4 k) of k orientations
         Goal orientations, from which the rotation vectors count.
+    recorded_as : RecordedAs or None
+        Channels of the recordings, where they are known.
     """
 
     tangent: Rollout
     references: Array
+    recorded_as: RecordedAs | None = None
 
     def __len__(self) -> int:
         return len(self.tangent)
@@ -51,8 +56,8 @@ class PoseRollout(BaseRollout):
 
     @cached_property
     def orientations(self) -> Array:
-        """Unit quaternions (n, T, 4)."""
-        return self._by_tiles(lambda p, r: product(exp(p), r), 4, self._vectors(0), self.references[:, None])
+        """Unit quaternions (n, T, 4); of k orientations (n, T, 4 k), one after the other, as all that follows."""
+        return self._of_each(lambda r, p: product(exp(p), r), 4, 1)
 
     @property
     def poses(self) -> Array:
@@ -62,48 +67,76 @@ class PoseRollout(BaseRollout):
     @property
     def positions(self) -> Array:
         """What was demonstrated: orientations (n, T, 4), or positions and orientations (n, T, 7)."""
-        return np.concatenate((self.tangent.positions[..., :-3], self.orientations), axis=-1)
+        return np.concatenate((self.tangent.positions[..., : self._n_positions], self.orientations), axis=-1)
 
     @cached_property
     def angular_velocities(self) -> Array:
         """Angular velocities in the world frame (n, T, 3) [rad/s]."""
-        return self._by_tiles(angular_velocity, 3, self._vectors(0), self._vectors(1))
+        return self._of_each(lambda _, p, rate: angular_velocity(p, rate), 3, 2)
 
     @cached_property
     def angular_accelerations(self) -> Array:
         """Angular accelerations in the world frame (n, T, 3) [rad/s^2]."""
-        return self._by_tiles(angular_acceleration, 3, self._vectors(0), self._vectors(1), self._vectors(2))
+        return self._of_each(lambda _, p, rate, bend: angular_acceleration(p, rate, bend), 3, 3)
 
     @property
     def velocities(self) -> Array:
         """Angular velocities (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
-        return np.concatenate((self.tangent.velocities[..., :-3], self.angular_velocities), axis=-1)
+        return np.concatenate((self.tangent.velocities[..., : self._n_positions], self.angular_velocities), axis=-1)
 
     @property
     def accelerations(self) -> Array:
         """Angular accelerations (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
-        return np.concatenate((self.tangent.accelerations[..., :-3], self.angular_accelerations), axis=-1)
+        linear = self.tangent.accelerations[..., : self._n_positions]
+        return np.concatenate((linear, self.angular_accelerations), axis=-1)
 
     @property
     def axis_names(self) -> list[str]:
-        """What the columns of `positions` are called: x, y, z and qw, qx, qy, qz."""
-        return [*"xyz"[: self.tangent.starts.shape[1] - 3], "qw", "qx", "qy", "qz"]
+        """What the columns of `positions` are called: as recorded, else x, y, z and qw, qx, qy, qz."""
+        known = self._to_recording
+        return list(known.column_names) if known else [*"xyz"[: self._n_positions], "qw", "qx", "qy", "qz"]
 
     @property
     def rate_names(self) -> list[str]:
-        """What the columns of `velocities` and `accelerations` are called: x, y, z and q.rx, q.ry, q.rz."""
-        return [*"xyz"[: self.tangent.starts.shape[1] - 3], "q.rx", "q.ry", "q.rz"]
+        """What the columns of `velocities` and `accelerations` are called: as recorded, else x, y, z, q.rx, ..."""
+        known = self._to_recording
+        return list(known.rate_names) if known else [*"xyz"[: self._n_positions], "q.rx", "q.ry", "q.rz"]
+
+    @property
+    def channels(self) -> Channels | None:
+        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        return None if self.recorded_as is None else self.recorded_as.channels
+
+    @property
+    def _to_recording(self) -> RecordedAs | None:
+        return self.recorded_as if self.recorded_as is not None and self.recorded_as.has_steps else None
+
+    @property
+    def _shares(self) -> Array:
+        return self.tangent._shares
+
+    @property
+    def _n_positions(self) -> int:
+        return self.tangent.starts.shape[1] - 3 * (self.references.shape[1] // 4)
 
     @property
     def _batch(self) -> Batch:
         return self.tangent.primitives
 
     def _take(self, chosen: NDArray[np.intp]) -> PoseRollout:
-        return PoseRollout(self.tangent[chosen], self.references[chosen])
+        shared = len(self._batch) == 1 or self.recorded_as is None
+        about = self.recorded_as if shared or self.recorded_as is None else self.recorded_as.take(chosen)
+        return PoseRollout(self.tangent[chosen], self.references[chosen], about)
 
-    def _vectors(self, order: int) -> Array:
-        """The rotation vectors (n, T, 3), or their first or second derivative in time."""
-        return (self.tangent.positions, self.tangent.velocities, self.tangent.accelerations)[order][..., -3:]
+    def _of_each(self, function: Callable[..., Array], size: int, orders: int) -> Array:
+        """A function of the reference and the first derivatives of each rotation vector: (n, T, size times k)."""
+        motion = [getattr(self.tangent, name) for name in ("positions", "velocities", "accelerations")[:orders]]
+        results = []
+        for i in range(self.references.shape[1] // 4):
+            at = self._n_positions + 3 * i
+            vectors = (one[..., at : at + 3] for one in motion)
+            results.append(self._by_tiles(function, size, self.references[:, None, 4 * i : 4 * i + 4], *vectors))
+        return results[0] if len(results) == 1 else np.concatenate(results, axis=-1)
 
     def _by_tiles(self, function: Callable[..., Array], size: int, *arrays: Array) -> Array:
         """Apply an elementwise function to movements, tile by tile in a core's cache; result (n, T, size)."""

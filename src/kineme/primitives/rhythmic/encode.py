@@ -14,6 +14,7 @@ from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.encode import check_movement
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.primitives.rhythmic.cycle import fold
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import encoder, even_phases
@@ -29,7 +30,8 @@ _ALMOST = 1 - 1e-6
 
 def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, Any]:
     """Learn one limit cycle per movement; see `RhythmicDMP.learn`."""
-    demos = preprocess(Demonstrations.of(movements), dmp.preprocessing)
+    recorded = Demonstrations.of(movements)
+    demos = preprocess(recorded, dmp.preprocessing)
     n, n_dims, H = len(demos), demos.n_dims, dmp.n_harmonics
     if dmp.align_on is not None and dmp.align_on >= n_dims:
         raise TrajectoryError(
@@ -60,6 +62,7 @@ def encode(dmp: RhythmicSpecification, movements: MovementsLike) -> dict[str, An
         "explained": explained,
         "labels": demos.labels,
         "names": demos.names,
+        "recorded_as": None if recorded.channels is None else RecordedAs(recorded.channels),
     }
 
 

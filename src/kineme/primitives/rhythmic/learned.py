@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.primitives.batch import Batch
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.validation import Array
 
@@ -37,3 +38,4 @@ class RhythmicLearned(Batch):
     explained: Array
     labels: NDArray[Any] | None = None
     names: tuple[str | None, ...] | None = None
+    recorded_as: RecordedAs | None = None

@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import TrajectoryError
 from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.discrete.modulate import modulated
+from kineme.primitives.discrete.rollout import Rollout, rollout
+from kineme.primitives.discrete.samples import sampled
+from kineme.primitives.discrete.via_points import ViaLike
 from kineme.primitives.styles.parameters import (
     check_primitives,
     from_numbers,
@@ -48,6 +52,30 @@ class AveragePrimitive:
     def weight_factor(self) -> Array:
         """F of shape (r, d N), ``F.T @ F`` being the covariance of the scaled weights (dimension-major)."""
         return self.factor[:, :, :-3].reshape(len(self.factor), -1)
+
+    def rollout(  # noqa: PLR0913 - one parameter per option
+        self,
+        start: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        duration: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
+        rate: float | None = None,
+        n_samples: int | None = None,
+        settle: float | None = None,
+    ) -> Rollout:
+        """Generate movements as `Primitives.rollout` does, through via points in the way of the demonstrations.
+
+        Where one demonstration only lets the path bend smoothly, the covariance of several says how they differ, and
+        the path goes through the via points as one of them would; r demonstrations count as r, smoothness as ten.
+
+        Parameters and errors are those of `Primitives.rollout`.
+        """
+        movement = rollout(self.primitive, start, goal, duration, velocity)
+        movement = modulated(movement, via, end_velocity, self.factor[:, :, :-3])
+        return sampled(movement, rate, n_samples, settle)
 
     def deviation(self, n_samples: int = 100, of: str = "position") -> Array:
         """Standard deviation at `n_samples` (S) even phases from start to goal, shape (S, d): the half-width of a band.

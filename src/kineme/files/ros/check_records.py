@@ -1,0 +1,56 @@
+"""Look at the bytes of a file of a bag before rosbags does, which believes what they say."""
+
+from __future__ import annotations
+
+import os
+import struct
+from pathlib import Path
+from typing import BinaryIO
+
+from kineme.errors import DataError
+from kineme.files.limits import check_in_passing
+from kineme.files.ros.damage import REMEDIES
+
+#: File ending -> the first bytes of every such file. What begins otherwise is not given to rosbags.
+_MAGIC = {".bag": b"#ROSBAG V2.0\n", ".mcap": b"\x89MCAP0\r\n", ".db3": b"SQLite format 3\0"}
+
+_HEAD = struct.Struct("<BQ")  # kind and length of a record of MCAP
+_CHUNK, _ATTACHMENT = 6, 9  # kinds
+_SIZE_AT = 16  # where a chunk says to how many bytes it expands
+
+
+def check_records(path: Path) -> None:
+    """Refuse a file that is none of ROS by its first bytes, and an MCAP file whose records are none or too large.
+
+    Records are passed over by their lengths. Other damage is left to rosbags, which may find its way by the index.
+
+    Raises
+    ------
+    DataError
+        The message names what may help.
+    """
+    magic = _MAGIC[path.suffix.lower()]
+    with path.open("rb") as file:
+        first = file.read(len(magic))
+        if first != magic:
+            raise DataError(
+                f"expected a {path.suffix.lower()} file of ROS, which begins with {magic!r}, got "
+                f"{'an empty file' if not first else repr(first)}"
+            )
+        if path.suffix.lower() == ".mcap":
+            _check_mcap(file, len(magic))
+
+
+def _check_mcap(file: BinaryIO, at: int) -> None:
+    """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
+    end = file.seek(0, os.SEEK_END)
+    while at + _HEAD.size <= end - len(_MAGIC[".mcap"]):
+        file.seek(at)
+        kind, length = _HEAD.unpack(file.read(_HEAD.size))
+        if not kind:
+            raise DataError(f"expected a record of MCAP at byte {at:,}, got zeros; {REMEDIES['.mcap']}")
+        if kind != _ATTACHMENT and at + length < end:
+            check_in_passing(length, f"a record of MCAP at byte {at:,}")
+        if kind == _CHUNK and len(size := file.read(_SIZE_AT + 8)) == _SIZE_AT + 8:
+            check_in_passing(int.from_bytes(size[_SIZE_AT:], "little"), f"a chunk of MCAP at byte {at:,}")
+        at += _HEAD.size + length

@@ -1,0 +1,29 @@
+"""What rosbags raises on a damaged bag becomes a `DataError`, with what may help."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from kineme.errors import DataError, KinemeError
+
+#: File ending, or none for a folder -> what may help if the bag is damaged.
+REMEDIES = {
+    ".bag": "if the recording was cut off, run rosbag reindex",
+    ".mcap": "if the recording was cut off, run mcap recover",
+    ".db3": "copy it again, or give the folder of the bag",
+    "": "copy it again, or run ros2 bag reindex",
+}
+
+
+@contextmanager
+def refused(expected: str, remedy: str) -> Iterator[None]:
+    """Whatever rosbags raises on a damaged bag, as a `DataError`."""
+    try:
+        yield
+    except (KinemeError, MemoryError):
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        unknown = ", which rosbags does not know" if isinstance(error, KeyError) else ""
+        raise DataError(f"{expected}, got: {reason[:300]}{unknown}; {remedy}") from error

@@ -1,0 +1,120 @@
+"""Points and stretches that a movement is asked to pass through: what users write, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.validation import LARGEST, Array, as_numbers
+
+#: What users write: (time, point) or ((begin, end), points), times as shares of the duration.
+ViaLike = Sequence[tuple[float | tuple[float, float], ArrayLike]]
+
+_SAME_TIME = 1e-9  # durations
+_SAME_PLACE = 1e-9  # of the larger number
+_FORM = "via=[(time, point), ...] or [((begin, end), points), ...] with times between 0 and 1, shares of the duration"
+
+
+class ViaPoints(NamedTuple):
+    """k via points of one movement, or of n, in the order of their times."""
+
+    times: Array  # (k,), between 0 and 1
+    points: Array  # (1 or n, k, d); NaN where a dimension is free
+    stretch: NDArray[np.bool_]  # (k,): whether it belongs to a stretch, which is met in the least squares
+
+
+def via_points(via: ViaLike, n_dims: int) -> ViaPoints:
+    """Check what a user wrote; see `Primitives.rollout`.
+
+    Raises
+    ------
+    SpecificationError
+        No list of pairs, a time outside ]0, 1[, two places at one time.
+    TrajectoryError
+        Points of the wrong shape, infinite, or without any number; batches of different lengths.
+    """
+    if isinstance(via, (str, bytes)) or not isinstance(via, (Sequence, np.ndarray)):
+        raise SpecificationError(f"expected {_FORM}, got {via!r}")
+    if len(via) == 2 and _is_time(via[0]):
+        raise SpecificationError(f"expected {_FORM}, got one pair; put it in a list: via=[{via!r}]")
+    parts = [_part(i, pair, n_dims) for i, pair in enumerate(via)]
+    n = max((len(points) for _, points, _ in parts), default=1)
+    for i, (_, points, _) in enumerate(parts):
+        if len(points) not in (1, n):
+            raise TrajectoryError(f"via[{i}]: expected points of one movement or of {n}, got {len(points)}")
+    if not parts:
+        return ViaPoints(np.zeros(0), np.zeros((1, 0, n_dims)), np.zeros(0, bool))
+    times = np.concatenate([times for times, _, _ in parts])
+    points = np.concatenate([np.broadcast_to(p, (n, *p.shape[1:])) for _, p, _ in parts], axis=1)
+    stretch = np.repeat([one for _, _, one in parts], [len(times) for times, _, _ in parts])
+    order = np.argsort(times, kind="stable")
+    return _merged(ViaPoints(times[order], points[:, order], stretch[order]))
+
+
+def _is_time(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def _part(i: int, pair: Any, n_dims: int) -> tuple[Array, Array, bool]:
+    """Times (m,), points (1 or n, m, d), and whether it is a stretch."""
+    try:
+        when, where = pair
+    except (TypeError, ValueError) as error:
+        raise SpecificationError(f"expected {_FORM}, got {pair!r} as via[{i}]") from error
+    points = as_numbers(where, f"via[{i}]")
+    stretch = not _is_time(when)
+    if stretch:
+        points = points[:, None] if n_dims == 1 and points.ndim == 1 else points
+        fits, shape = points.ndim in (2, 3) and points.shape[-2] >= 2, f"(m, {n_dims}) or (n, m, {n_dims})"
+    else:
+        points = points[None] if n_dims == 1 and points.ndim == 0 else points
+        fits, shape = points.ndim in (1, 2), f"({n_dims},) or (n, {n_dims})"
+    if not fits or points.shape[-1] != n_dims or not points.size:
+        raise TrajectoryError(f"via[{i}]: expected points of shape {shape}, got shape {np.shape(where)}")
+    points = points if points.ndim == 2 + stretch else points[None]
+    points = points if stretch else points[:, None]
+    if np.isinf(points).any() or np.nanmax(np.abs(points), initial=0.0) > LARGEST or np.isnan(points).all(axis=2).any():
+        raise TrajectoryError(
+            f"via[{i}]: expected numbers up to {LARGEST:g}, NaN only for dimensions that are free, got {where!r}"
+        )
+    return _times(i, when, points.shape[1]), points, stretch
+
+
+def _times(i: int, when: Any, n_points: int) -> Array:
+    """Even times (m,) from the begin to the end of a stretch, or one."""
+    try:
+        ends = np.array([when] if _is_time(when) else list(when), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SpecificationError(f"expected {_FORM}, got {when!r} as the time of via[{i}]") from error
+    if len(ends) != 1 + (not _is_time(when)) or not ((ends > 0) & (ends < 1)).all() or (np.diff(ends) <= 0).any():
+        raise SpecificationError(
+            f"via[{i}]: expected a time, or a begin and a later end, above 0 and below 1 as shares of the duration, "
+            f"got {when!r}; start, goal and end_velocity say where the movement begins and ends"
+        )
+    return np.linspace(ends[0], ends[-1], n_points)
+
+
+def _merged(via: ViaPoints) -> ViaPoints:
+    """One point for each time; what contradicts itself is refused."""
+    same = np.diff(via.times) <= _SAME_TIME
+    if not same.any():
+        return via
+    points = via.points.copy()
+    for j in np.flatnonzero(same):
+        one, other = points[:, j], points[:, j + 1]
+        apart = np.abs(one - other) > _SAME_PLACE * np.maximum(np.abs(one), np.abs(other))
+        if apart.any():
+            k = int(np.argmax(apart.any(axis=1)))
+            raise SpecificationError(
+                f"expected one place at {via.times[j]:g} of the duration, got two via points there: "
+                f"{one[k].tolist()} and {other[k].tolist()}{f' for movement {k}' if len(points) > 1 else ''}"
+            )
+        points[:, j + 1] = np.where(np.isnan(other), one, other)
+    kept = np.append(~same, True)
+    stretch = via.stretch.copy()
+    stretch[1:] &= ~same | stretch[:-1]  # a point on a stretch is met exactly
+    return ViaPoints(via.times[kept], points[:, kept], stretch[kept])

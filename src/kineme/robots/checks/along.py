@@ -1,0 +1,102 @@
+"""Kinematics, dynamics and contacts of an arm along a trajectory."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.robots.execution.joint_trajectory import JointTrajectory
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array
+
+_MARGIN = 0.005  # links closer than this count as touching [m]
+_RANDOM_POSTURES = 100
+_ALWAYS = 0.9  # of random postures in which a pair of shapes touches: it touches by design
+
+
+class Along(NamedTuple):
+    """What an arm does at the T samples of a trajectory."""
+
+    tip_positions: Array  # (T, 3) [m]
+    tip_rotations: Array  # (T, 3, 3)
+    smallest_singular_values: Array  # (T,), of the Jacobian of the tip, its translation counted in meters
+    holding_torques: Array  # (T, n), at rest in that posture [Nm]
+    moving_torques: Array  # (T, n), what the movement adds
+    contacts: tuple[tuple[int, str, str], ...]  # sample and names of two links that touch, the first for each pair
+
+
+def along(robot: Robot, trajectory: JointTrajectory) -> Along:
+    """Follow the trajectory through the model."""
+    import pinocchio
+
+    model, data = robot.model, robot.model.createData()
+    tip = model.getFrameId(robot.tip)
+    n_samples, n = trajectory.positions.shape
+    positions, rotations = np.empty((n_samples, 3)), np.empty((n_samples, 3, 3))
+    jacobians, holding, whole = np.empty((n_samples, 6, n)), np.empty((n_samples, n)), np.empty((n_samples, n))
+    samples = zip(trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True)
+    for t, (q, v, a) in enumerate(samples):
+        pinocchio.computeJointJacobians(model, data, q)
+        pinocchio.updateFramePlacement(model, data, tip)
+        jacobians[t] = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
+        holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
+        whole[t] = pinocchio.rnea(model, data, q, v, a)
+    singular = np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, min(6, n) - 1], dtype=np.float64)
+    return Along(positions, rotations, singular, holding, whole - holding, _contacts(robot, trajectory.positions))
+
+
+def _contacts(robot: Robot, positions: Array) -> tuple[tuple[int, str, str], ...]:
+    import pinocchio
+
+    geometry = pair_geometry(robot)
+    if len(geometry.collisionPairs) == 0:
+        return ()
+    data, shapes = robot.model.createData(), geometry.createData()
+    for request in shapes.collisionRequests:
+        request.security_margin = _MARGIN
+    found: dict[int, int] = {}
+    for t, q in enumerate(positions):
+        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
+            for k, result in enumerate(shapes.collisionResults):
+                if result.isCollision():
+                    found.setdefault(k, t)
+    pairs = geometry.collisionPairs
+
+    def link(shape: int) -> str:
+        return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
+
+    return tuple((t, link(pairs[k].first), link(pairs[k].second)) for k, t in found.items())
+
+
+@lru_cache(maxsize=8)
+def pair_geometry(robot: Robot) -> Any:
+    """The arm's shapes with the pairs that can touch.
+
+    None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
+    axis do.
+    """
+    import pinocchio
+
+    geometry = robot.geometry.copy()
+    geometry.removeAllCollisionPairs()
+    objects = geometry.geometryObjects
+    parents = list(robot.model.parents)
+    for i, first in enumerate(objects):
+        for j in range(i + 1, len(objects)):
+            a, b = first.parentJoint, objects[j].parentJoint
+            if a != b and parents[a] != b and parents[b] != a:
+                geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
+    if len(geometry.collisionPairs) == 0:
+        return geometry
+    data, shapes = robot.model.createData(), geometry.createData()
+    counts = np.zeros(len(geometry.collisionPairs))
+    postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
+    for q in postures:
+        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
+        counts += [result.isCollision() for result in shapes.collisionResults]
+    for k in np.flatnonzero(counts > _ALWAYS * len(postures))[::-1]:
+        geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
+    return geometry

@@ -1,0 +1,50 @@
+"""One thing that was checked, and all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class Check(NamedTuple):
+    """The worst instant of one quantity beside its limit."""
+
+    what: str  # "velocity", "self-collision", ...
+    where: str  # the joint, the two links, or the tip
+    time: float  # [s]
+    worst: float
+    limit: float  # nan where there is none to keep
+    unit: str
+    passed: bool
+    slower: float = 1.0  # the movement would pass if it took so many times as long; inf: at no speed
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """All checks of one trajectory.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+        For velocity, acceleration, position and torque the worst instant of each joint, then the arm as a whole.
+    unchecked : tuple of str
+        What could not be checked and why, one sentence each.
+    """
+
+    checks: tuple[Check, ...]
+    unchecked: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """The checks that did not pass, the worst ratio to its limit first."""
+        return tuple(sorted((c for c in self.checks if not c.passed), key=lambda c: -c.slower))
+
+    @property
+    def slower(self) -> float:
+        """The least factor of the duration with which all pass; inf if no speed helps."""
+        return max((check.slower for check in self.checks if not check.passed), default=1.0)

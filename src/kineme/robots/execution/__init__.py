@@ -1,0 +1,1 @@
+"""Timing, checks and the approach: what is sent to an arm."""

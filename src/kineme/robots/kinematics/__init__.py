@@ -1,0 +1,1 @@
+"""Poses of the tip to joint positions, over a whole movement."""

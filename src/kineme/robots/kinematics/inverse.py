@@ -1,0 +1,152 @@
+"""Inverse kinematics in steps: each moves the joints towards a pose of the tip, within their limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError, SpecificationError
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array, check_choice
+
+#: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
+ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 0.0, 0.0)}
+
+_PARTIAL = 0.005  # of these costs where the arm has fewer joints than a pose has coordinates
+_POSTURE = 1e-4  # cost of leaving the rest posture [1/rad]: decides where the pose leaves the joints free
+_GAIN = 0.95  # of the way to a limit that one step may go
+_DAMPING = 1e-12
+
+
+class InverseKinematics:
+    """The joints of one arm, step by step; the quadratic programs are those of pink, solved by DAQP.
+
+    One step minimizes ``|p - p*|^2 + |c (R - R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the joints
+    q, subject to the limits of position, and of velocity if a time step is given. p and R are position and orientation
+    of the tip, starred the wanted ones, c the cost of turning.
+
+    Parameters
+    ----------
+    robot : Robot
+    orientation : {"full", "axis", "free"}, default "full"
+        "axis" follows the z axis of the tip and leaves the turn about it free, "free" follows the position alone. Arms
+        of fewer than six joints follow the orientation as far as the position allows.
+    time_step : float, optional
+        Time between two steps [s]: joints then move no faster than their limits of velocity allow.
+
+    Raises
+    ------
+    DataError
+        The extra ``robot`` is not installed.
+    """
+
+    def __init__(self, robot: Robot, orientation: str = "full", time_step: float | None = None) -> None:
+        check_choice("orientation", orientation, list(ORIENTATIONS))
+        try:
+            import pinocchio
+            from pink import Configuration, solve_ik
+            from pink.limits import ConfigurationLimit, VelocityLimit
+            from pink.tasks import FrameTask, PostureTask
+        except ImportError as error:
+            raise DataError("expected the package pin-pink for arms; pip install 'kineme[robot]'") from error
+        self.robot = robot
+        self._pose, self._solve, self._configuration_of = pinocchio.SE3, solve_ik, Configuration
+        self._data = robot.model.createData()
+        self._time_step = 1.0 if time_step is None else time_step
+        partial = 1.0 if robot.n_joints >= 6 else _PARTIAL
+        costs = [partial * cost for cost in ORIENTATIONS[orientation]]
+        self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=costs, gain=1.0)
+        self._posture = PostureTask(cost=_POSTURE)
+        self._posture.set_target(robot.rest)
+        self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]
+        if time_step is not None:
+            limited = robot.model.copy()
+            limited.velocityLimit = robot.velocity
+            self._limits.append(VelocityLimit(limited))
+        self.reset(robot.rest)
+
+    def reset(self, q: Array) -> None:
+        """Start from joint positions q (n,).
+
+        Raises
+        ------
+        SpecificationError
+            Joints outside their limits.
+        """
+        robot = self.robot
+        outside = (q < robot.lower - 1e-9) | (q > robot.upper + 1e-9)
+        if outside.any():
+            i = int(np.argmax(outside))
+            raise SpecificationError(
+                f"expected {robot.joints[i]} to start within [{robot.lower[i]:.4g}, {robot.upper[i]:.4g}], "
+                f"got {q[i]:.4g}"
+            )
+        q = np.clip(q, robot.lower, robot.upper)
+        self._configuration = self._configuration_of(robot.model, self._data, q)
+
+    @property
+    def q(self) -> Array:
+        """Joint positions (n,)."""
+        return np.array(self._configuration.q)
+
+    @property
+    def tip_position(self) -> Array:
+        """Where the tip is (3,) [m]."""
+        return np.array(self._configuration.get_transform_frame_to_world(self.robot.tip).translation)
+
+    @property
+    def tip_rotation(self) -> Array:
+        """How the tip is turned (3, 3)."""
+        return np.array(self._configuration.get_transform_frame_to_world(self.robot.tip).rotation)
+
+    @property
+    def error(self) -> float:
+        """Distance of the tip from where it was asked to be at the last step [m]."""
+        wanted = self._tip.transform_target_to_world.translation
+        return float(np.linalg.norm(self.tip_position - wanted))
+
+    def step(self, position: Array, rotation: Array) -> Array:
+        """Move towards a pose by one step; joint positions (n,) after it."""
+        self._tip.set_target(self._pose(rotation, position))
+        self._advance()
+        return self.q
+
+    def solve(self, position: Array, rotation: Array, most: int = 30, tolerance: float = 1e-6) -> Array:
+        """Move towards a pose until the tip is within `tolerance` [m] and the joints stand, `most` steps at most."""
+        self._tip.set_target(self._pose(rotation, position))
+        for _ in range(most):
+            change = self._advance()
+            if self.error < tolerance and change < 1e-4:
+                break
+        return self.q
+
+    def follow(self, positions: Array, rotations: Array) -> Array:
+        """Joint positions (T, n) along poses that lie close to one another.
+
+        One step for each pose, from where the joints would be if they went on as between the two poses before: the
+        error of a step is quadratic in how far it goes, so this one is of the fourth order in the time between samples.
+        """
+        path = np.empty((len(positions), self.robot.n_joints))
+        for t, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
+            if t > 1:
+                ahead = np.clip(2 * path[t - 1] - path[t - 2], self.robot.lower, self.robot.upper)
+                self._configuration.update(ahead)
+            self._tip.set_target(self._pose(rotation, position))
+            self._advance()
+            path[t] = self._configuration.q
+        return path
+
+    def _advance(self) -> float:
+        dt = self._time_step
+        velocity = self._solve(
+            self._configuration,
+            (self._tip, self._posture),
+            dt,
+            solver="daqp",
+            limits=self._limits,
+            safety_break=False,
+            damping=_DAMPING,
+        )
+        self._configuration.integrate_inplace(velocity, dt)
+        return float(np.abs(velocity).max()) * dt

@@ -1,0 +1,67 @@
+"""The movement as poses of the tip: what inverse kinematics follows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, Slerp
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.rotations.quaternions import normalized
+from kineme.validation import Array, as_numbers
+
+#: Planes in which a two-dimensional movement is executed: its axes in the frame of the robot.
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+class TaskPath(NamedTuple):
+    """Poses of the tip in the frame of the robot's base, T samples."""
+
+    times: Array  # (T,) [s], from 0
+    positions: Array  # (T, 3) [m]
+    rotations: Array  # (T, 3, 3)
+
+    def at(self, times: Array) -> TaskPath:
+        """The poses at other times: cubic between positions, along the shortest turn between orientations."""
+        turns = Slerp(self.times, Rotation.from_matrix(self.rotations))
+        return TaskPath(times, CubicSpline(self.times, self.positions)(times), turns(times).as_matrix())
+
+
+def task_path(
+    times: Array, positions: Array, orientation: ArrayLike, plane: str = "xy", through: ArrayLike | None = None
+) -> TaskPath:
+    """Positions of two or three dimensions, and orientations, as poses.
+
+    Parameters
+    ----------
+    times : ndarray of shape (T,)
+    positions : ndarray of shape (T, 2) or (T, 3)
+    orientation : array_like of shape (4,) or (T, 4)
+        Unit quaternion w, x, y, z of the tip, one for all samples or one for each.
+    plane : {"xy", "xz", "yz"}
+        Where the two axes of a two-dimensional movement lie.
+    through : array_like of shape (3,), optional
+        A point of that plane; the origin if it is not given.
+
+    Raises
+    ------
+    TrajectoryError
+        Positions of another number of dimensions.
+    SpecificationError
+        An unknown plane.
+    """
+    d = positions.shape[1]
+    if d not in (2, 3):
+        raise TrajectoryError(
+            f"expected a movement of the tip, of 2 or 3 dimensions, got {d}; a movement of the joints has as many as "
+            "the robot"
+        )
+    if plane not in PLANES:
+        raise SpecificationError(f"expected plane as one of {', '.join(PLANES)}, got {plane!r}")
+    points = np.tile(np.zeros(3) if through is None else as_numbers(through, "through"), (len(times), 1))
+    points[:, list(PLANES[plane]) if d == 2 else [0, 1, 2]] = positions
+    quaternions = np.broadcast_to(normalized(np.atleast_2d(as_numbers(orientation, "orientation"))), (len(times), 4))
+    return TaskPath(times, points, Rotation.from_quat(quaternions, scalar_first=True).as_matrix())

@@ -1,0 +1,1 @@
+"""Arms that come with kineme, and arms from any URDF file."""

@@ -1,0 +1,34 @@
+"""The arms that come with kineme: one table."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+
+class Model(NamedTuple):
+    """An arm whose URDF file lies beside this module."""
+
+    title: str
+    tip: str  # the frame that follows the movement
+    rest: tuple[float, ...]  # joint positions from which it starts, tool pointing down where it can [rad]
+    meshes: str = ""  # its URDF with meshes in the package example-robot-data, if installed
+
+
+#: Name -> model; ``robots.load``, the command line and the docs list what is here.
+MODELS = {
+    "panda": Model(
+        "Franka Emika Panda, 7 joints",
+        "panda_hand_tcp",
+        (0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4),
+        "panda_description/urdf/panda.urdf",
+    ),
+    "ur5e": Model("Universal Robots UR5e, 6 joints", "tool0", (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)),
+    "wam": Model("Barrett WAM, 7 joints", "wam_tool", (0.0, 0.6, 0.0, 1.8, 0.0, 0.75, 0.0)),
+    "so101": Model(
+        "SO-101, 5 joints",
+        "gripper_frame_link",
+        (0.0, -0.6, 0.9, 0.9, 0.0),
+        "so_arm_description/urdf/so101.urdf",
+    ),
+}

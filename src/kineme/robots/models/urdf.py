@@ -1,0 +1,150 @@
+"""What a URDF file says about an arm, checked before a library for kinematics reads it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from kineme.errors import DataError
+from kineme.robots.models.meshes import resolve_meshes
+
+_LARGEST = 20_000_000  # bytes
+_MOVING = ("revolute", "continuous", "prismatic")
+_TURNS = 2 * math.pi  # a joint without stops is kept within one turn to each side
+
+
+class JointLimits(NamedTuple):
+    """Limits of one joint; nan where the file does not say."""
+
+    lower: float  # [rad] or [m]
+    upper: float
+    velocity: float  # per second
+    acceleration: float  # per second squared
+    effort: float  # [Nm] or [N]
+
+
+class Chain(NamedTuple):
+    """The joints between the root of a robot and the frame that follows the movement."""
+
+    text: str  # the URDF, joints without stops given those of one turn
+    joints: tuple[str, ...]
+    limits: tuple[JointLimits, ...]
+    tip: str
+    without_stops: tuple[str, ...]  # joints that the file calls continuous
+    without_shape: tuple[str, ...]  # links whose meshes are not there
+
+
+def read_chain(path: Path, tip: str | None) -> Chain:
+    """The chain from the root of the URDF at `path` to the frame `tip`, by default the last link of its only chain.
+
+    Raises
+    ------
+    DataError
+        No such file, no URDF, a tip that does not exist, several chains and no tip, a joint without limits or with a
+        mimic joint in the chain; each with the name of the joint or link.
+    """
+    robot = _root(path)
+    parents = {_child(joint, path): joint for joint in robot.findall("joint")}
+    links = [str(link.get("name")) for link in robot.findall("link")]
+    tip = _tip(tip, links, parents, path)
+    chain = []
+    link, passed = tip, set()
+    while link in parents:
+        if link in passed:
+            raise DataError(f"{path}: the joints above {tip!r} form a circle at {link!r}; a URDF is a tree")
+        passed.add(link)
+        chain.append(parents[link])
+        link = _end(parents[link], "parent", path)
+    moving = [joint for joint in reversed(chain) if joint.get("type") in _MOVING]
+    if not moving:
+        raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
+    free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
+    limits = tuple(_limits(joint, path) for joint in moving)
+    missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
+    joints = tuple(str(joint.get("name")) for joint in moving)
+    return Chain(ElementTree.tostring(robot, "unicode"), joints, limits, tip, free, missing)
+
+
+def _root(path: Path) -> ElementTree.Element:
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise DataError(f"{path}: expected a URDF of at most {_LARGEST / 1e6:.0f} MB, got {path.stat().st_size:,}")
+        robot = ElementTree.fromstring(path.read_bytes())
+    except OSError as error:
+        raise DataError(f"{path}: expected a URDF file, got {error.strerror or error}") from error
+    except (ElementTree.ParseError, ValueError) as error:
+        raise DataError(f"{path}: expected a URDF file, got text that is no XML: {error}") from error
+    if robot.tag != "robot":
+        raise DataError(
+            f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>; "
+            "a xacro file is turned into one with: xacro FILE > robot.urdf"
+        )
+    return robot
+
+
+def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
+    end = joint.find(which)
+    if end is None or not end.get("link"):
+        raise DataError(f"{path}: joint {joint.get('name')!r} has no <{which} link=...>")
+    return str(end.get("link"))
+
+
+def _child(joint: ElementTree.Element, path: Path) -> str:
+    return _end(joint, "child", path)
+
+
+def _tip(tip: str | None, links: list[str], parents: dict[str, ElementTree.Element], path: Path) -> str:
+    if tip is not None:
+        if tip not in links:
+            from difflib import get_close_matches
+
+            alike = get_close_matches(tip, links, 3) or links[-5:]
+            raise DataError(f"{path}: has no link {tip!r} to be the tip; there are {', '.join(map(repr, alike))}, ...")
+        return tip
+    above = {_end(joint, "parent", path) for joint in parents.values()}
+    ends = [link for link in links if link in parents and link not in above]
+    if len(ends) != 1:
+        raise DataError(
+            f"{path}: expected a tip, as the robot ends in {len(ends)} links: {', '.join(map(repr, ends[:8]))}; "
+            "say which one follows the movement (tip=..., --tip)"
+        )
+    return ends[0]
+
+
+def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
+    """The limits of a joint; one without stops becomes a joint with those of one turn to each side, in place."""
+    name = joint.get("name")
+    if joint.find("mimic") is not None:
+        raise DataError(f"{path}: joint {name!r} mimics another one; an arm whose own joints are coupled is not known")
+    limit = joint.find("limit")
+    if joint.get("type") == "continuous":
+        limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
+        joint.set("type", "revolute")
+        limit.set("lower", f"{-_TURNS}")
+        limit.set("upper", f"{_TURNS}")
+        limit.set("velocity", limit.get("velocity", "0"))
+        limit.set("effort", limit.get("effort", "0"))
+    if limit is None or limit.get("lower") is None or limit.get("upper") is None:
+        raise DataError(f"{path}: joint {name!r} has no limits; add <limit lower= upper= velocity= effort=/> to it")
+    found = JointLimits(*(_number(limit, key, joint, path) for key in JointLimits._fields))
+    if not found.lower < found.upper:
+        raise DataError(f"{path}: joint {name!r}: expected lower < upper, got {found.lower:g} and {found.upper:g}")
+    for key in ("velocity", "effort"):
+        limit.set(key, limit.get(key, "0"))
+    known = {key: getattr(found, key) for key in ("velocity", "acceleration", "effort")}
+    return found._replace(**{key: value if value > 0 else math.nan for key, value in known.items()})
+
+
+def _number(limit: ElementTree.Element, key: str, joint: ElementTree.Element, path: Path) -> float:
+    text = limit.get(key)
+    if text is None:
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DataError(f"{path}: joint {joint.get('name')!r}: expected a number for {key}, got {text!r}")
+    return value

@@ -1,0 +1,219 @@
+"""A movement on an arm: inverse kinematics, timing, approach and checks, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from kineme.errors import TrajectoryError
+from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.robots.checks.check import Preflight
+from kineme.robots.checks.preflight import preflight
+from kineme.robots.execution.approach import approach
+from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
+from kineme.robots.execution.retime import fastest
+from kineme.robots.execution.timing import Timing, as_generated, slowed, timed
+from kineme.robots.kinematics.choose import choose_place, choose_posture
+from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.task_path import TaskPath, task_path
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array, as_numbers, check_choice, check_number
+
+_TIMINGS = ("generated", "slowed", "fastest")
+_SPACES = ("tip", "joints")
+_ROUNDS = 4  # of slowing down: torques do not fall as fast as velocities do
+_A_LITTLE = 1 + 1e-6
+
+
+class InfeasibleError(TrajectoryError):
+    """A trajectory that an arm cannot or must not execute; ``preflight`` holds the checks."""
+
+    def __init__(self, message: str, preflight: Preflight | None = None) -> None:
+        super().__init__(message)
+        self.preflight = preflight
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotMovement:
+    """What `move` made.
+
+    Attributes
+    ----------
+    robot : Robot
+    trajectory : JointTrajectory
+        What is sent to the arm: the approach from the posture where it stands, then the movement.
+    path : TaskPath or None
+        What the tip follows, at the samples of the movement; None of a movement of the joints.
+    preflight : Preflight
+        All checks of `trajectory`.
+    begins : float
+        When the approach is over and the movement begins [s].
+    factor : float
+        How many times as long the movement takes as it was generated.
+    """
+
+    robot: Robot
+    trajectory: JointTrajectory
+    path: TaskPath | None
+    preflight: Preflight
+    begins: float
+    factor: float
+
+    def __repr__(self) -> str:
+        as_generated = f"{self.factor:.3g} times as long as generated"
+        return f"RobotMovement({self.robot.name!r}, {self.trajectory.duration:.2f} s, {as_generated})"
+
+
+def move(  # noqa: PLR0913 - one parameter per option
+    movement: Any,
+    robot: Robot,
+    *,
+    space: str = "tip",
+    orientation: ArrayLike | None = None,
+    follow: str = "full",
+    plane: str = "xy",
+    place: str = "as given",
+    timing: str = "generated",
+    rate: float = 100.0,
+    start: ArrayLike | None = None,
+    force: bool = False,
+) -> RobotMovement:
+    """Make a movement of the tip or of the joints executable on an arm, and check it.
+
+    Parameters
+    ----------
+    movement : Rollout, PoseRollout, Trajectory or what holds one of them
+        Positions of the tip in the frame of the robot [m], of two or three dimensions, alone or with orientations; or
+        positions of the joints.
+    robot : Robot
+    space : {"tip", "joints"}, default "tip"
+        Of what the positions are.
+    orientation : array_like of shape (4,), optional
+        Unit quaternion w, x, y, z of the tip, for movements without orientations; by default that of the rest posture.
+    follow : {"full", "axis", "free"}, default "full"
+        How much of the orientation is followed; see `InverseKinematics`.
+    plane : {"xy", "xz", "yz"}, default "xy"
+        Where the axes of a two-dimensional movement lie; the third coordinate is that of the tip at rest.
+    place : {"as given", "free"}, default "as given"
+        "free" shifts the movement to where the arm executes it best.
+    timing : {"generated", "slowed", "fastest"}, default "generated"
+        That of the movement; the same, slowed down evenly as far as limits demand; or the least time that keeps the
+        limits along the path.
+    rate : float, default 100
+        Samples per second of what is sent.
+    start : array_like of shape (n,), optional
+        Where the joints stand now; by default the rest posture. The approach begins there.
+    force : bool, default False
+        Return a trajectory that did not pass its checks.
+
+    Returns
+    -------
+    RobotMovement
+
+    Raises
+    ------
+    InfeasibleError
+        A check did not pass: which joint, when, its value beside the limit, and the least duration that works.
+    TrajectoryError
+        A pose out of reach, a movement of the wrong dimension, or several movements.
+    SpecificationError
+        An unknown option; a start outside the limits.
+    DataError
+        The extra ``robot`` is not installed.
+    """
+    check_choice("space", space, _SPACES)
+    check_choice("timing", timing, _TIMINGS)
+    check_choice("place", place, ("as given", "free"))
+    check_number("rate", rate, above=0.0)
+    times, positions = _one(movement)
+    at = robot.rest if start is None else _posture(start, robot)
+    if space == "joints":
+        if positions.shape[1] != robot.n_joints:
+            raise TrajectoryError(
+                f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {positions.shape[1]} columns"
+            )
+        path, joints = None, positions
+    else:
+        ik = InverseKinematics(robot, follow)
+        path, joints = _inverse(ik, _path(ik, times, positions, orientation, plane), place)
+    curve = CubicSpline(times, joints)
+    if timing == "fastest":
+        curve, chosen = fastest(robot, curve, rate)
+    else:
+        chosen = as_generated(robot, curve, rate)
+    made = _checked(robot, curve, chosen, path, at, rate)
+    for _ in range(_ROUNDS if timing == "slowed" else 0):
+        if made.preflight.passed or not np.isfinite(made.preflight.slower):
+            break
+        chosen = slowed(chosen, made.preflight.slower * _A_LITTLE, rate)
+        made = _checked(robot, curve, chosen, path, at, rate)
+    if not made.preflight.passed and not force:
+        raise InfeasibleError(_refusal(made), made.preflight)
+    return made
+
+
+def _one(movement: Any) -> tuple[Array, Array]:
+    """Times from 0 and positions of one movement."""
+    one = movement
+    if not isinstance(one, Trajectory):
+        from kineme.movements.segmentation.segment import as_recording
+
+        one = as_recording(movement)
+    times = np.asarray(one.times, dtype=float)
+    return times - times[0], np.asarray(one.positions, dtype=float)
+
+
+def _posture(start: ArrayLike, robot: Robot) -> Array:
+    q = as_numbers(start, "start")
+    if q.shape != (robot.n_joints,):
+        raise TrajectoryError(f"expected start as the positions of {robot.n_joints} joints, got shape {q.shape}")
+    return q
+
+
+def _path(ik: InverseKinematics, times: Array, positions: Array, orientation: ArrayLike | None, plane: str) -> TaskPath:
+    turned = Rotation.from_matrix(ik.tip_rotation).as_quat(scalar_first=True) if orientation is None else orientation
+    if positions.shape[1] == 7:
+        positions, turned = positions[:, :3], positions[:, 3:]
+    return task_path(times, positions, turned, plane, ik.tip_position)
+
+
+def _inverse(ik: InverseKinematics, path: TaskPath, place: str) -> tuple[TaskPath, Array]:
+    """The path where it is executed, and the joints along it."""
+    chosen = choose_place(ik, path) if place == "free" else choose_posture(ik, path)
+    path = path._replace(positions=path.positions + chosen.shift)
+    ik.reset(chosen.start)
+    return path, ik.follow(path.positions, path.rotations)
+
+
+def _checked(
+    robot: Robot, curve: CubicSpline, timing: Timing, path: TaskPath | None, start: Array, rate: float
+) -> RobotMovement:
+    """The approach and the movement with that timing, and the checks of both."""
+    movement = timed(robot, curve, timing)
+    first = approach(robot, start, movement.positions[0], rate)
+    whole = joined(first, movement)
+    wanted = None if path is None else path.at(timing.generated)._replace(times=timing.times + first.duration)
+    report = preflight(robot, whole, wanted, first.duration)
+    return RobotMovement(robot, whole, wanted, report, first.duration, movement.duration / float(timing.generated[-1]))
+
+
+def _refusal(made: RobotMovement) -> str:
+    failed = made.preflight.failed
+    lines: Sequence[str] = [
+        f"{c.what} of {c.where} at {c.time:.2f} s: {c.worst:.3g}, limit {c.limit:.3g} {c.unit}" for c in failed[:4]
+    ]
+    more = f" and {len(failed) - 4} more" if len(failed) > 4 else ""
+    duration = made.trajectory.duration - made.begins
+    slower = made.preflight.slower
+    remedy = (
+        f"it works in {duration * slower:.3g} s instead of {duration:.3g}: slow it down (timing='slowed', --slow-down)"
+        if np.isfinite(slower)
+        else "no speed helps: choose another place, orientation or posture"
+    )
+    return f"{made.robot.name} cannot execute this: {'; '.join(lines)}{more}. {remedy}"
