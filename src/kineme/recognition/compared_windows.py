@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,16 +140,16 @@ def compare_windows(
     sizes, slowness = np.empty((2, len(rows)))
     by = nearest if within is None else _nearest_within(known, within)
 
-    def fill(first: int, last: int) -> None:
-        demos = Demonstrations.of_movements(resampled(motion, start[first:last], end[first:last]))
+    def fill(begin: int, first: int, last: int) -> None:
+        tile = slice(begin + first, begin + last)
+        demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
         paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
-        sizes[first:last], slowness[first:last] = size_and_slowness(paths)
-        logs = score(known.comparison, known.references, demos, by)[0]
-        scores[first:last] = known.calibration.scores(logs)
+        sizes[tile], slowness[tile] = size_and_slowness(paths)
+        scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, by)[0])
 
     for begin in range(0, len(rows), _TILE):
         n = min(_TILE, len(rows) - begin)
-        for_tiles(lambda first, last, begin=begin: fill(begin + first, begin + last), n, _AT_ONCE)
+        for_tiles(partial(fill, begin), n, _AT_ONCE)
         if progress is not None:
             progress((begin + n) / len(rows))
     return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
