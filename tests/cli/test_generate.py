@@ -85,7 +85,8 @@ def test_any_number_of_dimensions(tmp_path, d):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--goal", "1,2,3"), "expected goal of shape (2,)"),
+        (("--goal", "1,2,3"), "expected 2 numbers for --goal, x, y, got 3"),
+        (("--start", "1"), "expected 2 numbers for --start, x, y, got 1"),
         (("--duration", 0), "duration above 0 seconds, got 0"),
         (("--rate", 1), "expected a rate of at least"),
         (("--formulation", "newest"), "'bio-inspired'"),
@@ -133,7 +134,7 @@ def test_numbers_that_are_not_finite_never_reach_a_file(recording, tmp_path):
     assert not (tmp_path / "again.kineme").exists()
     done = run(recording, "--goal", "1e308,1e308", "--json")
     assert done.returncode == 1
-    assert "numbers up to 1e+100 for goal" in done.stderr
+    assert "numbers up to 1e+100 for --goal" in done.stderr
     assert done.stdout == ""
 
 

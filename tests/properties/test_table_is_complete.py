@@ -38,12 +38,11 @@ OTHER_PARTS = {
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
     "movements.trajectories.demonstrations.Demonstrations.dimensions": "of columns",
-    "movements.channels.channel.Channel.coordinates": "names of columns",
-    "movements.channels.coordinates.as_wxyz": "another order of columns",
-    "movements.channels.coordinates.from_wxyz": "another order of columns",
     "movements.trajectories.demonstrations.Demonstrations.from_dataframe": "reads tables; from_arrays does the rest",
     "primitives.batch.Batch.join": "the former name of concatenate",
     "primitives.base_rollout.BaseRollout.axis_names": "of columns",
+    "primitives.base_rollout.BaseRollout.channels": "of columns",
+    "primitives.base_rollout.BaseRollout.rate_names": "of columns",
     "primitives.base_rollout.BaseRollout.plot": "one picture",
     "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
     "primitives.rollout_figure.draw_rollout": "one picture",

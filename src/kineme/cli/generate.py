@@ -29,8 +29,12 @@ _BAD_FIT = 0.05  # of the extent of the recording
 @click.command(short_help="Generate a movement from a symbol or a recording.")
 @click.argument("source", type=SymbolName())
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
-@click.option("--start", type=Numbers(), help="Start position.  [default: as demonstrated]")
-@click.option("--goal", type=Numbers(), help="Goal position.  [default: as demonstrated]")
+@click.option(
+    "--start",
+    type=Numbers(),
+    help="Where it starts: a value for each column but discrete ones.  [default: as demonstrated]",
+)
+@click.option("--goal", type=Numbers(), help="Where it ends, likewise.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
 @click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
@@ -58,12 +62,15 @@ def generate(**options: Any) -> None:
     kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
     kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
     """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.primitives.generation.generate import checked_point
     from kineme.primitives.generation.generate import generate as make
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])
     learned = _learned(options)
     wanted = _movement_options(options)
+    for name in ("start", "goal"):
+        checked_point(learned, getattr(wanted, name), f"--{name}")
     made = make(learned, wanted)
     _warn_of_bad_fit(learned)
     if options["save"]:
@@ -108,13 +115,14 @@ def _chosen(several: Any, options: dict[str, Any]) -> Any:
 
 
 def _warn_of_bad_fit(learned: Any) -> None:
-    from kineme.primitives.generation.learned import largest_deviation
+    from kineme.primitives.generation.deviation import largest_deviation
 
     off = largest_deviation(learned)
-    if off is not None and off[1] > _BAD_FIT:
+    if off is not None and off.share > _BAD_FIT:
+        of = f"in its {printable(off.of)}, " if off.of else ""
         write(
-            f"warning: the fit is off the recording by up to {off[0]:.3g}, {100 * off[1]:.2g} % of its extent; "
-            "see it with --plot, and try more basis functions with --n-basis",
+            f"warning: the fit is off the recording {of}by up to {off.largest:.3g}, {100 * off.share:.2g} % of its "
+            "extent; see it with --plot, and try more basis functions with --n-basis",
             err=True,
         )
 
