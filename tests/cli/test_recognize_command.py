@@ -59,7 +59,7 @@ def test_known_and_unknown_in_one_folder(folder, asked):
 def assert_alike(ours, theirs):
     """Equal, numbers up to the rounding of single precision, as in `batched_functions`.
 
-    Movements that are recognized together round together: to 8e-7 of a share. Plain and compiled loops differ by 1.3e-6,
+    Movements that are recognized together round together, to 8e-7 of a share. Plain and compiled loops differ by 1e-6,
     and the second answer is compiled where what ran before in this process did not repay that, but both together do.
     """
     if isinstance(theirs, dict):
