@@ -48,6 +48,7 @@ def draw_movement(learned: Learned, made: Columns, obstacles: Array | None) -> F
         axes.tick_params(labelbottom=True)
     over_time.align_ylabels()
     figure.legend(handles=_key(learned, bool(paths), obstacles is not None), loc="outside lower center", ncols=3)
+    figure.draw_without_rendering()  # a first layout, without which the aligned names are cut off
     return figure
 
 
