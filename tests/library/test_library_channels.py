@@ -8,18 +8,20 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kineme
 from kineme import ActionLibrary, Demonstrations
 from kineme.errors import DataError, TrajectoryError
+from kineme.library.recognition.recognize import LibraryRecognizer
 from kineme.library.storage.channels import channels_of_text, other_columns
 from kineme.library.storage.folder import FILE
 from kineme.library.storage.read import movements
 from kineme.library.symbols.grounding import learned_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
-from kineme.orientation import exp, product
+from kineme.orientation import PoseDMP, exp, product
 from kineme.primitives.generation.generate import MovementOptions, generate
 
 CHANNELS = (
@@ -186,3 +188,68 @@ def test_recognition_and_prediction_are_those_of_the_recognizer(library):
     asked = poses(seed=3)
     expected = kineme.Recognizer().fit(poses()).predict(asked)
     assert [answer.ranked[0] for answer in library.recognize(asked)] == expected.tolist()
+
+
+def test_a_library_says_what_it_was_recorded_as_and_refuses_other_kinds(library):
+    assert library.channels == CHANNELS
+    plain = tuple(Channel(f"j{k}", "position", (f"j{k}",)) for k in range(6))
+    walks = Demonstrations.from_arrays(np.cumsum(np.random.default_rng(0).normal(size=(2, 30, 6)), axis=1))
+    with pytest.raises(TrajectoryError, match=r"expected movements recorded as gripper \(disc.* got j0 \(position\)"):
+        library.recognize(Demonstrations.of_movements(of_channels(walks.movements, plain)))
+
+
+def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_of_the_library(library):
+    asked = poses(seed=3)
+    raw = [kineme.Trajectory(one.times, one.recorded, one.label) for one in asked]
+    expected = [answer.ranked[0] for answer in library.recognize(asked)]
+    assert [answer.ranked[0] for answer in library.recognize(raw)] == expected
+    assert library.learn(asked).added == 6
+    assert library.learn(raw).added == 0
+    assert library.verify() == []
+
+
+def nameless(demos):
+    """Poses as arrays: positions, and quaternions (w, x, y, z)."""
+    blocks = np.split(demos.recorded[:, [1, 2, 3, 7, 4, 5, 6]], demos.offsets[1:-1])
+    return Demonstrations.from_arrays(blocks, demos.labels, [one.times for one in demos])
+
+
+@pytest.mark.parametrize("exhaustive", [0, 100])
+@pytest.mark.parametrize("shown", [nameless, lambda demos: demos], ids=["nameless", "named"])
+def test_generated_poses_are_recognized(library, exhaustive, shown):
+    made = PoseDMP().learn(shown(poses())).rollout(n_samples=100)
+    asked = LibraryRecognizer(library.store, exhaustive=exhaustive)
+    assert [answer.label for answer in asked.recognize(made)] == list("ababab")
+
+
+def test_generated_poses_are_learned_as_poses(tmp_path):
+    made = PoseDMP().learn(nameless(poses())).rollout(n_samples=100)
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(made)
+        assert library.n_dims == 6
+        assert [one.kind for one in library.channels] == ["position"] * 3 + ["orientation"]
+        assert library.learn(made).added == 0
+        assert library.verify() == []
+    with ActionLibrary(tmp_path / "plain", create=True) as library:
+        library.learn(made.positions, labels=list(made.labels))
+        assert (library.n_dims, library.channels) == (7, None)
+        assert library.learn(made[:2]).added == 2, "of plain columns more of them"
+
+
+def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_path):
+    turns = np.cumsum(np.abs(np.random.default_rng(0).normal(size=(4, 60, 1))), axis=1) / 2
+    angles = np.concatenate([(turns + np.pi) % (2 * np.pi) - np.pi, np.cos(turns)], axis=2)
+    channels = (Channel("joint", "angle", ("joint",)), Channel("x", "position", ("x",)))
+    raw = Demonstrations.from_arrays(angles, list("abab"))
+    demos = Demonstrations.from_dataframe(
+        [pd.DataFrame({"t": one.times, "joint": one.positions[:, 0], "x": one.positions[:, 1]}) for one in raw]
+    )
+    assert demos.channels == (channels[0]._replace(period=2 * np.pi), channels[1])
+    assert np.ptp(demos.positions[:, 0]) > 13, "more than a turn, so that values alone would be degrees"
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, labels=list("abab"))
+    with ActionLibrary(tmp_path / "actions") as library:
+        assert library.channels == demos.channels
+        assert [answer.ranked[0] for answer in library.recognize(list(angles))] == list("abab")
+        learned = LibraryRecognizer(library.store).model().comparison.checked(list(angles))
+        np.testing.assert_allclose(learned.positions, demos.positions, atol=1e-9)

@@ -52,6 +52,7 @@ from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.primitives.discrete.basis import GATINGS
@@ -463,6 +464,20 @@ def recorded_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
     return each(len(demos), path=(recorded[..., :3] - start) / unit, other=recorded[..., 3:])
 
 
+def learned_coordinates(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Recorded columns as they are learned, and back to columns."""
+    channels = (
+        *(Channel(axis, "position", (axis,)) for axis in "xyz"),
+        Channel("q", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
+    )
+    found = as_learned(demos, channels, 6)
+    plain = as_learned(found, None, 7)
+    return [
+        {"rotation": one.positions[:, 3:], "quaternions": again.positions[:, 3:] * np.sign(again.positions[0, 3])}
+        for one, again in zip(found, plain, strict=True)
+    ]
+
+
 def tangents(demos: Demonstrations) -> list[dict[str, Any]]:
     """There and back, and the quaternions one by one."""
     tangent, references = to_tangent(demos)
@@ -553,6 +568,7 @@ TABLE = [
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),
     Batched("PoseDMP.learn", pose_numbers, 1e-6, draw=poses),
     Batched("PoseDMP.learn of channels", recorded_numbers, 1e-6, draw=poses),
+    Batched("as_learned", learned_coordinates, 1e-9, draw=poses),
     Batched("to_tangent", tangents, 1e-12, draw=poses),
     Batched("PoseFeatures", pose_features, 1e-8, draw=poses),
     style_row(),

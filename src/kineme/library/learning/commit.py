@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from kineme.library.learning.deduplicate import Batch, Stored, find_stored
 from kineme.library.learning.serialize import evenly_sampled, serialize
 from kineme.library.storage.channels import channels_to_text
-from kineme.library.storage.read import people_of
+from kineme.library.storage.read import people_by_movement
 from kineme.library.storage.rows import Row, among, as_text, listed, next_key
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.symbols import add_members, keys_by_name
 from kineme.library.storage.versions import Change
+from kineme.movements.channels.coordinates import with_periods
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
 
@@ -102,7 +103,7 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
     if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
         if demos.channels is not None:
-            change.insert("meta", [("channels", channels_to_text(demos.channels))])
+            change.insert("meta", [("channels", channels_to_text(with_periods(demos.channels, demos.recorded)))])
     lengths, durations = demos.lengths.tolist(), demos.durations.tolist()
     starts = np.zeros(len(demos)) if demos.movements.times is None else demos.times[demos.offsets[:-1]]
     t0, names = starts.tolist(), demos.names or (None,) * len(demos)
@@ -144,7 +145,7 @@ def _assign_labels(change: Change, batch: Batch, keys: list[int]) -> tuple[str, 
 def _without_person(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
     """Movement -> who showed it, for movements of which that is said and was not known."""
     said = {key: group for key, group in zip(keys, batch.groups, strict=True) if group is not None}
-    known = people_of(connection, list(said), NOW) if said else {}
+    known = people_by_movement(connection, list(said), NOW) if said else {}
     return {key: group for key, group in said.items() if key not in known}
 
 
