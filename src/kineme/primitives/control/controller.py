@@ -87,7 +87,8 @@ class Controller:
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events = _NOTHING
-        influences = Influences(*self._follow(0.0), self._zeros, self._nowhere, self._nowhere)
+        goal, ratio = self._follow(0.0)
+        influences = Influences(goal, self._zeros, ratio, self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
         self.state = self._report(*self._derivatives())
         return self.state
@@ -101,6 +102,7 @@ class Controller:
         coupling: ArrayLike | None = None,
         obstacles: ArrayLike | None = None,
         *,
+        goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
     ) -> State:
@@ -112,7 +114,10 @@ class Controller:
             Measured now, at the time of `state`; see `feedback`. A velocity is read at the tempo of the last step. With
             feedback="phase", no position does not slow the phase, and one that cannot be used slows it like the last.
         goal : array_like of shape (d,), optional
-            A new goal, for this step and all later ones.
+            A new goal, for this step and all later ones: where it is now.
+        goal_velocity : array_like of shape (d,), optional
+            Velocity of the goal, per second, which then moves on by itself, until the next goal. It is followed without
+            a lag; without a velocity, what moves at v is trailed by ``D / K tau v``, that is 0.2 tau v.
         tempo : float, default 1.0
             Speed of the phase during this step. The path does not depend on it; velocities are in proportion to it, so
             change it gradually. 0 is a pause.
@@ -128,30 +133,29 @@ class Controller:
         State
         """
         self._events = _NOTHING
-        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
         return self.state
 
     def _step(  # noqa: PLR0913, PLR0917 - as `step`
         self,
         position: Any,
         velocity: Any,
-        goal: Any,
+        goal: tuple[Any, Any],
         tempo: Any,
         coupling: Any,
-        obstacles: Any,
-        obstacle_velocities: Any,
+        obstacles: tuple[Any, Any],
         dt: Any,
     ) -> None:
-        """`step`, after the events of the last one are forgotten."""
+        """`step`, after the events of the last one are forgotten; goal and obstacles with their velocities."""
         dt, tempo = self._pace(dt, tempo)
         last = self._motion
         if position is not None or velocity is not None:
             self._measure(position, velocity)
         else:
             self._slowing = 0.0
-        if goal is not None:
-            self._aim(goal)
-        self._sense(obstacles, obstacle_velocities)
+        if goal[0] is not None or goal[1] is not None:
+            self._aim(*goal)
+        self._sense(*obstacles)
         push = self._zeros if coupling is None else self._couple(coupling)
         velocity_before = self._derivatives()[0] if self._limited else self._zeros
         self._rate = tempo / (self._tau * (1.0 + self._slowing))
@@ -214,12 +218,22 @@ class Controller:
     def _read_goal(self, value: Any) -> Array | None:
         return inputs.vector(value, self._n_dims)
 
+    def _read_goal_velocity(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
     def _read_coupling(self, value: Any) -> Array | None:
         return inputs.vector(value, self._n_dims)
 
-    def _aim(self, goal: Any) -> None:
-        target = self._read_goal(goal)
-        if target is None or not self._goal.aim(target - self._origin):
+    def _aim(self, goal: Any, velocity: Any = None) -> None:
+        """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
+        target = self._goal.target + self._origin if goal is None else self._read_goal(goal)
+        moving = None if velocity is None else self._read_goal_velocity(velocity)
+        if target is not None and (moving is not None or velocity is None):
+            remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
+            aimed = self._goal.aim(target - self._origin, moving, remaining)
+        else:
+            aimed = False
+        if not aimed:
             self._events |= Status.GOAL_REJECTED
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
@@ -245,6 +259,7 @@ class Controller:
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
         goal, ratio = self._follow(dt)
+        goal_velocity = self._goal.velocity
         self._clock.add_time(dt)
         du = self._rate * dt
         if du <= _STANDSTILL:
@@ -255,7 +270,11 @@ class Controller:
         velocities = self._obstacle_velocities
         if len(velocities):
             velocities = velocities / self._rate
-        influences = Influences(goal, ratio, push, self._obstacles, velocities)
+        goal_rate = self._zeros
+        if goal_velocity is not None:
+            goal_rate = goal_velocity / self._rate
+            goal = goal + self._plan.D / self._plan.K * goal_rate
+        influences = Influences(goal, goal_rate, ratio, push, self._obstacles, velocities)
         motion = self._advance(self._motion[:2], self._clock.u, du, influences)
         if self._usable(motion):
             self._motion = motion

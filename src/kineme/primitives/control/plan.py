@@ -18,7 +18,8 @@ _ROUNDING = 64 * np.finfo(np.float64).eps
 class Influences(NamedTuple):
     """What acts on the movement during one step, held constant over it; in normalized time, relative to the origin."""
 
-    goal: Array  # (d,)
+    goal: Array  # (d,), at the start of the step; ahead of a goal that moves, see `MovingGoal`
+    goal_rate: Array  # (d,), with which it goes on during the step
     ratio: Array  # (d,), what scale f is multiplied by
     push: Array  # (d,), an external acceleration
     obstacles: Array  # (m, n_positions), at the start of the step
