@@ -119,4 +119,4 @@ def test_a_velocity_that_is_none_leaves_the_goal_as_it_is(bio, velocity):
     controller = bio.controller(0.02)
     state = controller.step(goal=[9.0, 9.0, 9.0], goal_velocity=velocity)
     assert Status.GOAL_REJECTED in state.status
-    np.testing.assert_array_equal(state.goal, bio.goals[0])
+    np.testing.assert_allclose(state.goal, bio.goals[0], rtol=1e-15)
