@@ -50,6 +50,9 @@ from kineme.comparison.representation import Representation as Representation
 from kineme.kernels.soft_rotation import RotationPrior as RotationPrior
 from kineme.recognition.answer import Answer as Answer
 from kineme.recognition.early.hypotheses import Early as Early
+from kineme.recognition.outliers import find_outliers as find_outliers
+from kineme.recognition.outliers import Outlier as Outlier
+from kineme.recognition.outliers import Outliers as Outliers
 from kineme.recognition.warm_up import warm_up as warm_up
 
 # Symbols and the action library

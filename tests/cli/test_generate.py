@@ -1,7 +1,9 @@
 """``kineme generate`` as a user runs it, on a real recording."""
 
 import json
+import lzma
 from dataclasses import replace
+from pathlib import Path
 
 import commands
 import numpy as np
@@ -85,7 +87,8 @@ def test_any_number_of_dimensions(tmp_path, d):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--goal", "1,2,3"), "expected goal of shape (2,)"),
+        (("--goal", "1,2,3"), "expected 2 numbers for --goal, x, y, got 3"),
+        (("--start", "1"), "expected 2 numbers for --start, x, y, got 1"),
         (("--duration", 0), "duration above 0 seconds, got 0"),
         (("--rate", 1), "expected a rate of at least"),
         (("--formulation", "newest"), "'bio-inspired'"),
@@ -133,7 +136,7 @@ def test_numbers_that_are_not_finite_never_reach_a_file(recording, tmp_path):
     assert not (tmp_path / "again.kineme").exists()
     done = run(recording, "--goal", "1e308,1e308", "--json")
     assert done.returncode == 1
-    assert "numbers up to 1e+100 for goal" in done.stderr
+    assert "numbers up to 1e+100 for --goal" in done.stderr
     assert done.stdout == ""
 
 
@@ -141,3 +144,17 @@ def test_help_states_no_range_where_there_is_none():
     shown = run("--help").stdout
     assert "--rate" in shown
     assert "None" not in shown
+
+
+def test_a_library_of_the_first_release_moves_again_before_and_after_it_is_learned_into(tmp_path):
+    kept = Path(__file__).parents[1] / "library" / "library_0.1.0.xz"
+    (tmp_path / "actions").mkdir()
+    (tmp_path / "actions" / "library.sqlite").write_bytes(lzma.decompress(kept.read_bytes()))
+    new = write_movement(
+        tmp_path / "new.csv", {"times": np.arange(20) / 20, "positions": np.random.default_rng(0).random((20, 2))}
+    )
+    symbol = ("tilt", "--library", tmp_path / "actions")
+    assert run(*symbol, "-o", tmp_path / "before.csv").returncode == 0
+    assert commands.run("learn", new, "--label", "wave", "--library", tmp_path / "actions").returncode == 0
+    assert run(*symbol, "-o", tmp_path / "after.csv").returncode == 0
+    assert (tmp_path / "before.csv").read_bytes() == (tmp_path / "after.csv").read_bytes()

@@ -3,6 +3,7 @@
 import commands
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 import kineme
 from kineme.files.write_movement import write_movement
@@ -72,13 +73,16 @@ def test_a_saved_pose_is_a_pose_again(pose, tmp_path):
     assert run(pose, "--save", tmp_path / "p.kineme", "-o", tmp_path / "a.csv").returncode == 0
     done = run(tmp_path / "p.kineme")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("time,x,y,z,qw,qx,qy,qz,v_x,v_y,v_z,v_q.rx")
+    assert done.stdout == (tmp_path / "a.csv").read_text()
 
 
 def test_a_goal_of_other_columns_is_refused_with_their_names(pose):
     done = run(pose, "--goal", "1,2")
     assert done.returncode == 1
-    assert "expected 7 numbers, tool.x, tool.y, tool.z, tool.qx, tool.qy, tool.qz, tool.qw, got 2" in done.stderr
+    assert (
+        "expected 7 numbers for --goal, tool.x, tool.y, tool.z, tool.qx, tool.qy, tool.qz, tool.qw, got 2"
+        in done.stderr
+    )
 
 
 def test_obstacles_lie_where_the_position_moves(pose, tmp_path):
@@ -134,7 +138,27 @@ def test_a_bad_fit_is_said(tmp_path):
     assert run(path, "--n-basis", 150, "-o", tmp_path / "good.csv").stderr == ""
 
 
+@pytest.mark.parametrize(("ripple", "bad"), [(0.045, False), (0.055, True)])
+def test_a_fit_is_bad_beyond_a_twentieth_of_the_extent(tmp_path, ripple, bad):
+    """Few basis functions follow the way and not the ripples on it, which are so high beside an extent of 1."""
+    times = np.linspace(0, 1, 300)
+    rippled = np.column_stack([times, ripple * np.sin(2 * np.pi * 40 * times)])
+    path = write_movement(tmp_path / "rippled.csv", {"times": times, "positions": rippled})
+    done = run(path, "--n-basis", 10, "-o", tmp_path / "new.csv")
+    assert done.returncode == 0
+    assert ("warning: the fit is off" in done.stderr) == bad
+
+
 def test_short_names_of_columns_tell_them_apart():
     joints = [f"{joint}.pos" for joint in ("shoulder_pan", "shoulder_lift", "elbow_flex")]  # as LeRobot names them
     assert short_names(joints) == ["…ulder_pan.pos", "…lder_lift.pos", "elbow_flex.pos"]
     assert short_names(["field.pose.position.x", "y", "v."]) == ["position.x", "y", "v."]
+
+
+def test_names_of_columns_are_not_cut_off_at_the_edge(tmp_path):
+    u = np.linspace(0, 2, N)
+    heads = ",".join(["t", *(f"panda_joint{k + 1}" for k in range(7)), "gripper"])
+    table = np.column_stack([u, *(0.5 * np.sin(u * (1 + 0.3 * k)) + 0.2 * k for k in range(7)), u > 1])
+    np.savetxt(tmp_path / "arm.csv", table, delimiter=",", header=heads, comments="")
+    assert run(tmp_path / "arm.csv", "--plot", tmp_path / "a.png", "-o", tmp_path / "new.csv").returncode == 0
+    assert imread(tmp_path / "a.png")[:, :3, :3].min() == 1.0  # white

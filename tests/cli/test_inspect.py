@@ -109,3 +109,42 @@ def test_progress_is_shown_on_a_terminal(folder):
     assert out.startswith(b"14 movements")
     assert b"reading" in seen
     assert b"/15" in seen
+
+
+@pytest.fixture(scope="module")
+def misplaced(tmp_path_factory):
+    """Three shapes, one movement of which lies in the folder of another."""
+    folder = tmp_path_factory.mktemp("misplaced")
+    for i, one in enumerate(kineme.load_lasa(["CShape", "Snake", "Sine"])):
+        label = "Snake" if i == 2 else one.label
+        (folder / label).mkdir(exist_ok=True)
+        write_movement(folder / label / f"{i}.csv", {"times": one.times, "positions": one.positions})
+    return folder
+
+
+def test_a_movement_unlike_the_others_of_its_label_is_listed(misplaced, tmp_path):
+    text = run(misplaced, "--plot", tmp_path / "out.png").stdout
+    assert "outliers: 1 of 21 movements unlike the others of their label (about 5 % of those listed are" in text
+    assert "Snake/2.csv" in text.split("outliers: ")[1]
+    assert "(CShape)" in text.split("outliers: ")[1]
+    assert (tmp_path / "out.png").read_bytes().startswith(PNG)
+    data = json.loads(run(misplaced, "--json").stdout)["outliers"]
+    assert (data["checked"], data["error_rate"]) == (21, 0.05)
+    (one,) = data["found"]
+    assert (one["movement"], one["label"], one["label_of_most_like"]) == ("Snake/2.csv", "Snake", "CShape")
+
+
+def test_outliers_are_not_looked_for_where_that_is_said_or_there_are_few(misplaced, folder):
+    assert "outliers" not in run(misplaced, "--no-outliers").stdout
+    assert "outliers" not in json.loads(run(misplaced, "--no-outliers", "--json").stdout)
+    assert "outliers" not in run(folder).stdout
+    assert run(misplaced, "--error-rate", "1").returncode == 2
+
+
+def test_movements_that_cannot_be_compared_are_no_error(tmp_path):
+    (tmp_path / "a").mkdir()
+    for k in range(24):
+        (tmp_path / "a" / f"{k}.csv").write_text("time,x\n" + "".join(f"{i},{i}\n" for i in range(9)))
+    done = run(tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "outliers were not looked for: expected training movements that differ" in done.stdout

@@ -163,3 +163,19 @@ def test_movements_of_other_dimensions_are_refused_and_nothing_changes(recording
     assert done.returncode == 1
     assert "expected movements of 2 dimensions as all others of the library" in done.stderr
     assert len(answer("library", "history", "-l", library)) == 1
+
+
+def test_people_from_a_column_of_a_table(tmp_path):
+    rows = [
+        f"{who},{label},{k / 10},{k * (1 + 0.1 * n)},{k * k if label == 'wave' else 3 * (k % 4)}"
+        for n, who in enumerate(("ann", "bob"))
+        for label in ("wave", "nod")
+        for k in range(10)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["who,label,t,x,y", *rows]))
+    library = tmp_path / "actions"
+    learned = answer("learn", tmp_path / "a.csv", "--person-column", "who", "-l", library)
+    assert (learned["added"], learned["people"], learned["symbols"]) == (4, ["ann", "bob"], ["wave", "nod"])
+    done = run("learn", tmp_path / "a.csv", "--person-column", "who", "--person", "eve", "-l", library)
+    assert "expected --person, or people from --person-column or --label-pattern, not both" in done.stderr
+    assert "person who" in run("inspect", tmp_path / "a.csv", "--person-column", "who").stdout

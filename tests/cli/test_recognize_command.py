@@ -210,3 +210,18 @@ def test_an_answer_that_is_a_guess_says_so(tmp_path, asked, shown, guess):
     text = run("recognize", asked / "c.csv", "-l", tmp_path / "a").stdout
     assert ("Which movements are unknown, their confidence, and p-values are a guess" in text) is guess
     assert ("two or more of each symbol, 19 in all, to keep --error-rate 0.05" in text) is guess
+
+
+def test_tiny_p_values_are_shown_short_and_complete_as_data(tmp_path):
+    """Without calibration they fall to 1e-100, which says no more than a thousandth does, and widens the table."""
+    u = np.linspace(0, 1, 50)
+    shapes = {"wave": np.column_stack([u, np.sin(6 * u)]), "point": np.column_stack([u**2, u])}
+    rng = np.random.default_rng(0)
+    demos = [x * size + 1e-3 * rng.normal(size=x.shape) for x in shapes.values() for size in (1, 1.01, 0.99)]
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, [name for name in shapes for _ in range(3)])
+    path = write_movement(tmp_path / "a.csv", {"times": u, "positions": shapes["wave"]})
+    (one,) = answer("recognize", path, "-l", tmp_path / "actions")["movements"]
+    assert one["ranked"][1]["p_value"] < 1e-3
+    text = run("recognize", path, "-l", tmp_path / "actions").stdout
+    assert "point <0.001" in text

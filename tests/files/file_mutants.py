@@ -16,8 +16,13 @@ from pathlib import Path
 import numpy as np
 
 import kineme
+from kineme.files.annotations.labeled_pieces import labeled_pieces
+from kineme.files.annotations.read_labels import read_labels
+from kineme.files.lerobot.copy import copy_with_motions
+from kineme.files.lerobot.motions import OWN, Motion
 from kineme.orientation import PosePrimitives
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives
+from lerobot_sets import write_v2, write_v3
 
 N_SAMPLES = 12
 WORDS = (
@@ -206,6 +211,39 @@ def _bag(kind, compress=False):
 
 
 @functools.cache
+def _lerobot(write):
+    """A data set, as an archive of its files: one of them is damaged at a time."""
+    buffer = io.BytesIO()
+    with tempfile.TemporaryDirectory() as name, zipfile.ZipFile(buffer, "w") as archive:
+        folder = write(Path(name) / "set", lengths=(8, 9, 10))
+        for path in sorted(one for one in folder.rglob("*") if one.is_file()):
+            archive.writestr(str(path.relative_to(folder)), path.read_bytes())
+    return buffer.getvalue()
+
+
+def _elan():
+    slots = "".join(f'<TIME_SLOT TIME_SLOT_ID="t{k}" TIME_VALUE="{200 * k}"/>' for k in range(4))
+    rows = "".join(
+        f'<ANNOTATION><ALIGNABLE_ANNOTATION TIME_SLOT_REF1="t{k}" TIME_SLOT_REF2="t{k + 1}"><ANNOTATION_VALUE>wave'
+        "</ANNOTATION_VALUE></ALIGNABLE_ANNOTATION></ANNOTATION>"
+        for k in (0, 2)
+    )
+    return f'<D><TIME_ORDER>{slots}</TIME_ORDER><TIER TIER_ID="symbol">{rows}</TIER></D>'.encode()
+
+
+def _label_tables():
+    rows = [{"start": 0.1, "end": 0.4, "label": "wave"}, {"start": 0.5, "end": 0.9, "label": "nod, twice"}]
+    lines = "\n".join(f'{one["start"]},{one["end"]},"{one["label"]}"' for one in rows)
+    tracks = "\n".join(f"{one['start']}\t{one['end']}\t{one['label']}" for one in rows)
+    return {
+        "named.labels.csv": f"start,end,label\n{lines}\n".encode(),
+        "named.labels.txt": f"{tracks}\n\\\t1\t2\n".encode(),
+        "named.labels.json": json.dumps(rows).encode(),
+        "named.labels.eaf": _elan(),
+    }
+
+
+@functools.cache
 def samples():
     """File name -> bytes: at least one of every format and every kind of saved primitives."""
     (t, x), (t2, x2) = _movement(), _movement(1)
@@ -257,19 +295,24 @@ def samples():
         "run.db3": _bag("sqlite3"),
         "run.mcap": _bag("mcap"),
         "compressed.mcap": _bag("mcap", compress=True),
+        "v2.lerobot": _lerobot(write_v2),
+        "v3.lerobot": _lerobot(write_v3),
+        **_label_tables(),
         **{name: _saved(cls) for name, cls in _SAVED.items()},
     }
 
 
 def mutant(rng, data, name):
     """The bytes with one to four kinds of damage; inside what is compressed too."""
+    if name.endswith(".lerobot"):
+        return _zip_mutant(rng, data)
     if name.endswith((".npz", ".kineme")) and rng.random() < 0.6:
         data = _zip_mutant(rng, data)
         return data if rng.random() < 0.8 else _damaged(rng, data)
     if "compressed.mat" in name and rng.random() < 0.7:
         return _mat_mutant(rng, data)
     for _ in range(int(rng.integers(1, 5))):
-        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh")))
+        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh", ".eaf")))
     return data
 
 
@@ -361,11 +404,41 @@ def read_mutant(name, data):
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         path = Path(folder) / name
+        if name.endswith(".lerobot"):
+            return _read_lerobot(path, data)
         path.write_bytes(data)
+        if ".labels." in name:
+            return _read_labels(path)
         if name in _SAVED:
             _check_saved(_SAVED[name].load(path))
             return 0
         return check_recordings(kineme.read_recordings(path))
+
+
+def _read_lerobot(folder, data):
+    """Read the data set, and copy it with a text about an episode."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for one in archive.infolist():
+            path = folder / one.filename
+            with contextlib.suppress(OSError):  # of names that are no paths
+                if folder.resolve() in path.resolve().parents:
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(archive.read(one))
+    n = check_recordings(kineme.read_recordings(folder))
+    target = folder.parent / "copy"
+    target.mkdir()
+    with contextlib.suppress(kineme.KinemeError):
+        copy_with_motions(folder, target, {0: [Motion(0.0, OWN + "}")]})
+        check_recordings(kineme.read_recordings(target))
+    return n
+
+
+def _read_labels(path):
+    """Read the labels, and cut a recording by them."""
+    table = read_labels(path)
+    assert all(math.isfinite(row.start) and math.isfinite(row.end) for row in table.rows)
+    (path.parent / "long.csv").write_bytes(_wide(","))
+    return check_recordings(labeled_pieces(kineme.read_recordings(path.parent / "long.csv"), table))
 
 
 def check_recordings(read):

@@ -156,6 +156,53 @@ def test_an_mcap_without_chunks_or_index_is_refused_with_the_remedy(tmp_path):
             copied(source, tmp_path / "b.mcap")
 
 
+def offered():
+    """A quality of service as of /tf_static."""
+    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+
+    forever = QosTime(9223372036, 854775807)
+    how = (QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, forever, forever, QosLiveliness.AUTOMATIC, forever)
+    return [Qos(QosHistory.KEEP_LAST, 1, *how, False)]
+
+
+@pytest.mark.parametrize(("kind", "version"), [("mcap", 8), ("mcap", 9), ("sqlite3", 8), ("sqlite3", 9)])
+def test_how_topics_were_offered_stays(tmp_path, kind, version):
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    m = Maker(kind)
+    with Writer(tmp_path / "run", version=version, storage_plugin=StoragePlugin[kind.upper()]) as writer:
+        static = writer.add_connection(
+            "/s", "std_msgs/msg/String", typestore=store(kind), offered_qos_profiles=offered()
+        )
+        plain = writer.add_connection("/t", "std_msgs/msg/String", typestore=store(kind))
+        for ns in stamps(5):
+            for one in (static, plain):
+                writer.write(one, ns, store(kind).serialize_cdr(m.string("x"), "std_msgs/msg/String"))
+    with reader(tmp_path / "run") as old, reader(copied(tmp_path / "run", tmp_path / "named")) as new:
+        before = [one._replace(owner=None) for one in old.connections]
+        assert [one._replace(owner=None) for one in new.connections if one.topic != TOPIC] == before
+        assert before[0].ext.offered_qos_profiles == offered()
+        (added,) = (one for one in new.connections if one.topic == TOPIC)
+        assert (added.ext.serialization_format, added.ext.offered_qos_profiles) == ("cdr", [])
+        assert new.message_count == 10 + len(TEXTS)
+        assert (new.start_time, new.duration) == (old.start_time, max(old.duration, SECOND // 4 + 1))
+
+
+def test_who_published_and_what_is_latched_stays_in_a_bag_of_ros_1(tmp_path):
+    from rosbags.rosbag1 import Writer
+
+    m, known = Maker("ros1"), store("ros1")
+    with Writer(tmp_path / "run.bag") as writer:
+        for who in ("/node_a", "/node_b"):
+            one = writer.add_connection("/s", "std_msgs/msg/String", typestore=known, callerid=who, latching=1)
+            for ns in stamps(5):
+                writer.write(one, ns, known.serialize_ros1(m.string(who), "std_msgs/msg/String"))
+    with reader(tmp_path / "run.bag") as old, reader(copied(tmp_path / "run.bag", tmp_path / "named.bag")) as new:
+        before = [one._replace(owner=None) for one in old.connections]
+        assert [(one.ext.callerid, one.ext.latching) for one in before] == [("/node_a", 1), ("/node_b", 1)]
+        assert [one._replace(owner=None) for one in new.connections if one.topic != TOPIC] == before
+
+
 def test_each_message_goes_into_the_file_of_its_time(tmp_path):
     """As rosbag2 divides a long recording."""
     from ruamel.yaml import YAML

@@ -244,3 +244,33 @@ def test_a_damaged_transform_topic_is_named(tmp_path):
     read = read_recordings(path, frame="a:b", skip="sample")
     assert read.demonstrations.lengths.tolist() == [50]
     assert len(read.problems) == 1
+
+
+def test_a_cut_file_of_a_folder_is_named(tmp_path):
+    path = a_bag(tmp_path, "mcap")
+    file_of(path).write_bytes(file_of(path).read_bytes()[:-100])
+    with pytest.raises(kineme.DataError, match=r"run: run\.mcap: expected an MCAP file that was closed.*mcap recover"):
+        read_recordings(path)
+
+
+def test_a_chunk_of_gigabytes_that_are_zeros_is_refused_at_once(tmp_path):
+    path = a_bag(tmp_path, "ros1")
+    data = path.read_bytes()
+    at = data.index(b"size=") + 5 + 4  # the size of the chunk in the file, behind the header of the chunk
+    with path.open("wb") as file:
+        file.write(data[:at] + struct.pack("<L", 4 * 10**9) + data[at + 4 :])
+        file.truncate(10 * 2**30)
+    with pytest.raises(kineme.DataError, match=r"run\.bag: expected a bag .*, got: records that contradict each other"):
+        read_recordings(path)
+
+
+def test_stamps_of_two_clocks_are_said_with_the_way_out(tmp_path):
+    m, rows = Maker("mcap"), pose_rows()
+    messages = [("/sim", ns, m.joint_state(ns - START, ["a"], [k])) for k, ns in enumerate(stamps())]
+    messages += [("/tool", ns, m.pose_stamped(ns, row)) for ns, row in zip(stamps(), rows, strict=True)]
+    path = write_bag(tmp_path, "mcap", messages)
+    expected = r"got none: /sim from 0 to 0.49 s, /tool from 1700000000 to 1700000000.49 s; .* --time recorded"
+    with pytest.raises(kineme.DataError, match=expected):
+        read_recordings(path, topic=["/sim", "/tool"])
+    (movement,) = read_recordings(path, topic=["/sim", "/tool"], time="recorded").demonstrations
+    np.testing.assert_array_equal(movement.recorded[:, 0], range(50))

@@ -1,10 +1,12 @@
 """What columns are, from the file on: names and kinds are kept, and what is no orientation is refused by name."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kineme
 from kineme.errors import SpecificationError
+from kineme.files.inspection.inspect import inspect
 from kineme.orientation import exp, product
 
 HEADS = "frame_index,Sub Frame,t,pose.position.x," + ",".join(f"pose.orientation.{part}" for part in "xyzw")
@@ -68,6 +70,58 @@ def test_a_file_of_other_heads_is_no_company_for_orientations(tmp_path):
     assert "'claw'] where most files have ['pose.position.x'" in recordings.problems[0].reason
 
 
+def written(path, order, gripper, positions="xy"):
+    u = np.linspace(0, 1, N)
+    q = exp(np.outer(u, [0.2, 0.5, 2.0]))[:, ["wxyz".index(part) for part in order]]
+    xy = np.column_stack([u, u**2])[:, ["xy".index(axis) for axis in positions]]
+    heads = ",".join(["t", *positions, *(f"q{part} [rad]" for part in order), "gripper"])
+    np.savetxt(path, np.column_stack([u, xy, q, gripper(u)]), delimiter=",", header=heads, comments="")
+
+
+def test_quaternions_in_two_orders_are_read_in_that_of_the_first_file(tmp_path):
+    for k, (order, positions) in enumerate([("wxyz", "xy"), ("xyzw", "xy"), ("xyzw", "yx")]):
+        written(tmp_path / f"{k}.csv", order, lambda u: u > 0.5, positions)
+    recordings = kineme.read_recordings(tmp_path)
+    assert recordings.problems == ()
+    demos = recordings.demonstrations
+    assert [one.order for one in demos.channels if one.kind == "orientation"] == ["wxyz"]
+    for one in demos[1:]:
+        np.testing.assert_allclose(one.recorded, demos[0].recorded)
+    assert sum(n for _, n in recordings.detected) == 3
+    assert len(recordings.detected) == 3
+    (note,) = [note for note in inspect(recordings).notes if "order" in note]
+    assert note == (
+        "some files have the columns qx [rad], qy [rad], qz [rad], qw [rad] in this order: they are read as "
+        "qw [rad], qx [rad], qy [rad], qz [rad], that of the first file"
+    )
+    assert not any("order" in note for note in inspect(kineme.read_recordings(tmp_path / "1.csv")).notes)
+
+
+def test_plain_columns_in_two_orders_are_told_apart_by_their_names(tmp_path):
+    u = np.linspace(0, 1, N)
+    for k, heads in enumerate(("x [m],y [mm]", "y [mm],x [m]")):
+        columns = np.column_stack([u, 5 * u**2])[:, [0, 1] if k == 0 else [1, 0]]
+        np.savetxt(
+            tmp_path / f"{k}.csv", np.column_stack([u, columns]), delimiter=",", header=f"t,{heads}", comments=""
+        )
+    recordings = kineme.read_recordings(tmp_path)
+    demos = recordings.demonstrations
+    np.testing.assert_allclose(demos[0].positions, demos[1].positions)
+    assert [(one.name, one.unit) for one in demos.channels] == [("x [m]", "m"), ("y [mm]", "mm")]
+
+
+@pytest.mark.parametrize("first", ["continuous", "switched"])
+def test_what_a_gripper_is_is_decided_for_all_files_of_a_set(tmp_path, first):
+    grippers = [lambda u: 0.04 * u, lambda u: 0.04 * (u > 0.5)]
+    for k, gripper in enumerate(grippers if first == "continuous" else grippers[::-1]):
+        written(tmp_path / f"{k}.csv", "wxyz", gripper)
+    recordings = kineme.read_recordings(tmp_path)
+    assert (len(recordings), recordings.problems) == (2, ())
+    assert recordings.demonstrations.channels[-1].kind == "position"
+    switched = kineme.read_recordings(tmp_path / ("1.csv" if first == "continuous" else "0.csv"))
+    assert switched.demonstrations.channels[-1].kind == "discrete"
+
+
 def test_the_caller_says_what_columns_are(tmp_path):
     path = write(tmp_path / "a.csv", gripper="g")
     assert kineme.read_recordings(path).demonstrations.channels[-1].kind == "position"
@@ -112,3 +166,14 @@ def test_headers_of_messages_are_no_coordinates(tmp_path, before):
     assert [one.kind for one in recordings.demonstrations.channels] == ["position", "orientation"]
     assert recordings.detected[0][0].ignored == tuple(heads[1:5])
     assert recordings.demonstrations.durations[0] == pytest.approx(1)
+
+
+def test_columns_of_a_quaternion_that_stand_apart_are_read_alike_from_files_and_frames(tmp_path):
+    u = np.linspace(0, 1, 40)
+    q = np.column_stack([np.cos(u), np.sin(u) * 0.6, 0 * u, np.sin(u) * 0.8])
+    columns = {"t": u, "qw": q[:, 0], "x": u**2, "qx": q[:, 1], "y": 1 - u, "qy": q[:, 2], "qz": q[:, 3]}
+    frame = pd.DataFrame(columns)
+    frame.to_csv(tmp_path / "apart.csv", index=False)
+    for one in (kineme.read_recordings(tmp_path / "apart.csv").demonstrations, kineme.Demonstrations.of(frame)):
+        assert one.dimensions == ("q.rx", "q.ry", "q.rz", "x", "y")
+        np.testing.assert_allclose(one.recorded, np.column_stack([q, u**2, 1 - u]), atol=1e-12)

@@ -271,6 +271,12 @@ def test_an_episode_that_is_not_there(tmp_path, source):
         copied(source, tmp_path / "named", {7: [Motion(0.0, "a")]})
 
 
+def test_a_damaged_description_is_not_copied(tmp_path, source):
+    (source / "meta" / "episodes" / "chunk-000" / "file-001.parquet").write_bytes(b"cut")
+    with pytest.raises(kineme.DataError, match=r"expected a whole data set to copy: expected file-001\.parquet"):
+        copied(source, tmp_path / "named")
+
+
 def test_a_damaged_shard_is_named(tmp_path, source):
     (source / SHARDS[1]).write_bytes((source / SHARDS[1]).read_bytes()[:-200])
     with pytest.raises(kineme.DataError, match=r"file-001\.parquet"):

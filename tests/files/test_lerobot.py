@@ -206,3 +206,104 @@ def test_missing_metadata_is_named(tmp_path):
     next(folder.glob("meta/episodes/*/*")).unlink()
     with pytest.raises(DataError, match=r"expected meta/episodes/\*/\*.parquet of a LeRobot data set of version 3"):
         kineme.read_recordings(folder)
+
+
+def test_damaged_tasks_cost_the_labels_alone(tmp_path):
+    folder = write_v3(tmp_path / "three")
+    (folder / "meta" / "tasks.parquet").write_bytes(b"PAR1 cut")
+    found = kineme.read_recordings(folder)
+    assert found.labels.tolist() == [None] * 3
+    assert found.problems[0].reason.startswith("expected tasks.parquet in the meta folder of a LeRobot data set")
+    (folder / "meta" / "tasks.parquet").unlink()
+    found = kineme.read_recordings(folder)
+    assert "expected meta/tasks.parquet or meta/tasks.jsonl, found none; episodes have no" in found.problems[0].reason
+    folder = write_v2(tmp_path / "two")
+    tasks = folder / "meta" / "tasks.jsonl"
+    tasks.write_text('{"task_index": "0", "task": "a"}\n{"task_index": 1, "task": "Wave"}\n{')
+    found = kineme.read_recordings(folder)
+    assert found.labels.tolist() == [None, "Wave", None]
+    assert [one.reason.split(": ")[0] for one in found.problems] == [f"meta/tasks.jsonl, line {k}" for k in (1, 3)]
+
+
+def test_damaged_descriptions_of_episodes_cost_those_alone(tmp_path):
+    folder = write_v2(tmp_path / "two")
+    path = folder / "meta" / "episodes.jsonl"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([lines[0], lines[1][:-9], "", lines[2]]))
+    found = kineme.read_recordings(folder)
+    assert [source.place for source in found.sources] == ["episode 0", "episode 2"]
+    assert "meta/episodes.jsonl, line 2: expected an object with episode_index, length" in found.problems[0].reason
+    folder = write_v3(tmp_path / "three", lengths=(10,) * 6)
+    whole = next(folder.glob("meta/episodes/*/*"))
+    pd.read_parquet(whole)[:4].to_parquet(whole)
+    (whole.parent / "file-001.parquet").write_bytes(b"cut")
+    found = kineme.read_recordings(folder)
+    assert [source.place for source in found.sources] == [f"episode {k}" for k in range(4)]
+    assert found.problems[0].reason.startswith("expected file-001.parquet in the meta folder of a LeRobot data set")
+    whole.write_bytes(b"cut")
+    with pytest.raises(DataError, match=r"got none in its meta folder; the first problem: expected file-000.parquet"):
+        kineme.read_recordings(folder)
+
+
+def test_several_chunks_of_several_files_described_in_another_order(tmp_path):
+    folder = write_v3(tmp_path / "set", lengths=(10, 11, 12, 13, 14, 15, 16))
+    first = folder / "data" / "chunk-000"
+    (folder / "data" / "chunk-001").mkdir()
+    for k in (2, 3):
+        (first / f"file-00{k}.parquet").rename(folder / "data" / "chunk-001" / f"file-00{k - 2}.parquet")
+    path = next(folder.glob("meta/episodes/*/*"))
+    rows = pd.read_parquet(path)
+    rows.loc[4:, "data/chunk_index"] = 1
+    rows.loc[4:, "data/file_index"] -= 2
+    rows[3:].to_parquet(path)
+    rows[:3].to_parquet(path.parent / "file-001.parquet")
+    found = kineme.read_recordings(folder)
+    assert (found.problems, found.demonstrations.lengths.tolist()) == ((), [10, 11, 12, 13, 14, 15, 16])
+
+
+def test_an_episode_without_frames_and_one_with_a_missing_number(tmp_path):
+    folder = write_v3(tmp_path / "set", lengths=(10, 0, 12, 13))
+
+    def spoiled(frames):
+        frames.at[3, "observation.state"] = np.array([1, np.nan, 2], dtype=np.float32)
+        return frames
+
+    change(folder, spoiled)
+    found = kineme.read_recordings(folder)
+    assert [source.place for source in found.sources] == ["episode 2", "episode 3"]
+    reasons = [one.reason for one in found.problems]
+    assert "episode 1: expected frames in data/chunk-000/file-000.parquet, got none" in reasons
+    assert "movement episode 0: expected finite positions, got [1.0, nan, 2.0] at sample 3" in reasons
+
+
+@pytest.mark.parametrize(
+    ("frames", "words"),
+    [
+        (lambda frames: frames.drop(columns="observation.state"), "expected the column 'observation.state', got none"),
+        (lambda frames: frames.assign(**{"observation.state": "a"}), "expected numbers in 'observation.state', got "),
+    ],
+)
+def test_a_shard_without_its_numbers_is_named_with_its_episodes(tmp_path, frames, words):
+    folder = write_v3(tmp_path / "set")
+    change(folder, frames, 1)
+    found = kineme.read_recordings(folder)
+    assert len(found) == 2
+    assert f"the shard data/chunk-000/file-001.parquet: {words}" in found.problems[0].reason
+    assert found.problems[0].reason.endswith("; left out episode 2")
+
+
+def test_frames_of_no_episode_are_named_without_a_number(tmp_path):
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: frames.astype({"episode_index": "Int64"}).where(frames["index"] != 29, other=None))
+    reasons = "; ".join(one.reason for one in kineme.read_recordings(folder).problems)
+    assert "frames without an episode_index: expected frame 0 next" in reasons
+    assert "episode -1" not in reasons
+
+
+def test_pictures_alone_are_refused_by_their_names(folder):
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    kept = {name: one for name, one in info["features"].items() if one["dtype"] == "video" or name == "timestamp"}
+    path.write_text(json.dumps(info | {"features": kept}))
+    with pytest.raises(DataError, match=r"expected features of numbers .* got only .*'observation.images.top'"):
+        kineme.read_recordings(folder)

@@ -184,6 +184,19 @@ def test_qualisys_bodies_are_positions_and_angles():
     assert found.detected[0][0].measured_in == ("mm", "mm", "mm", "deg", "deg", "deg")
 
 
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_trc_that_a_program_for_tables_has_saved(separator):
+    """As pyomeca's example: commas, as many in every line, and a line of nothing but commas below the axes."""
+    lines = [line.split("\t") for line in trc().splitlines() if line]
+    widest = max(map(len, lines))
+    saved = "\n".join(separator.join(line + [""] * (widest - len(line))) for line in lines)
+    head, _, samples = saved.partition("\n1" + separator)
+    for empty in ("", "\n" + separator * (widest - 1)):
+        found = read(f"{head}{empty}\n1{separator}{samples}", "walk.trc")
+        np.testing.assert_array_equal(found.demonstrations.recorded, read(trc(), "walk.trc").demonstrations.recorded)
+        assert found.detected[0][0].columns == read(trc(), "walk.trc").detected[0][0].columns
+
+
 def test_trc_markers_have_names_units_and_times():
     found = read(trc(), "walk.trc")
     assert found.demonstrations.dimensions == ("LASI.x", "LASI.y", "LASI.z", "RASI.x", "RASI.y", "RASI.z")

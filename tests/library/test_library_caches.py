@@ -16,6 +16,7 @@ from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.members import members_of
 from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.recognition.conformal import calibrate
 
 CODES, CALIBRATION = features_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
@@ -189,3 +190,82 @@ def test_what_is_no_file_is_no_cache(served, name, make):
         assert _answers(library) == expected
     if (folder / name).is_dir():
         (folder / name).rmdir()
+
+
+@pytest.fixture
+def of_all(tmp_path, monkeypatch):
+    """A small library whose calibration is cached, and how often it was computed."""
+    computed = []
+
+    def counting(*arguments):
+        computed.append(arguments)
+        return calibrate(*arguments)
+
+    monkeypatch.setattr(calibration_cache, "_FEW", 12)
+    monkeypatch.setattr(calibration_cache, "calibrate", counting)
+    with ActionLibrary(tmp_path, create=True) as library:
+        library.learn(draw_movements(12, n_samples=12, labels=LABELS[0]), groups=["ann", "bob"] * 6)
+        yield library, computed
+
+
+def _all_answers(library):
+    recognizer = LibraryRecognizer(library.store)
+    calibration = recognizer.model().calibration
+    found = recognizer.recognize(library.movements())
+    return [(a.label, a.ranked, a.confidence, a.p_known, a.rule, dict(a.p_values)) for a in found], calibration
+
+
+def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
+    library, computed = of_all
+    expected, made = _all_answers(library)
+    (found, read), (again, _) = _all_answers(library), _all_answers(library)
+    assert found == again == expected
+    assert len(computed) == 1
+    for name in vars(made):
+        for one, other in zip(getattr(made, name), getattr(read, name), strict=True):
+            np.testing.assert_array_equal(one, other)
+    (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(b"spoiled")
+    assert _all_answers(library)[0] == expected
+    assert len(computed) == 2
+    with ActionLibrary(tmp_path, read_only=True) as reading:
+        assert _all_answers(reading)[0] == expected
+    assert len(computed) == 2
+
+
+@pytest.mark.parametrize("change", ["learn", "assign", "delete", "rename", "content"])
+def test_a_change_of_the_library_makes_it_again(of_all, tmp_path, change):
+    library, computed = of_all
+    _all_answers(library)
+    kept = (tmp_path / calibration_cache.FILE_OF_ALL).read_bytes()
+    if change == "learn":
+        library.learn(draw_movements(1, n_samples=13, labels=["wave"]))
+    elif change == "assign":
+        library.assign([1], "nod")
+    elif change == "delete":
+        library.learn(draw_movements(1, n_samples=13, labels=["wave"]))
+        library.delete([1])
+    elif change == "rename":
+        library.rename("nod", "bend")
+    else:  # the same ids and names in another folder, whose samples are others
+        digests = calibration_cache._digests(library.store, members_of(library.store))
+        key = calibration_cache._key(library.store, members_of(library.store), digests)
+        assert key != calibration_cache._key(library.store, members_of(library.store), digests[:-5] + b"7)]]]")
+        return
+    (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(kept)
+    _, fresh = _all_answers(library)
+    assert len(computed) == 2
+    (tmp_path / calibration_cache.FILE_OF_ALL).unlink()
+    np.testing.assert_array_equal(_all_answers(library)[1].scales, fresh.scales)
+
+
+def test_a_hostile_calibration_of_all_is_made_again(of_all, tmp_path):
+    library, computed = of_all
+    expected, _ = _all_answers(library)
+    path = tmp_path / calibration_cache.FILE_OF_ALL
+    kept, members = path.read_bytes(), members_of(library.store)
+    key = calibration_cache._key(library.store, members, calibration_cache._digests(library.store, members))
+    for changes in ({"novel own": np.full(12, -1.0)}, {"novel ends": np.array([0, 99, 12])}, {"novel own": None}):
+        path.write_bytes(_archive(**changes)(kept, key))
+        assert _all_answers(library)[0] == expected
+        assert path.read_bytes() == kept
+    assert len(computed) == 4

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kineme
 from kineme import ActionLibrary, Demonstrations
 from kineme.errors import DataError, TrajectoryError
+from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.library.storage.channels import channels_of_text, other_columns
 from kineme.library.storage.folder import FILE
 from kineme.library.storage.read import movements
 from kineme.library.symbols.grounding import learned_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
-from kineme.orientation import exp, product
+from kineme.orientation import PoseDMP, exp, product
 from kineme.primitives.generation.generate import MovementOptions, generate
 
 CHANNELS = (
@@ -103,6 +107,70 @@ def test_names_of_plain_columns_bind_nobody(tmp_path):
         assert library.verify() == []
 
 
+def test_angles_are_stored_once_with_the_positions():
+    channels = (Channel("joint", "angle", ("joint",)), *CHANNELS)
+    assert other_columns(channels) == [1, 5, 6, 7, 8]
+    assert other_columns(channels[:1]) == []
+
+
+def test_angles_beside_orientations_come_back_as_precisely_as_positions(tmp_path):
+    random = np.random.default_rng(0)
+    channels = (Channel("joint1", "angle", ("joint1",), "rad"), *CHANNELS)
+    plain = poses()
+    joint = np.cumsum(random.normal(size=len(plain.positions)))[:, None] * 1e-3 + 2.0
+    columns = np.concatenate((joint, plain.recorded), axis=1)
+    demos = of_channels(replace(plain.movements, positions=columns, recorded=None), channels)
+    with ActionLibrary(tmp_path / "joints", create=True) as library:
+        library.learn(Demonstrations.of_movements(demos))
+        stored = movements(library.store, np.arange(1, 7))
+        np.testing.assert_array_equal(stored.recorded[:, 0], stored.positions[:, 0])
+        np.testing.assert_allclose(stored.recorded, demos.recorded, atol=1e-6)
+
+
+@pytest.mark.parametrize("spoil", [lambda blob: blob[:-4], lambda blob: blob + blob[:4], lambda blob: b""])
+def test_columns_of_another_size_are_refused(library, spoil):
+    folder = library.store.folder
+    library.close()
+    with closing(sqlite3.connect(folder / FILE)) as connection, connection:
+        from kineme.library.storage.rows import seal
+
+        table = connection.execute("SELECT * FROM recorded WHERE movement = 1")
+        names = [one[0] for one in table.description]
+        row = dict(zip(names, table.fetchone(), strict=True))
+        (blob,) = [name for name, value in row.items() if isinstance(value, bytes)]
+        row[blob] = spoil(row[blob])
+        crc = seal("recorded", tuple(value for name, value in row.items() if name != "crc"))
+        connection.execute(f"UPDATE recorded SET {blob} = ?, crc = ? WHERE movement = 1", (row[blob], crc))
+    with ActionLibrary(folder, read_only=True) as damaged, pytest.raises(DataError, match="recorded"):
+        movements(damaged.store, np.array([1]))
+
+
+def _spoiled(**changes):
+    channels = [one._asdict() for one in CHANNELS]
+    channels[changes.pop("at")] |= changes
+    return json.dumps(channels)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _spoiled(at=4, order="zyxw"),
+        _spoiled(at=4, order=""),
+        _spoiled(at=1, order="wxyz"),
+        _spoiled(at=0, kind="angle"),
+        _spoiled(at=4, columns=["a", "b", "c"]),
+        _spoiled(at=1, columns=["a", "b"]),
+        _spoiled(at=1, kind="color"),
+        _spoiled(at=1, unit=5),
+        _spoiled(at=1, name=None),
+    ],
+)
+def test_a_channel_of_which_one_thing_is_wrong_is_refused(text, tmp_path):
+    with pytest.raises(DataError, match="recorded as"):
+        channels_of_text(text, 6, tmp_path)
+    assert channels_of_text(json.dumps([one._asdict() for one in CHANNELS]), 6, tmp_path) == CHANNELS
+
+
 @pytest.mark.parametrize("text", ["[]", "x", '[{"name": 1}]', "[" * 100_000])
 def test_channels_that_are_none_are_refused(library, text):
     folder = library.store.folder
@@ -120,3 +188,68 @@ def test_recognition_and_prediction_are_those_of_the_recognizer(library):
     asked = poses(seed=3)
     expected = kineme.Recognizer().fit(poses()).predict(asked)
     assert [answer.ranked[0] for answer in library.recognize(asked)] == expected.tolist()
+
+
+def test_a_library_says_what_it_was_recorded_as_and_refuses_other_kinds(library):
+    assert library.channels == CHANNELS
+    plain = tuple(Channel(f"j{k}", "position", (f"j{k}",)) for k in range(6))
+    walks = Demonstrations.from_arrays(np.cumsum(np.random.default_rng(0).normal(size=(2, 30, 6)), axis=1))
+    with pytest.raises(TrajectoryError, match=r"expected movements recorded as gripper \(disc.* got j0 \(position\)"):
+        library.recognize(Demonstrations.of_movements(of_channels(walks.movements, plain)))
+
+
+def test_recorded_columns_without_channels_are_recognized_and_learned_as_those_of_the_library(library):
+    asked = poses(seed=3)
+    raw = [kineme.Trajectory(one.times, one.recorded, one.label) for one in asked]
+    expected = [answer.ranked[0] for answer in library.recognize(asked)]
+    assert [answer.ranked[0] for answer in library.recognize(raw)] == expected
+    assert library.learn(asked).added == 6
+    assert library.learn(raw).added == 0
+    assert library.verify() == []
+
+
+def nameless(demos):
+    """Poses as arrays: positions, and quaternions (w, x, y, z)."""
+    blocks = np.split(demos.recorded[:, [1, 2, 3, 7, 4, 5, 6]], demos.offsets[1:-1])
+    return Demonstrations.from_arrays(blocks, demos.labels, [one.times for one in demos])
+
+
+@pytest.mark.parametrize("exhaustive", [0, 100])
+@pytest.mark.parametrize("shown", [nameless, lambda demos: demos], ids=["nameless", "named"])
+def test_generated_poses_are_recognized(library, exhaustive, shown):
+    made = PoseDMP().learn(shown(poses())).rollout(n_samples=100)
+    asked = LibraryRecognizer(library.store, exhaustive=exhaustive)
+    assert [answer.label for answer in asked.recognize(made)] == list("ababab")
+
+
+def test_generated_poses_are_learned_as_poses(tmp_path):
+    made = PoseDMP().learn(nameless(poses())).rollout(n_samples=100)
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(made)
+        assert library.n_dims == 6
+        assert [one.kind for one in library.channels] == ["position"] * 3 + ["orientation"]
+        assert library.learn(made).added == 0
+        assert library.verify() == []
+    with ActionLibrary(tmp_path / "plain", create=True) as library:
+        library.learn(made.positions, labels=list(made.labels))
+        assert (library.n_dims, library.channels) == (7, None)
+        assert library.learn(made[:2]).added == 2, "of plain columns more of them"
+
+
+def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_path):
+    turns = np.cumsum(np.abs(np.random.default_rng(0).normal(size=(4, 60, 1))), axis=1) / 2
+    angles = np.concatenate([(turns + np.pi) % (2 * np.pi) - np.pi, np.cos(turns)], axis=2)
+    channels = (Channel("joint", "angle", ("joint",)), Channel("x", "position", ("x",)))
+    raw = Demonstrations.from_arrays(angles, list("abab"))
+    demos = Demonstrations.from_dataframe(
+        [pd.DataFrame({"t": one.times, "joint": one.positions[:, 0], "x": one.positions[:, 1]}) for one in raw]
+    )
+    assert demos.channels == (channels[0]._replace(period=2 * np.pi), channels[1])
+    assert np.ptp(demos.positions[:, 0]) > 13, "more than a turn, so that values alone would be degrees"
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, labels=list("abab"))
+    with ActionLibrary(tmp_path / "actions") as library:
+        assert library.channels == demos.channels
+        assert [answer.ranked[0] for answer in library.recognize(list(angles))] == list("abab")
+        learned = LibraryRecognizer(library.store).model().comparison.checked(list(angles))
+        np.testing.assert_allclose(learned.positions, demos.positions, atol=1e-9)

@@ -11,7 +11,7 @@ import atexit
 import shutil
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,10 @@ from kineme.kernels import KERNELS, MEANS, averaged
 from kineme.kernels.pair_distances import listed_distances, pair_bounds, pair_distances
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
+from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.trajectories.as_learned import as_learned
+from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.fits import FITS
@@ -441,6 +444,40 @@ def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
     )
 
 
+def recorded_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
+    """What a recording of the replayed poses would be, with a gripper that steps; positions in extents of their own."""
+    elapsed = demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
+    gripper = elapsed > np.repeat(demos.durations / 3.0, demos.lengths)
+    columns = np.column_stack((demos.positions[:, [0, 1, 2, 4, 5, 6, 3]], gripper))
+    channels = (
+        *(Channel(axis, "position", (axis,)) for axis in "xyz"),
+        Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw"),
+        Channel("gripper", "discrete", ("gripper",)),
+    )
+    named = Demonstrations.of_movements(of_channels(replace(demos.movements, positions=columns), channels))
+    primitives = PoseDMP(DMP(n_basis=20)).learn(named)
+    primitives = type(primitives).concatenate([primitives[i] for i in range(len(primitives))])
+    rollout = primitives.rollout(n_samples=200)
+    assert rollout.channels == primitives.to_recording.channels == channels
+    recorded = rollout.demonstrations.recorded.reshape(len(demos), 200, 8)
+    start, unit = demos.positions[demos.offsets[:-1], None, :3], pose_extents(demos)[:, None, None]
+    return each(len(demos), path=(recorded[..., :3] - start) / unit, other=recorded[..., 3:])
+
+
+def learned_coordinates(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Recorded columns as they are learned, and back to columns."""
+    channels = (
+        *(Channel(axis, "position", (axis,)) for axis in "xyz"),
+        Channel("q", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
+    )
+    found = as_learned(demos, channels, 6)
+    plain = as_learned(found, None, 7)
+    return [
+        {"rotation": one.positions[:, 3:], "quaternions": again.positions[:, 3:] * np.sign(again.positions[0, 3])}
+        for one, again in zip(found, plain, strict=True)
+    ]
+
+
 def tangents(demos: Demonstrations) -> list[dict[str, Any]]:
     """There and back, and the quaternions one by one."""
     tangent, references = to_tangent(demos)
@@ -530,6 +567,8 @@ TABLE = [
     *(rhythm_row(RhythmicDMP(fit=fit)) for fit in FITS),
     Batched("RhythmicFeatures", rhythmic_features, 1e-6, draw=rhythms),
     Batched("PoseDMP.learn", pose_numbers, 1e-6, draw=poses),
+    Batched("PoseDMP.learn of channels", recorded_numbers, 1e-6, draw=poses),
+    Batched("as_learned", learned_coordinates, 1e-9, draw=poses),
     Batched("to_tangent", tangents, 1e-12, draw=poses),
     Batched("PoseFeatures", pose_features, 1e-8, draw=poses),
     style_row(),

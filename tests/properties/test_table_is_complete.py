@@ -32,18 +32,18 @@ OTHER_PARTS = {
     "files": "reads and writes files, one by one; reports on whole sets",
     "library": "its class is in the table; what lies under it writes and reads rows of a database",
     "movements.segmentation": "one recording by contract",
+    "robots": "one movement by contract",
     "validation": "checks that raise",
 }
 
 #: Functions that depend on the whole batch by intent, or on one movement by contract.
 EXEMPT = {
     "movements.trajectories.demonstrations.Demonstrations.dimensions": "of columns",
-    "movements.channels.channel.Channel.coordinates": "names of columns",
-    "movements.channels.coordinates.as_wxyz": "another order of columns",
-    "movements.channels.coordinates.from_wxyz": "another order of columns",
     "movements.trajectories.demonstrations.Demonstrations.from_dataframe": "reads tables; from_arrays does the rest",
     "primitives.batch.Batch.join": "the former name of concatenate",
     "primitives.base_rollout.BaseRollout.axis_names": "of columns",
+    "primitives.base_rollout.BaseRollout.channels": "of columns",
+    "primitives.base_rollout.BaseRollout.rate_names": "of columns",
     "primitives.base_rollout.BaseRollout.plot": "one picture",
     "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
     "primitives.rollout_figure.draw_rollout": "one picture",
@@ -56,6 +56,7 @@ EXEMPT = {
     "primitives.pose.pose_controller.PoseState.orientation": "of one movement at one moment",
     "primitives.pose.pose_controller.PoseState.pose": "of one movement at one moment",
     "comparison.bounds.ReducedFeatures.take": "an index into arrays",
+    "recognition.outliers.find_outliers": "compares each with the others of its label",
     "recognition.early.early.earliness": "a score of the whole set",
     "recognition.early.live_state.LiveStatus.messages": "of one stream; its length counts problems",
     "movements.preparation.perturbations.Perturbation.apply": "random numbers are drawn for the batch in its order",
@@ -82,6 +83,8 @@ EXEMPT = {
     "primitives.discrete.choose.score": "one score of the whole batch",
     "primitives.discrete.dmp.DMP.choose": "one specification for the whole batch; see test_choose.py",
     "primitives.styles.average.average": "a mean of the batch; see test_order_of_training.py",
+    "primitives.styles.average.AveragePrimitive.log_likelihood": "one by one, too, in test_likelihood.py",
+    "primitives.styles.blending.encoded": "of `AveragePrimitive.blend`, one average",
     "primitives.styles.average.average_by_label": "means of the batch, by `average`",
     "primitives.styles.figure.draw_morph": "one picture",
     "primitives.styles.learn.learn_styles": "what differs within the batch; see test_order_of_training.py",

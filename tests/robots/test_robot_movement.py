@@ -38,7 +38,7 @@ def test_every_arm_follows_a_stroke_within_its_limits(name, timing):
 
 def test_a_stroke_that_is_too_fast_is_refused_with_the_duration_that_works():
     robot = load("ur5e")
-    with pytest.raises(InfeasibleError, match=r"limit .* it works in .* s instead of 0\.4") as caught:
+    with pytest.raises(InfeasibleError, match=r"limit .* It works in .* s instead of 0\.4") as caught:
         move(stroke(robot, 0.4), robot)
     made = move(stroke(robot, 0.4), robot, timing="slowed")
     assert made.preflight.passed

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.channels import differences
 from kineme.cli.options import Finite, force_option, json_option, library_option
 from kineme.cli.output import check_new, say
 from kineme.cli.reading import layout_options, read, recordings_argument
@@ -73,12 +74,14 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
             _check_folder(target, force)
     with ActionLibrary(folder, read_only=True) as library, _progress(parsed) as progress:
         found = find(library.store, parsed, error_rate, progress)
+        notes = differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {
         "annotations": [as_row(one) for one in found.annotations],
         "seconds": float(parsed.demonstrations.durations.sum()),
         "calibrated": found.calibrated,
         "written": [str(one) for one in written],
+        "notes": notes,
         "problems": [str(one) for one in (*parsed.problems, *found.problems)],
     }
     say(as_json, data, lambda: _text(data))
@@ -120,6 +123,7 @@ def _text(data: dict[str, Any]) -> str:
             "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
             "differ; learn more of each"
         )
+    lines += map(printable, data["notes"])
     lines += [f"not annotated: {printable(problem)}" for problem in data["problems"]]
     return "\n".join([*lines, *(f"written to {printable(one)}" for one in written)])
 

@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from kineme.cli.options import (
-    SPECIFICATION,
     Finite,
     Numbers,
     SymbolName,
@@ -20,7 +18,8 @@ from kineme.cli.options import (
     whole,
 )
 from kineme.cli.output import check_new, write, write_bytes
-from kineme.cli.reading import LAYOUT_OPTIONS, layout_options, read
+from kineme.cli.reading import layout_options
+from kineme.cli.source import read_source
 from kineme.output.text import printable
 
 _BAD_FIT = 0.05  # of the extent of the recording
@@ -29,8 +28,12 @@ _BAD_FIT = 0.05  # of the extent of the recording
 @click.command(short_help="Generate a movement from a symbol or a recording.")
 @click.argument("source", type=SymbolName())
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
-@click.option("--start", type=Numbers(), help="Start position.  [default: as demonstrated]")
-@click.option("--goal", type=Numbers(), help="Goal position.  [default: as demonstrated]")
+@click.option(
+    "--start",
+    type=Numbers(),
+    help="Where it starts: a value for each column but discrete ones.  [default: as demonstrated]",
+)
+@click.option("--goal", type=Numbers(), help="Where it ends, likewise.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
 @click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
 @click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
@@ -58,12 +61,15 @@ def generate(**options: Any) -> None:
     kineme generate wave --library actions/ --goal 0.4,0.2 --duration 2 -o wave.csv
     kineme generate wave.csv --goal 0.4,0.2 --duration 2 -o new.csv --plot new.png
     """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.primitives.generation.generate import checked_point
     from kineme.primitives.generation.generate import generate as make
 
     for name in ("output", "save", "plot"):
         check_new(options[name], options["force"], options["source"])
-    learned = _learned(options)
+    learned = read_source(options)
     wanted = _movement_options(options)
+    for name in ("start", "goal"):
+        checked_point(learned, getattr(wanted, name), f"--{name}")
     made = make(learned, wanted)
     _warn_of_bad_fit(learned)
     if options["save"]:
@@ -73,56 +79,17 @@ def generate(**options: Any) -> None:
     _write(options["output"], made, ".json" if options["as_json"] else ".csv")
 
 
-def _learned(options: dict[str, Any]) -> Any:
-    """The primitive of a symbol, a recording or a file, with the recording that it is of."""
-    source = options["source"]
-    if _is_symbol(source, options["folder"]):
-        from kineme.library.library import ActionLibrary
-        from kineme.library.symbols.grounding import learned_of
-
-        with ActionLibrary(options["folder"], read_only=True) as library:
-            return learned_of(library.store, source)
-    from kineme.primitives.discrete.dmp import DMP
-    from kineme.primitives.generation.learned import SAVED, Learned, learn_one, load_saved
-
-    if source != "-" and not Path(source).exists():
-        raise FileNotFoundError(
-            f"expected a recording or a saved primitive, found no file {printable(source)}; "
-            "for a symbol, name its --library"
-        )
-    if Path(source).suffix.lower() == SAVED:
-        return Learned(_chosen(load_saved(Path(source)), options))
-    dmp = DMP(**{name: options[name] for name in SPECIFICATION})
-    recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
-    return learn_one(_chosen(recordings, options), dmp)
-
-
-def _chosen(several: Any, options: dict[str, Any]) -> Any:
-    """The one that is asked for by --index, or the only one."""
-    n, index = len(several), options["index"]
-    if index is None and n > 1:
-        raise click.UsageError(f"expected one movement, {printable(options['source'])} holds {n}; choose with --index")
-    if index is not None and index >= n:
-        raise click.BadParameter(f"{printable(options['source'])} holds {n}, counted from 0", param_hint="--index")
-    return several[index or 0]
-
-
 def _warn_of_bad_fit(learned: Any) -> None:
-    from kineme.primitives.generation.learned import largest_deviation
+    from kineme.primitives.generation.deviation import largest_deviation
 
     off = largest_deviation(learned)
-    if off is not None and off[1] > _BAD_FIT:
+    if off is not None and off.share > _BAD_FIT:
+        of = f"in its {printable(off.of)}, " if off.of else ""
         write(
-            f"warning: the fit is off the recording by up to {off[0]:.3g}, {100 * off[1]:.2g} % of its extent; "
-            "see it with --plot, and try more basis functions with --n-basis",
+            f"warning: the fit is off the recording {of}by up to {off.largest:.3g}, {100 * off.share:.2g} % of its "
+            "extent; see it with --plot, and try more basis functions with --n-basis",
             err=True,
         )
-
-
-def _is_symbol(source: str, folder: Path | None) -> bool:
-    """Whether SOURCE is a symbol: with --library always; with a library from the environment, unless a file exists."""
-    given = click.get_current_context().get_parameter_source("folder")
-    return folder is not None and (given != ParameterSource.ENVIRONMENT or not Path(source).exists())
 
 
 def _movement_options(options: dict[str, Any]) -> Any:

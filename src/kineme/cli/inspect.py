@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import json_option
+from kineme.cli.options import Finite, json_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read, recordings_argument
 
@@ -16,13 +16,23 @@ from kineme.cli.reading import layout_options, read, recordings_argument
 @recordings_argument
 @layout_options
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
+@click.option(
+    "--outliers/--no-outliers", default=True, show_default=True, help="Look for movements unlike others of their label."
+)
+@click.option(
+    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
+    help="Share of false alarms among the outliers.",
+)  # fmt: skip
 @json_option
-def inspect(recordings: tuple[Path, ...], plot: Path | None, as_json: bool, **options: Any) -> None:
+def inspect(
+    recordings: tuple[Path, ...], plot: Path | None, outliers: bool, error_rate: float, as_json: bool, **options: Any
+) -> None:
     """Inspect RECORDINGS: files, folders, patterns of them, or - for CSV from the standard input.
 
     Shows, per label: how many movements, how long, sampled how fast and how evenly, with which gaps. Below: how the
     files were understood, movements that occur twice, and what could not be read and why. In a folder, the name of
-    the innermost folder is the label. Topics and frames of ROS bags are listed first.
+    the innermost folder is the label. Topics and frames of ROS bags are listed first. Outliers, movements unlike the
+    others of their label, are listed last, if there are at least 20 movements, 5 of a label.
 
     Example: kineme inspect recordings/ --plot recordings.png
     """
@@ -35,24 +45,50 @@ def inspect(recordings: tuple[Path, ...], plot: Path | None, as_json: bool, **op
 
     files = [one for one in recordings if str(one) != "-"]
     contents = contents_of_all(files, options["follow_links"])
+    unlike: tuple[int, ...] = ()
+    found: dict[str, Any] = {}
     try:
         recorded = read(recordings, options)
     except DataError as error:
         if not contents or plot is not None:
             raise
         summary = nothing_read(in_words(recordings), str(error))
-        text = f"not read: {error}"
+        texts = [f"not read: {error}"]
     else:
-        if plot is not None:
-            _draw(recorded, plot)
         summary = summarize(recorded)
-        text = as_words(summary)
-    data = as_data(summary) | ({"contents": contents_as_data(contents)} if contents else {})
-    say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), text]))
+        texts = [as_words(summary)]
+        if outliers:
+            unlike, found, words = _outliers(recorded, error_rate)
+            texts += [words] if words else []
+        if plot is not None:
+            _draw(recorded, unlike, plot)
+    data = as_data(summary) | found | ({"contents": contents_as_data(contents)} if contents else {})
+    say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
 
 
-def _draw(recorded: Any, path: Path) -> None:
+def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[str, Any], str]:
+    """Indices of the outliers; what is said of them as data, and in words."""
+    from tqdm import tqdm
+
+    from kineme.errors import KinemeError
+    from kineme.recognition.outlier_report import outliers_as_data, outliers_as_words
+    from kineme.recognition.outliers import find_outliers
+
+    names = recorded.short_names
+    try:
+        with tqdm(total=len(names), desc="comparing", unit="movement", leave=False, disable=None) as bar:
+            found = find_outliers(recorded, recorded.labels, error_rate, lambda done: bar.update(done - bar.n))
+    except KinemeError as error:
+        return (), {}, f"outliers were not looked for: {error}"
+    return (
+        tuple(one.index for one in found.found),
+        {"outliers": outliers_as_data(found, names)},
+        outliers_as_words(found, names),
+    )
+
+
+def _draw(recorded: Any, unlike: tuple[int, ...], path: Path) -> None:
     from kineme.files.inspection.figure import draw_recordings
     from kineme.output.figures import save_figure
 
-    save_figure(draw_recordings(recorded), path)
+    save_figure(draw_recordings(recorded, unlike), path)

@@ -41,8 +41,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     The library is created if it does not exist. In a folder, the name of the innermost folder is the label. Movements
     that are stored already are not stored again; what cannot be read is listed, and the rest is learned.
 
-    Where several people show movements and others will be recognized, say who showed what, with --person or
-    --by-person: kineme recognize then knows how much people differ, and calls fewer movements of new ones unknown.
+    Where several people show movements and others will be recognized, say who showed what, with --person,
+    --person-column or --by-person: kineme recognize then knows how much people differ, and calls fewer movements of
+    new ones unknown.
 
     A long recording is cut by a table of what happens when, with --labels: CSV, JSON, a document of ELAN or its
     tab-delimited export, or labels of Audacity. Stretches without label are stored without.
@@ -95,7 +96,7 @@ def _people(root: Path, recordings: Any, person: str | None, by_person: bool) ->
     from kineme.files.people import each_person
 
     if recordings.people is not None and person is not None:
-        raise click.UsageError("expected --person or {person} in --label-pattern, not both")
+        raise click.UsageError("expected --person, or people from --person-column or --label-pattern, not both")
     if not by_person:
         return recordings.people if person is None else [person] * len(recordings)
     people = each_person(root, recordings.sources)

@@ -17,6 +17,7 @@ from kineme.cli.inspect import inspect
 from kineme.cli.learn import learn
 from kineme.cli.library import library
 from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
+from kineme.cli.move import move
 from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
@@ -64,6 +65,7 @@ main.add_command(anchor)
 main.add_command(annotate)
 main.add_command(evaluate)
 main.add_command(generate)
+main.add_command(move)
 main.add_command(inspect)
 main.add_command(learn)
 main.add_command(library)

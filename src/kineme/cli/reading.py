@@ -87,6 +87,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--columns", type=Heads(), help="Columns of the coordinates."),
     click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
+    click.option("--person-column", metavar="COLUMN", help="Column of who showed the movements of a table."),
     click.option("--units", type=Unit(), help="Unit of the time stamps, by name or in seconds."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
@@ -116,7 +117,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
 
 #: Names of the parameters that `layout_options` adds.
 LAYOUT_OPTIONS = (
-    "time", "columns", "movement", "label_column", "units", "skip", "kinds", "topic", "frame",
+    "time", "columns", "movement", "label_column", "person_column", "units", "skip", "kinds", "topic", "frame",
     "label_pattern", "label_by", "trim", "follow_links",
 )  # fmt: skip
 
@@ -140,7 +141,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any]) -> Any:
     from kineme.files.recordings import read_paths
     from kineme.movements.tables.layout import Layout
 
-    known = {"label" if name == "label_column" else name: value for name, value in options.items()}
+    known = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
     how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
     known["kinds"] = dict(known.get("kinds") or ()) or None

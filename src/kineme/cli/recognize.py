@@ -8,11 +8,13 @@ from typing import Any
 
 import click
 
+from kineme.cli.channels import differences
 from kineme.cli.options import Finite, json_option, library_option, whole
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import printable
 
+_SMALLEST = 0.001  # p-value that is shown; JSON has all digits
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
@@ -45,9 +47,11 @@ def recognize(
     parsed = read(recordings, options)
     with ActionLibrary(folder, read_only=True) as library:
         answers = _recognized(library, parsed.demonstrations, error_rate)
+        notes = differences(library.channels, parsed.demonstrations.channels)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [_as_data(source, one, stored, top) for source, one in zip(parsed.sources, answers, strict=True)],
+        "notes": notes,
         "problems": [str(problem) for problem in parsed.problems],
     }
     say(as_json, data, lambda: _text(data, error_rate))
@@ -103,7 +107,7 @@ def _text(data: dict[str, Any], error_rate: float) -> str:
              "" if one["symbol"] is None else _relative(one["transform"]))
         )  # fmt: skip
     heads = ("recording", "symbol", "confidence", "ranked, with p-values", "most like", "relative to it")
-    lines = [to_text(Table("", heads, rows))]
+    lines = [to_text(Table("", heads, rows)), *map(printable, data["notes"])]
     if not all(one["calibrated"] for one in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
@@ -121,4 +125,6 @@ def _relative(transform: dict[str, Any]) -> str:
 
 
 def _share(p_value: float | None) -> str:
-    return "" if p_value is None else f"{p_value:.2g}"
+    if p_value is None:
+        return ""
+    return f"{p_value:.2g}" if p_value >= _SMALLEST else f"<{_SMALLEST:g}"

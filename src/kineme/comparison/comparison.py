@@ -14,9 +14,10 @@ from kineme.comparison.normalization import Normalization
 from kineme.comparison.representation import Representation
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.soft_rotation import RotationPrior
+from kineme.movements.channels.channel import Channels
+from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 
@@ -34,12 +35,15 @@ class Comparison:
         Movements are smoothed below this many cycles each; None for not at all.
     similarity : AveragedSimilarity
         With the distance, the widths, the weights and the average.
+    channels : tuple of Channel or None
+        What was recorded of the movements that it was fitted to; None if that is not known.
     """
 
     representations: tuple[Representation, ...]
     normalization: Normalization
     cutoff: float | None
     similarity: AveragedSimilarity
+    channels: Channels | None = None
 
     @property
     def procrustes(self) -> Procrustes:
@@ -65,21 +69,17 @@ class Comparison:
             self.representations, self.normalization, self.cutoff, angle, self.mean, prior or RotationPrior()
         )
 
-    def checked(self, movements: MovementsLike) -> Demonstrations:
-        """The movements as `Demonstrations`.
+    def checked(self, movements: MovementsLike, what: str = "movements") -> Demonstrations:
+        """The movements as `Demonstrations`, in the coordinates that were learned; see `as_learned`.
+
+        `what` they are called in messages.
 
         Raises
         ------
         TrajectoryError
-            Movements of another number of dimensions.
+            Movements of another number of dimensions, or of channels of other kinds.
         """
-        demos = Demonstrations.of(movements)
-        if demos.n_dims != self.n_dims:
-            raise TrajectoryError(
-                f"expected movements of {self.n_dims} dimensions as in fit, got {demos.n_dims}; "
-                "select the dimensions by columns= of read_recordings, in the shell --columns"
-            )
-        return demos
+        return as_learned(movements, self.channels, self.n_dims, what)
 
     def prepared(self, rows: tuple[NDArray[np.floating[Any]], ...]) -> Described:
         """Feature rows, as from `feature_rows`, ready for comparison."""

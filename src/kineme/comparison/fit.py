@@ -18,6 +18,9 @@ from kineme.comparison.specification import ComparisonSpecification
 from kineme.comparison.weights import WEIGHTS, given_weights
 from kineme.comparison.widths import impostor_widths
 from kineme.errors import SpecificationError
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.coordinates import with_periods
+from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import check_choice
@@ -53,20 +56,26 @@ def fit_comparison(
     SpecificationError
         Weights that do not fit the specification, or movements that are all the same.
     """
+    demos = Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
     order = np.argsort(labels, kind="stable")
     demos, labels = demos[order], labels[order]
     with single_threaded_blas():  # products of few rows: a second thread mostly waits
         rows = feature_rows(demos, specification)
         references = References.of(demos, prepare(rows, specification, specification.procrustes(demos.n_dims)), labels)
-        return fit_to_references(specification, references, weights)
+        channels = None if demos.channels is None else with_periods(demos.channels, demos.recorded)
+        return fit_to_references(specification, references, weights, channels)
 
 
 def fit_to_references(
     specification: ComparisonSpecification,
     references: References,
     weights: str | Sequence[float] = "auto",
+    channels: Channels | None = None,
 ) -> tuple[Comparison, References]:
-    """As `fit_comparison`, of movements that are described already, in all representations of the specification."""
+    """As `fit_comparison`, of movements that are described already, in all representations of the specification.
+
+    `channels` are what was recorded of them, where that is known.
+    """
     described, labels = references.described, references.labels
     representations = specification.representations
     with single_threaded_blas():
@@ -90,5 +99,6 @@ def fit_to_references(
         specification.normalization,
         specification.cutoff,
         replace(similarity, weights=values),
+        channels,
     )
     return whole.select(kept), replace(references, described=described.select(kept))

@@ -140,4 +140,5 @@ def take_movements(block: Block, chosen: Flags) -> Block:
     ends = kept.offsets[np.concatenate(([True], chosen))]
     labels = [label for label, one in zip(block.labels, chosen, strict=True) if one]
     places = [place for place, one in zip(block.places, chosen, strict=True) if one]
-    return replace(kept, offsets=ends, labels=labels, places=places)
+    people = block.people and [person for person, one in zip(block.people, chosen, strict=True) if one]
+    return replace(kept, offsets=ends, labels=labels, places=places, people=people)

@@ -23,7 +23,8 @@ _HINT = "check the order of the columns, or divide the quaternions by their norm
 def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRead], Channels | None, list[Problem]]:
     """The channels of files with equally many columns, the files that have them, and problems.
 
-    Kinds are found for all files together: a gripper that no file opens is one still. Files of other heads are merged
+    Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
+    continuously is a position in all of them. Files of other heads are merged
     by the order of their columns while all are positions or angles, without the wraps of angles, and then nothing is
     known of the channels; else they are problems.
 

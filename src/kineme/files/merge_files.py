@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.files.column_order import in_one_order
 from kineme.files.file_channels import with_channels
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
@@ -44,7 +45,7 @@ class Source(NamedTuple):
         Which movement of the file: its key in a long table, its index in arrays; empty if the file holds but one.
     label : str or None
     person : str or None
-        Who showed it, where ``label_pattern`` says it.
+        Who showed it, where a column or ``label_pattern`` says it.
     """
 
     path: str
@@ -92,9 +93,22 @@ class Recordings(MovementSequence):
 
     @property
     def people(self) -> list[str | None] | None:
-        """Who showed each movement, as ``{person}`` in ``label_pattern`` says it; None where it says nothing."""
+        """Who showed each movement, by a column, or ``{person}`` in ``label_pattern``; None where these say nothing."""
         people = [source.person for source in self.sources]
         return people if any(people) else None
+
+    @property
+    def short_names(self) -> list[str]:
+        """A name for each movement: its place where all are of one file, as ``episode 3``; else file and place."""
+        one_file = len({source.path for source in self.sources}) == 1
+        return [
+            source.place
+            if source.place and one_file
+            else f"{source.path}#{source.place}"
+            if source.place
+            else source.path
+            for source in self.sources
+        ]
 
     def __repr__(self) -> str:
         n_files = len({source.path for source in self.sources})
@@ -144,17 +158,23 @@ def merge_files(
         Problem(one.path, None, f"{_block(one).positions.shape[1]} dimensions where most have {n_dims}") for one in odd
     ]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
-    full, channels, odd_channels = with_channels(full, kinds or {})
+    understood = {one.path: one.detected for one in full}
+    full, channels, odd_channels = with_channels(in_one_order(full), kinds or {})
     listed += odd_channels
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
     sources = tuple(
-        Source(one.path, one.sha256, one.size, one.mtime, place, label, one.person)
+        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person)
         for one in full
-        for place, label in zip(_block(one).places, _block(one).labels, strict=True)
+        for place, label, person in zip(_block(one).places, _block(one).labels, _people(one), strict=True)
     )
-    detected = Counter(one.detected for one in full if one.detected)
+    detected = Counter(how for one in full if (how := understood[one.path]))
     return Recordings(_demonstrations(full, sources, channels), sources, tuple(listed), tuple(detected.most_common()))
+
+
+def _people(one: FileRead) -> Sequence[str | None]:
+    """Who showed each movement, as the file says it."""
+    return _block(one).people or [None] * len(_block(one).labels)
 
 
 def _block(one: FileRead) -> Block:

@@ -81,6 +81,11 @@ class NameRule:
             raise self._not_understood("there is no text between two fields")
         return tuple(merged)
 
+    @property
+    def names_person(self) -> bool:
+        """Whether the pattern says who showed the movements."""
+        return PERSON in {part.field for part in self.parts}
+
     def apply(self, read: FileRead, path: Path) -> FileRead:
         """A file with the labels that its path says; one that the pattern does not match is a problem."""
         if read.block is None:

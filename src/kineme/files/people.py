@@ -32,8 +32,8 @@ def people_of(path: Path, sources: Sequence[Source]) -> NDArray[Any] | None:
 def each_person(path: Path, sources: Sequence[Source]) -> list[str | None]:
     """The person of each movement, or None where it is unknown.
 
-    Where a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one entry for
-    each movement. Else the folder above that of the label: ``person/label/recording``.
+    Where a column or a label pattern names the person, that one. In an npz archive, an array named as in `NAMES`, one
+    entry for each movement. Else the folder above that of the label: ``person/label/recording``.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -115,7 +116,9 @@ def _parsed(parse: Callable[[], Parsed], form: Format, relative: Path, layout: L
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     labels = [label if one is None else _storable(one) for one in block.labels]
-    block = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
+    people = block.people and [None if one is None else _storable(one) for one in block.people]
+    bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
+    block = replace(bare, people=people)
     problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
     return FileRead(name, "", 0, 0.0, detected, block, problems)
 

@@ -33,6 +33,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     kinds: Mapping[str, str] | None = None,
     topic: str | Sequence[str] | None = None,
     frame: str | Sequence[str] | None = None,
+    person: Column | None = None,
     label_pattern: str | None = None,
     label_by: str | int | None = None,
     trim: bool = False,
@@ -64,12 +65,15 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     kinds : mapping, optional
         What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
         "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
-        `Demonstrations.channels`.
+        `Demonstrations.channels`. As in `columns`, what several heads begin with stands for all of them.
     topic : str or sequence of str, optional
         Topics of ROS bags; of several, the others are interpolated to the stamps of the first. By default the only
         one that can be read.
     frame : str or sequence of str, optional
         Frames of ROS bags as ``"parent:child"``: the pose of the child in the parent, composed of the transforms.
+    person : str or int, optional
+        Column of a table that names who showed a movement; another movement begins where it changes. People are in
+        `Recordings.people`.
     label_pattern : str, optional
         File names that say the label, who showed the movements, or both: ``"{person}_{label}_{n}.csv"``. Text outside
         the braces is taken literally, ``{n}`` is a number, other fields are passed over, and each takes as little as it
@@ -93,7 +97,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     SpecificationError
         An unknown unit or choice, a label pattern that cannot be understood, or a limit of memory that is no number.
     """
-    layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame)
+    layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame, person)
     rule = NameRule(label_pattern, label_by)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
     return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, progress=progress)
@@ -113,6 +117,8 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     max_file_bytes()
     if rule.label_by is not None and layout.label is not None:
         raise SpecificationError("expected label or label_by, not both")
+    if rule.names_person and layout.person is not None:
+        raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
     entries, problems = entries_of(paths, follow_links)
     read, where = [], list(paths)
     if standard_input is not None:
@@ -127,6 +133,11 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
         read.append(rule.apply(one, path))
     recordings = merge_files(read, in_words(where), problems, layout.kinds)
+    if layout.person is not None and recordings.people is None:
+        raise DataError(
+            f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "
+            "say who showed them with label_pattern=, in the shell also with --by-person or --person"
+        )
     return trimmed(recordings) if trim else recordings
 
 

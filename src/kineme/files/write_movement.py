@@ -102,13 +102,13 @@ def _checked(columns: Mapping[str, ArrayLike], names: ColumnNames | None) -> Col
 
 def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     one = as_recording(movement)
-    if one.channels is not None:
-        named = ColumnNames(recorded_names(one.channels), learned_names(one.channels))
-        return {"times": one.times, "positions": one.recorded}, named
     derivatives = {name: np.asarray(getattr(movement, name)[0]) for name in _DERIVATIVES if hasattr(movement, name)}
-    rates: Any = getattr(movement, "rate_names", None)  # of poses
-    of_poses = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
-    return {"times": one.times, "positions": one.positions, **derivatives}, of_poses
+    rates: Any = getattr(movement, "rate_names", None)  # of rollouts
+    if one.channels is not None:
+        named = ColumnNames(recorded_names(one.channels), tuple(rates or learned_names(one.channels)))
+        return {"times": one.times, "positions": one.recorded, **derivatives}, named
+    of_rollout = None if rates is None else ColumnNames(tuple(getattr(movement, "axis_names", ())), tuple(rates))
+    return {"times": one.times, "positions": one.positions, **derivatives}, of_rollout
 
 
 def _csv(columns: Columns, names: ColumnNames | None) -> bytes:

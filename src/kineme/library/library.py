@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from kineme.library.storage.versions import Version
     from kineme.library.symbols.proposals import LibraryProposals
     from kineme.library.symbols.review import Review
+    from kineme.movements.channels.channel import Channels
     from kineme.movements.trajectories.demonstrations import Demonstrations
     from kineme.movements.trajectories.movements_like import HasDemonstrations
     from kineme.movements.trajectories.trajectory import Trajectory
@@ -129,6 +130,11 @@ class ActionLibrary:
     def n_dims(self) -> int | None:
         """Dimensions that all movements share; None before the first."""
         return self.store.n_dims
+
+    @property
+    def channels(self) -> Channels | None:
+        """What its movements were recorded as, and those to be recognized should be; None if that is not known."""
+        return self.store.channels
 
     @property
     def specification(self) -> Specification:
@@ -264,7 +270,7 @@ class ActionLibrary:
         SpecificationError
             No movement belongs to a symbol, or there is only one movement.
         TrajectoryError
-            Movements of another number of dimensions.
+            Movements of another number of dimensions, or of channels of other kinds than those that were learned.
         """
         return self._recognizer.recognize(movements, error_rate)
 

@@ -19,6 +19,10 @@ table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabu
 caption { text-align: left; white-space: nowrap; font-weight: 600; padding-bottom: .4rem; font-size: .95rem; }
 th, td { padding: .28rem .7rem .28rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e3e3e3; }
 thead th { border-bottom: 1.5px solid #1a1a1a; } tbody th { font-weight: 500; }
+@media (max-width: 40rem) {
+  caption { white-space: normal; max-width: calc(100vw - 2rem); }
+  th, td { padding-right: .4rem; }
+}
 footer { color: #555; font-size: .85rem; margin-top: 3rem; border-top: 1px solid #ddd; padding-top: 1rem; }
 """
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, overload
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
@@ -63,6 +64,11 @@ class BaseRollout(ABC):
         return self._batch.to_recording
 
     @property
+    def _column_channels(self) -> Channels | None:
+        """What the columns of `positions` are, where these are no coordinates and no recording is known."""
+        return None
+
+    @property
     @abstractmethod
     def _batch(self) -> Batch:
         """The primitives that move, one for each movement or one for all."""
@@ -110,6 +116,9 @@ class BaseRollout(ABC):
         Of primitives that were learned from recordings with named columns they are what a recording of the movement
         would be: orientations in the recorded order, and discrete channels that step where they did.
 
+        Of other poses the positions are the columns that are generated, quaternions (w, x, y, z) too. Their channels
+        say so, and recognition converts them.
+
         Raises
         ------
         TrajectoryError
@@ -117,9 +126,13 @@ class BaseRollout(ABC):
         """
         made = Demonstrations.from_arrays(self.positions, self.labels, list(self.times), self.names, copy=False)
         about = self._to_recording
-        if about is None:
+        if about is not None:
+            return Demonstrations.of_movements(with_recorded(made.movements, about, self._shares, len(self._batch)))
+        if (columns := self._column_channels) is None:
             return made
-        return Demonstrations.of_movements(with_recorded(made.movements, about, self._shares, len(self._batch)))
+        return Demonstrations.of_movements(
+            replace(made.movements, channels=columns, dimensions=recorded_names(columns))
+        )
 
     @property
     def trajectories(self) -> Demonstrations:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.channels.channel import Channels, is_plain, learned_names, same_columns
 from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
 from kineme.movements.preparation.preprocess import Step, preprocess
 from kineme.movements.preparation.trim import TrimRest
@@ -105,7 +105,7 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
 def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
     """That of several batches, one after the other; None if they were not recorded as the same."""
     known = [one for one in several if one is not None]
-    if len(known) < len(several) or any(one.channels != known[0].channels for one in known):
+    if len(known) < len(several) or not all(same_columns(one.channels, known[0].channels) for one in known):
         return None
     steps = [one.steps for one in known if one.steps is not None]
     return replace(known[0], steps=concatenated(steps)) if steps else known[0]

@@ -218,10 +218,11 @@ def calibrate(
     known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
     scales = np.array([known[int(size)].scales[c] for c, size in enumerate(counts)])
     novelties = {size: _novelties(scored, others, scales) for size, scored in known.items()}
+    pooled = {size: scored.pooled() for size, scored in known.items()}
     return Calibration(
         scales,
         tuple(finite(block.nearest(int(n))[0] / s) for block, n, s in zip(blocks, counts, scales, strict=True)),
-        tuple(known[int(size)].pooled() for size in counts),
+        tuple(pooled[int(size)] for size in counts),
         tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
         tuple(novelties[int(size)][0] for size in counts),
     )

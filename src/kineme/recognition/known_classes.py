@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, cast
 
@@ -14,7 +14,9 @@ from kineme.comparison.described import Described
 from kineme.comparison.fit import fit_comparison, fit_to_references
 from kineme.comparison.references import References
 from kineme.comparison.scores import nearest, score
+from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, answers, known_labels
@@ -22,6 +24,9 @@ from kineme.recognition.classifiers import Classifier, fit_classifier
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import Array
+
+#: What calibrates references, as `calibrate` does.
+Calibrates = Callable[[AveragedSimilarity, References, NDArray[np.intp] | None], Calibration]
 
 
 class FittedRecognizer(Protocol):
@@ -81,26 +86,33 @@ def known_classes(known: FittedRecognizer | MovementsLike) -> KnownClasses:
     return _known(*fit_comparison(ComparisonSpecification(), demos, labels), "auto")
 
 
-def fit_known_classes(
+def fit_known_classes(  # noqa: PLR0913, PLR0917 - what a recognizer is made of
     specification: ComparisonSpecification,
     references: References,
     weights: str | Sequence[float] = "auto",
     classifier: str = "auto",
     groups: NDArray[np.intp] | None = None,
+    channels: Channels | None = None,
+    calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
     """Fit to references that are described already, see `kineme.comparison.fit.fit_to_references`.
 
     With `groups`, such as people, each a number, the calibration compares no reference with another of its group.
+    `channels` are what was recorded of the movements, where that is known. `calibrated` may keep calibrations.
     """
-    return _known(*fit_to_references(specification, references, weights), classifier, groups)
+    return _known(*fit_to_references(specification, references, weights, channels), classifier, groups, calibrated)
 
 
 def _known(
-    comparison: Comparison, references: References, classifier: str, groups: NDArray[np.intp] | None = None
+    comparison: Comparison,
+    references: References,
+    classifier: str,
+    groups: NDArray[np.intp] | None = None,
+    calibrated: Calibrates = calibrate,
 ) -> KnownClasses:
     with single_threaded_blas():  # products of few rows: a second thread waits for most of the time, and in the way
         fitted = fit_classifier(classifier, comparison, references)
-        calibration = calibrate(comparison.similarity, references, groups)
+        calibration = calibrated(comparison.similarity, references, groups)
     return KnownClasses(comparison, references, fitted, calibration)
 
 

@@ -22,6 +22,7 @@ from kineme.comparison.representation import Representation, default_representat
 from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.soft_rotation import RotationPrior
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
@@ -87,6 +88,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         Their kernel widths.
     n_dims_ : int
         Dimensions of the movements.
+    channels_ : tuple of Channel or None
+        What was recorded of the movements; None if that is not known. Movements to be recognized are converted by them.
     comparison_ : Comparison
     references_ : References
 
@@ -202,6 +205,11 @@ class Recognizer(ClassifierMixin, BaseEstimator):
     def n_dims_(self) -> int:
         """Number of dimensions of the movements."""
         return self._fitted[0].n_dims
+
+    @property
+    def channels_(self) -> Channels | None:
+        """What was recorded of the movements, and is expected of those to be recognized; None if it is not known."""
+        return self._fitted[0].channels
 
     def describe(self, X: MovementsLike) -> Described:
         """Movements described as the stored ones are, ready to be compared with them."""

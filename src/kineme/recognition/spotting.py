@@ -80,11 +80,7 @@ def spot(
     check_count("max_pieces", max_pieces, 1)
     lasting = durations_of(references)
     whole = _as_timed(recording) if lasting is not None else as_recording(recording)
-    if whole.n_dims != comparison.n_dims:
-        raise TrajectoryError(
-            f"expected a recording of {comparison.n_dims} dimensions as in fit, got {whole.n_dims}; "
-            "select the dimensions by columns= of read_recordings, in the shell --columns"
-        )
+    whole = comparison.checked([whole], "a recording")[0]
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(whole, durations, max_pieces)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ from kineme.validation import Array, as_numbers, check_choice, check_number
 
 _TIMINGS = ("generated", "slowed", "fastest")
 _SPACES = ("tip", "joints")
+_DENSE = 150  # poses at least for which the joints are solved, whatever the duration
 _ROUNDS = 4  # of slowing down: torques do not fall as fast as velocities do
 _A_LITTLE = 1 + 1e-6
 
@@ -82,6 +83,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     timing: str = "generated",
     rate: float = 100.0,
     start: ArrayLike | None = None,
+    steps: Mapping[str, Array] | None = None,
     force: bool = False,
 ) -> RobotMovement:
     """Make a movement of the tip or of the joints executable on an arm, and check it.
@@ -109,6 +111,8 @@ def move(  # noqa: PLR0913 - one parameter per option
         Samples per second of what is sent.
     start : array_like of shape (n,), optional
         Where the joints stand now; by default the rest posture. The approach begins there.
+    steps : dict of str to array_like of shape (T,), optional
+        Discrete channels, as of a gripper, at the samples of the movement: kept as steps, whatever the timing.
     force : bool, default False
         Return a trajectory that did not pass its checks.
 
@@ -142,17 +146,9 @@ def move(  # noqa: PLR0913 - one parameter per option
     else:
         ik = InverseKinematics(robot, follow)
         path, joints = _inverse(ik, _path(ik, times, positions, orientation, plane), place)
-    curve = CubicSpline(times, joints)
-    if timing == "fastest":
-        curve, chosen = fastest(robot, curve, rate)
-    else:
-        chosen = as_generated(robot, curve, rate)
-    made = _checked(robot, curve, chosen, path, at, rate)
-    for _ in range(_ROUNDS if timing == "slowed" else 0):
-        if made.preflight.passed or not np.isfinite(made.preflight.slower):
-            break
-        chosen = slowed(chosen, made.preflight.slower * _A_LITTLE, rate)
-        made = _checked(robot, curve, chosen, path, at, rate)
+    held = {name: _held(values, times, name) for name, values in (steps or {}).items()}
+    asked = _Asked(robot, CubicSpline(times if path is None else path.times, joints), path, at, rate, held)
+    made = _in_time(asked, timing)
     if not made.preflight.passed and not force:
         raise InfeasibleError(_refusal(made), made.preflight)
     return made
@@ -187,16 +183,55 @@ def _inverse(ik: InverseKinematics, path: TaskPath, place: str) -> tuple[TaskPat
     """The path where it is executed, and the joints along it."""
     chosen = choose_place(ik, path) if place == "free" else choose_posture(ik, path)
     path = path._replace(positions=path.positions + chosen.shift)
+    if len(path.times) < _DENSE:
+        path = path.at(np.linspace(0.0, path.times[-1], _DENSE))
     ik.reset(chosen.start)
     return path, ik.follow(path.positions, path.rotations)
 
 
-def _checked(
-    robot: Robot, curve: CubicSpline, timing: Timing, path: TaskPath | None, start: Array, rate: float
-) -> RobotMovement:
+def _held(values: Array, times: Array, name: str) -> tuple[Array, Array]:
+    """Times (T,) from which each value of a discrete channel holds, and the values."""
+    values = as_numbers(values, name)
+    if values.shape != times.shape:
+        raise TrajectoryError(f"expected {len(times)} values of {name}, one for each sample, got {values.shape}")
+    return times, values
+
+
+class _Asked(NamedTuple):
+    """What is executed, whatever its timing."""
+
+    robot: Robot
+    curve: CubicSpline  # of the joints
+    path: TaskPath | None  # of the tip
+    start: Array  # (n,), where the joints stand
+    rate: float
+    held: Mapping[str, tuple[Array, Array]]
+
+
+def _in_time(asked: _Asked, timing: str) -> RobotMovement:
+    """The movement with that timing, slowed down until it passes if that is allowed and helps."""
+    if timing == "fastest":
+        curve, chosen = fastest(asked.robot, asked.curve, asked.rate)
+        return _checked(asked._replace(curve=curve), chosen)
+    chosen = as_generated(asked.robot, asked.curve, asked.rate)
+    made = _checked(asked, chosen)
+    for _ in range(_ROUNDS if timing == "slowed" else 0):
+        if made.preflight.passed or not np.isfinite(made.preflight.slower):
+            break
+        chosen = slowed(chosen, made.preflight.slower * _A_LITTLE, asked.rate)
+        made = _checked(asked, chosen)
+    return made
+
+
+def _checked(asked: _Asked, timing: Timing) -> RobotMovement:
     """The approach and the movement with that timing, and the checks of both."""
-    movement = timed(robot, curve, timing)
-    first = approach(robot, start, movement.positions[0], rate)
+    robot, path = asked.robot, asked.path
+    steps = {
+        name: values[np.searchsorted(times, timing.generated + 1e-9, "right") - 1]
+        for name, (times, values) in asked.held.items()
+    }
+    movement = replace(timed(robot, asked.curve, timing), steps=steps)
+    first = approach(robot, asked.start, movement.positions[0], asked.rate)
     whole = joined(first, movement)
     wanted = None if path is None else path.at(timing.generated)._replace(times=timing.times + first.duration)
     report = preflight(robot, whole, wanted, first.duration)
@@ -212,8 +247,8 @@ def _refusal(made: RobotMovement) -> str:
     duration = made.trajectory.duration - made.begins
     slower = made.preflight.slower
     remedy = (
-        f"it works in {duration * slower:.3g} s instead of {duration:.3g}: slow it down (timing='slowed', --slow-down)"
+        f"It works in {duration * slower:.3g} s instead of {duration:.3g}: slow it down (timing='slowed', --slow-down)"
         if np.isfinite(slower)
-        else "no speed helps: choose another place, orientation or posture"
+        else "No speed helps: choose another place, orientation or posture"
     )
     return f"{made.robot.name} cannot execute this: {'; '.join(lines)}{more}. {remedy}"

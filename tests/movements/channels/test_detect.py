@@ -248,8 +248,8 @@ def test_a_numbered_quaternion_whose_scalar_nothing_tells_is_asked_for():
 
 def test_movements_one_after_the_other_do_not_change_the_sign_of_a_quaternion():
     steady = np.abs(numbered(0))
-    heads, both = ["q0", "q1", "q2", "q3"], np.concatenate([steady, -steady])
-    both[T:, 3] = 0.0
+    heads, both = ["q0", "q1", "q2", "q3"], np.concatenate([steady, steady * [1, -1, -1, -1]])
+    assert both[T - 1] @ both[T] < 0
     with pytest.raises(SpecificationError, match="expected heads that say"):
         find_channels(heads, both, np.array([0, T, 2 * T]), {})
 

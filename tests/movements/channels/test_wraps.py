@@ -67,3 +67,19 @@ def test_values_beyond_every_turn_do_not_wrap():
     ticks = np.array([0.0, 4095.0, 10.0, 4000.0])
     assert period_of(ticks, None) == np.inf
     assert without_wraps(ticks, np.array([0, 4]), np.inf) is ticks
+
+
+@pytest.mark.parametrize(("beyond", "period"), [(0.3, 360.0), (0.5, None)])
+def test_a_thousandth_of_a_turn_beyond_the_range_is_rounding(beyond, period):
+    """Angles in single precision, or filtered ones, pass half a turn by a little; more is another range."""
+    angles = np.array([179.0, 180.0 + beyond, -179.9, -179.0])
+    assert wrap_period(angles, np.array([0, 4])) == period
+    assert wrap_period(-angles, np.array([0, 4])) == period
+
+
+@pytest.mark.parametrize(
+    ("largest", "period"),
+    [(2 * np.pi * 1.0009, 2 * np.pi), (2 * np.pi * 1.0011, 360.0), (360.3, 360.0), (360.4, np.inf)],
+)
+def test_angles_of_no_unit_pass_a_turn_by_a_thousandth(largest, period):
+    assert period_of(np.array([0.0, largest]), None) == period

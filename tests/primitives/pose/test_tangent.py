@@ -1,12 +1,14 @@
 """The rotation vector from the goal: continuous past half a turn, blind to signs, and refused where there is none."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 
 from kineme import Demonstrations, Resample, Trajectory
 from kineme.errors import TrajectoryError
 from kineme.orientation import angle_between, exp, from_tangent, product, to_tangent
+from kineme.primitives.pose.tangent import with_orientations_last
 from rotation_samples import as_rotation, carry, random_quaternions, seeds, tumble, turn
 
 
@@ -145,3 +147,12 @@ def test_messages_name_the_movement_beyond_the_first_tile():
     movements = [tumble(0, 100)] * 250 + [off_norm()]
     with pytest.raises(TrajectoryError, match=r"trajectory 250 \('last'\): sample 42: .* norm 1\.25"):
         to_tangent(Demonstrations.from_arrays(movements, names=[None] * 250 + ["last"]))
+
+
+def test_a_joint_beside_an_orientation_is_learned_with_the_positions():
+    """Between the columns of a pose of a robot there may be angles: they come first, before the orientations."""
+    t, q = np.linspace(0, 1, 40), exp(np.outer(np.linspace(0, 1, 40), [0.1, 0.4, 1.0]))
+    frame = pd.DataFrame({"t": t, "qw": q[:, 0], "qx": q[:, 1], "qy": q[:, 2], "qz": q[:, 3], "joint1": t**2, "x": t})
+    columns, n_orientations = with_orientations_last(Demonstrations.of(frame))
+    assert n_orientations == 1
+    np.testing.assert_allclose(columns.positions, np.column_stack([t**2, t, q]), atol=1e-15)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,8 @@ _NAME = 22  # letters of a label above its panel, and of a column in the legend
 _LETTERS, _BESIDE = 11, 24  # letters of the legend in an inch, and those that start and end take
 
 
-def draw_recordings(recordings: Recordings) -> Figure:
-    """Small multiples, one per label.
+def draw_recordings(recordings: Recordings, unlike: Collection[int] = ()) -> Figure:
+    """Small multiples, one per label; movements that are unlike the others of theirs, by their indices, in orange.
 
     One dimension is drawn over time, two in the plane, of three and more the first three in space. Every panel has a
     scale of its own, the same for its axes; below it stand the sides of the box around what is drawn.
@@ -41,7 +42,7 @@ def draw_recordings(recordings: Recordings) -> Figure:
     space = {"projection": "3d"} if n_dims >= 3 else {}
     panels = figure.subplots(rows, columns, squeeze=False, subplot_kw=space).ravel()
     for axes, label in zip(panels, shown, strict=False):
-        _draw_label(axes, recordings, label)
+        _draw_label(axes, recordings, label, set(unlike))
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     names = recordings.detected[0][0].columns[:3] if recordings.detected else axis_names(n_dims)
@@ -51,17 +52,19 @@ def draw_recordings(recordings: Recordings) -> Figure:
     across = drawable(across) + more
     ncols = 3 if len(across) < _LETTERS * figure.get_figwidth() - _BESIDE else 1
     across = across if ncols > 1 else across.replace(", ", ",\n")
-    figure.legend(handles=_key(across), loc="outside lower center", ncols=ncols, handletextpad=0.3)
+    figure.legend(handles=_key(across, bool(unlike)), loc="outside lower center", ncols=ncols, handletextpad=0.3)
     return figure
 
 
-def _draw_label(axes: Any, recordings: Recordings, label: str | None) -> None:
+def _draw_label(axes: Any, recordings: Recordings, label: str | None, unlike: set[int]) -> None:
     chosen = [i for i, one in enumerate(recordings.labels) if one == label]
-    drawn = evenly_spaced(len(chosen), _OVERLAID)
-    paths = [_path(recordings.demonstrations[chosen[k]]) for k in drawn]
+    odd = [i for i in chosen if i in unlike][:_OVERLAID]
+    drawn = [chosen[k] for k in evenly_spaced(len(chosen), _OVERLAID) if chosen[k] not in unlike] + odd
+    paths = [_path(recordings.demonstrations[i]) for i in drawn]
     opacity = max(0.25, 0.9 - 0.05 * len(paths))
-    for path in paths:
-        axes.plot(*path.T, color=BLUE, linewidth=0.9, alpha=opacity)
+    for i, path in zip(drawn, paths, strict=True):
+        color, strength = (ORANGE, 1.0) if i in unlike else (BLUE, opacity)
+        axes.plot(*path.T, color=color, linewidth=0.9, alpha=strength)
     starts, ends = np.array([path[0] for path in paths]), np.array([path[-1] for path in paths])
     axes.plot(*starts.T, "o", color=GRAY, markersize=3, zorder=3)
     axes.plot(*ends.T, "*", color=ORANGE, markersize=5.5, markeredgewidth=0, zorder=4)
@@ -100,10 +103,12 @@ def _path(one: Trajectory) -> Any:
     return x if x.shape[1] > 1 else np.column_stack((one.times[kept] - one.times[0], x))
 
 
-def _key(across: str) -> list[Any]:
+def _key(across: str, unlike: bool) -> list[Any]:
     from matplotlib.lines import Line2D
 
+    odd = [Line2D([], [], color=ORANGE, linewidth=0.9, label="unlike the others")] if unlike else []
     return [
+        *odd,
         Line2D([], [], linestyle="none", marker="o", color=GRAY, markersize=4, label="start"),
         Line2D([], [], linestyle="none", marker="*", color=ORANGE, markersize=7, label="end"),
         Line2D([], [], color=BLUE, linewidth=0.9, label=across),

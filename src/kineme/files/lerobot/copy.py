@@ -40,6 +40,8 @@ def copy_with_motions(source: Path, target: Path, motions: Mapping[int, Sequence
     info = read_info(source)
     column = COLUMNS[info.version]
     declared = read_episodes(source, info)
+    if declared.problems:
+        raise DataError(f"expected a whole data set to copy: {declared.problems[0]}")
     if unknown := set(motions) - set(declared.numbers.tolist()):
         raise DataError(f"expected an episode of the data set, got {min(unknown)}")
     shards = [one for one in dict.fromkeys(declared.shards) if (source / one).is_file()]

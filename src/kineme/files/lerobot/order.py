@@ -28,7 +28,10 @@ def whole_episodes(
     numbers, lengths = frames.episodes[offsets[:-1]], np.diff(offsets)
     wrong = _miscounted(numbers, lengths, declared) | _disordered(frames, offsets, numbers) | _divided(numbers)
     bad = np.isin(numbers, list(wrong))
-    left_out = [f"episode {k}: {reason}" for k, reason in sorted(wrong.items())]
+    left_out = [
+        f"{f'episode {k}' if k >= 0 else 'frames without an episode_index'}: {reason}"
+        for k, reason in sorted(wrong.items())
+    ]
     left_out += _absent(numbers, declared, unread)
     left_out += [
         f"episode {after}: its frames stand behind those of episode {before}; it is read all the same"

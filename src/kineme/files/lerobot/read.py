@@ -43,10 +43,10 @@ def lerobot_movements(folder: Path, layout: Layout) -> Parsed:
     _check_choices(layout)
     info = read_info(folder)
     features, heads, chosen = _chosen(info, layout)
-    declared, tasks = read_episodes(folder, info), read_tasks(folder)
+    declared, (tasks, unsaid) = read_episodes(folder, info), read_tasks(folder)
     frames, unread = _all_frames(folder, declared, features)
     frames, offsets, wrong = whole_episodes(frames, declared, unread)
-    left_out = [*unread.values(), *wrong]
+    left_out = [*declared.problems, *unsaid, *unread.values(), *wrong]
     if len(offsets) < 2:
         raise DataError(f"expected episodes in a LeRobot data set, got none that is whole; the first: {left_out[0]}")
     places = [f"episode {k}" for k in frames.episodes[offsets[:-1]].tolist()]
@@ -77,7 +77,8 @@ def _check_choices(layout: Layout) -> None:
 def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...], list[int]]:
     """Features that are read with their widths; heads of the coordinates; their columns among those features."""
     if not info.heads:
-        raise DataError("expected features of numbers in a LeRobot data set, got none")
+        only = f"only {listed(info.others)}" if info.others else "none"
+        raise DataError(f"expected features of numbers in a LeRobot data set, got {only}")
     owners = [name for name, entries in info.heads.items() for _ in entries]
     entries = [entry for one in info.heads.values() for entry in one]
     full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]

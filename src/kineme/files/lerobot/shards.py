@@ -65,7 +65,7 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
             known = set(file.schema_arrow.names)
             needed = [*features, "episode_index", "frame_index", "timestamp"]
             if missing := [name for name in needed if name not in known]:
-                raise DataError(f"expected the column {missing[0]!r} in the shard {shard}, got none")
+                raise DataError(f"expected the column {missing[0]!r}, got none")
             width = sum(features.values()) + len(_OF_FRAMES)
             check_expanded(taken + 8 * width * max(file.metadata.num_rows, 0), "a data set")
             columns = [*needed, *(["task_index"] if "task_index" in known else [])]
@@ -74,6 +74,8 @@ def read_shard(folder: Path, shard: str, features: Mapping[str, int], taken: int
                 parts.append(_frames(batch, features))
                 n_rows += len(parts[-1].values)
                 check_expanded(taken + 8 * width * n_rows, "a data set")
+    except DataError as error:
+        raise DataError(f"the shard {shard}: {error}") from error
     except (pa.ArrowException, OSError, ValueError) as error:
         raise DataError(f"expected the shard {shard} to be a Parquet file, got a damaged one ({error})") from error
     return parts
@@ -113,7 +115,7 @@ def _numbers(column: Any, name: str) -> Array:
     try:
         return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"expected numbers in {name!r}, got {column.type}") from error
+        raise DataError(f"expected numbers in {name!r}, got {column.type}") from error
 
 
 def _whole(column: Any) -> NDArray[np.int64]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,16 +63,18 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
     from pyarrow import parquet
 
     try:
-        with parquet.ParquetFile(source) as file:
+        with _opened(source) as file:
             schema = file.schema_arrow
             kind = column.type_in(schema)
-            rows = _snapped(file, motions)
+            with _reading():
+                rows = _snapped(file, motions)
             if column.name not in schema.names:
                 schema = schema.append(pa.field(column.name, kind))
             packed = _compression(file.metadata, column.leaves(kind))
             with parquet.ParquetWriter(target, schema, compression=packed) as writer:
                 for k in range(file.num_row_groups):
-                    table = file.read_row_group(k, use_threads=False)
+                    with _reading():
+                        table = file.read_row_group(k, use_threads=False)
                     writer.write_table(
                         _extended(table, rows, column, kind, schema), row_group_size=max(table.num_rows, 1)
                     )
@@ -79,6 +82,22 @@ def write_shard(source: Path, target: Path, motions: Mapping[int, Sequence[Motio
         raise DataError(f"{source.name}: {error}") from error
     except (pa.ArrowException, ValueError, KeyError) as error:
         raise DataError(f"expected the shard {source.name} to take the column {column.name}, got: {error}") from error
+
+
+def _opened(source: Path) -> Any:
+    from pyarrow import parquet
+
+    with _reading():
+        return parquet.ParquetFile(source)
+
+
+@contextmanager
+def _reading() -> Iterator[None]:
+    """Damage is an error of the data; what is wrong with the disk when writing stays one of the system."""
+    try:
+        yield
+    except OSError as error:
+        raise DataError(f"expected a Parquet file, got a damaged one ({error})") from error
 
 
 def _compression(metadata: Any, leaves: Sequence[str]) -> str | dict[str, str]:

@@ -43,8 +43,12 @@ def check_records(path: Path) -> None:
 
 def _check_mcap(file: BinaryIO, at: int) -> None:
     """Rosbags takes each nine zeros for a record, of which there may be billions, and reads records whole."""
+    magic = _MAGIC[".mcap"]
     end = file.seek(0, os.SEEK_END)
-    while at + _HEAD.size <= end - len(_MAGIC[".mcap"]):
+    file.seek(max(end - len(magic), 0))
+    if file.read() != magic:
+        raise DataError(f"expected an MCAP file that was closed, got one that ends before; {REMEDIES['.mcap']}")
+    while at + _HEAD.size <= end - len(magic):
         file.seek(at)
         kind, length = _HEAD.unpack(file.read(_HEAD.size))
         if not kind:

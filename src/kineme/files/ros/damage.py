@@ -24,6 +24,8 @@ def refused(expected: str, remedy: str) -> Iterator[None]:
     except (KinemeError, MemoryError):
         raise
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        is_silent = isinstance(error, AssertionError) and not str(error)
+        reason = "records that contradict each other" if is_silent else " ".join(str(error).split())
+        reason = reason or type(error).__name__
         unknown = ", which rosbags does not know" if isinstance(error, KeyError) else ""
         raise DataError(f"{expected}, got: {reason[:300]}{unknown}; {remedy}") from error

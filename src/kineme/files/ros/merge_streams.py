@@ -64,7 +64,10 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
         inside &= (at >= stamps[0]) & (at <= stamps[-1])
     names = ", ".join(one.name for one in streams[1:])
     if not inside.any():
-        raise DataError(f"expected samples of {first.name} and of {names} at the same time, got none")
+        raise DataError(
+            f"expected samples of {first.name} and of {names} at the same time, got none: {_spans(streams, of_headers)}"
+            + ("; if their headers are of two clocks, say time='recorded', in the shell --time recorded" * of_headers)
+        )
     start = int(at[inside][0])
     seconds = (at[inside] - start) / SECOND
     values = [first.values[inside]]
@@ -79,6 +82,11 @@ def merge_streams(streams: Sequence[Stream], of_headers: bool) -> tuple[Stream, 
     n_lost = int(len(at) - inside.sum())
     lost = f"{counted(n_lost, 'sample')} of {first.name} before {names} begins or after it ends"
     return kept, [lost] if n_lost else []
+
+
+def _spans(streams: Sequence[Stream], of_headers: bool) -> str:
+    spans = ((one.name, stamps_of(one, of_headers)) for one in streams)
+    return ", ".join(f"{name} from {at.min() / SECOND:.12g} to {at.max() / SECOND:.12g} s" for name, at in spans)
 
 
 def values_at(at: Array, times: Array, stream: Stream, values: Array) -> Array:

@@ -17,6 +17,7 @@ from kineme.library.storage.source import Source
 from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.symbols import add_members, keys_by_name
 from kineme.library.storage.versions import Change
+from kineme.movements.channels.coordinates import with_periods
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
 
@@ -102,7 +103,7 @@ def _insert_movements(change: Change, batch: Batch, new: dict[int, int], stored:
     if change.connection.execute("SELECT 1 FROM meta WHERE key = 'n_dims'").fetchone() is None:
         change.insert("meta", [("n_dims", str(demos.n_dims))])
         if demos.channels is not None:
-            change.insert("meta", [("channels", channels_to_text(demos.channels))])
+            change.insert("meta", [("channels", channels_to_text(with_periods(demos.channels, demos.recorded)))])
     lengths, durations = demos.lengths.tolist(), demos.durations.tolist()
     starts = np.zeros(len(demos)) if demos.movements.times is None else demos.times[demos.offsets[:-1]]
     t0, names = starts.tolist(), demos.names or (None,) * len(demos)

@@ -18,7 +18,9 @@ from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
-from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
+from kineme.movements.trajectories.as_learned import as_recorded, of_columns
+from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -68,7 +70,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 ) -> LearnReport:
     """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
-    demos = Demonstrations.of(movements)
+    demos = _in_columns_of(store, Demonstrations.of(movements))
     _check_dimensions(store, demos)
     check(demos)
     names = _as_names(demos, "label", demos.labels if labels is None else labels)
@@ -144,6 +146,17 @@ def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
     )
 
 
+def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
+    """Recorded columns without channels as those of the library, and generated ones as they are learned."""
+    ours, n_dims = store.channels, store.n_dims
+    if demos.channels is None:
+        known = ours is not None and demos.n_dims == len(recorded_names(ours))
+        return of_columns(demos, ours) if ours is not None and known else demos
+    if ours is None and n_dims == demos.n_dims > len(learned_names(demos.channels)):
+        return as_recorded(demos)
+    return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
+
+
 def _check_dimensions(store: Store, demos: Demonstrations) -> None:
     n_dims = store.n_dims
     if n_dims is not None and n_dims != demos.n_dims:
@@ -152,19 +165,16 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
             f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
         )
     ours = store.channels
-    if n_dims is None or ours == demos.channels or all(is_plain(one or ()) for one in (ours, demos.channels)):
+    if (
+        n_dims is None
+        or same_columns(ours, demos.channels)
+        or all(is_plain(one or ()) for one in (ours, demos.channels))
+    ):
         return
     raise TrajectoryError(
-        f"expected movements recorded as {_kinds(ours)}, as all others of the library in {store.folder}, got "
-        f"{_kinds(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
+        f"expected movements recorded as {in_words(ours)}, as all others of the library in {store.folder}, got "
+        f"{in_words(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
     )
-
-
-def _kinds(channels: Channels | None) -> str:
-    if channels is None:
-        return "plain coordinates"
-    columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
-    return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:

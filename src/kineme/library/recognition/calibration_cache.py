@@ -1,10 +1,11 @@
-"""Recognizer of a large library, fitted to a sample of its movements; its calibration is kept in a cache file."""
+"""Calibrations of libraries, kept in cache files; and the comparison of a large one, fitted to a sample."""
 
 from __future__ import annotations
 
 import hashlib
 import io
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 from zipfile import BadZipFile
@@ -14,19 +15,23 @@ from numpy.typing import NDArray
 
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.fit import fit_to_references
+from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.members import Members, described_references
+from kineme.library.storage.rows import among, listed
 from kineme.library.storage.store import Store
 from kineme.output.atomic import write_atomically
-from kineme.recognition.conformal import Calibration
+from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.sampled_calibration import calibrate_sample
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 
-FILE = "calibration.cache"
+FILE = "calibration.cache"  # of a large library, by a sample
+FILE_OF_ALL = "calibration_of_all.cache"  # of a smaller one, whose members are all compared
 
-_FORMAT = "2"
+_FORMAT = "3"
+_FEW = 500  # members of which a calibration takes 0.1 s: computed every time
 _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
 
@@ -35,28 +40,60 @@ def sample_comparison(store: Store, members: Members) -> Comparison:
     """A comparison with widths and weights that are fitted to a sample of the members."""
     chosen, how = evenly_spaced(len(members.ids), _SAMPLE), store.specification
     references = described_references(store, members.ids[chosen], members.labels[chosen])
-    return fit_to_references(how.comparison, references, how.weights)[0]
+    return fit_to_references(how.comparison, references, how.weights, store.channels)[0]
 
 
 def calibrated(store: Store, members: Members, similarity: AveragedSimilarity, stored: StoredReferences) -> Calibration:
     """The calibration on all members, taken from the cache if that is of the same ones."""
-    path, key = store.folder / FILE, _key(store, members)
+    return _cached(
+        store, FILE, _key(store, members), members, lambda: calibrate_sample(similarity, stored, members.groups)
+    )
+
+
+def calibrated_once(
+    store: Store,
+    members: Members,
+    similarity: AveragedSimilarity,
+    references: References,
+    groups: NDArray[np.intp] | None,
+) -> Calibration:
+    """As `conformal.calibrate` of the members, from a cache of its own; of few, it is computed every time."""
+    if len(members.ids) < _FEW:
+        return calibrate(similarity, references, groups)
+    key = _key(store, members, _digests(store, members))
+    return _cached(store, FILE_OF_ALL, key, members, lambda: calibrate(similarity, references, groups))
+
+
+def _cached(store: Store, name: str, key: str, members: Members, make: Callable[[], Calibration]) -> Calibration:
+    """The calibration in that file of the folder, if it has this key; else made, and written there."""
+    path = store.folder / name
     if path.is_file():  # not a pipe, which would block
         with suppress(*_SPOILED):
             return _deserialized(path.read_bytes(), key, len(members.names))
-    made = calibrate_sample(similarity, stored, members.groups)
+    made = make()
     if not store.read_only:
         with suppress(OSError):  # disk full or no permission: it is computed again next time
             write_atomically(path, _serialized(made, key))
     return made
 
 
-def _key(store: Store, members: Members) -> str:
-    """Cache validity key: changes with the library, its specification, the members of symbols, and their people."""
+def _digests(store: Store, members: Members) -> bytes:
+    """Digests of the samples of the members, in the order of their ids."""
+    with store.reading() as connection:
+        query = f"SELECT digest FROM movement WHERE {among('id')} ORDER BY id"
+        return repr(connection.execute(query, {"keys": listed(members.ids)}).fetchall()).encode()
+
+
+def _key(store: Store, members: Members, content: bytes = b"") -> str:
+    """Cache validity key: changes with the library, its specification, the members of symbols, and their people.
+
+    And with `content`, what is known of the samples of the members.
+    """
     text = [_FORMAT, store.id, *store.specification.to_json().values(), *map(str, members.names)]
     digest = hashlib.sha256("\0".join(text).encode())
     digest.update(members.ids.tobytes() + members.first.tobytes())
     digest.update(b"" if members.groups is None else members.groups.tobytes())
+    digest.update(content)
     return digest.hexdigest()
 
 
@@ -67,7 +104,8 @@ def _serialized(calibration: Calibration, key: str) -> bytes:
     arrays: dict[str, Any] = {f"pooled {k}": one for k, (one, _) in enumerate(pooled.values())}
     arrays |= {f"novelties {k}": one for k, (_, one) in enumerate(pooled.values())}
     arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
-    arrays |= {"own": np.concatenate(calibration.own), "ends": np.cumsum([len(one) for one in calibration.own])}
+    for name, several in (("", calibration.own), ("novel ", calibration.own_novelties)):
+        arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(one) for one in several])}
     file = io.BytesIO()
     np.savez(file, scales=calibration.scales, **arrays)
     return _seal(file.getvalue(), key) + file.getvalue()
@@ -84,16 +122,24 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
     if seal != _seal(data, key):
         raise ValueError("damaged, or of other members")
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        which, ends = _whole(arrays["which"], n, n), _whole(arrays["ends"], n, len(data))
+        which = _whole(arrays["which"], n, n)
         pooled, novelties = (
             [_real(arrays[f"{name} {k}"]) for k in range(int(which.max()) + 1)] for name in ("pooled", "novelties")
         )
-        scales, own = _real(arrays["scales"]), _real(arrays["own"])
-    sound = scales.shape == (n,) and ((scales > 0) & np.isfinite(scales)).all()
-    if not sound or (np.diff(ends) < 0).any() or ends[-1] != len(own):
+        scales = _real(arrays["scales"])
+        own, own_novelties = (_split(arrays[f"{name}own"], arrays[f"{name}ends"], n) for name in ("", "novel "))
+    if scales.shape != (n,) or not ((scales > 0) & np.isfinite(scales)).all():
         raise ValueError("no calibration")
-    scores = tuple(np.split(own, ends[:-1]))
-    return Calibration(scales, scores, tuple(pooled[k] for k in which), scores, tuple(novelties[k] for k in which))
+    every = tuple(pooled[k] for k in which), tuple(novelties[k] for k in which)
+    return Calibration(scales, own, every[0], own_novelties, every[1])
+
+
+def _split(scores: NDArray[Any], ends: NDArray[Any], n: int) -> tuple[Array, ...]:
+    """The scores of each of n classes."""
+    scores, ends = _real(scores), _whole(ends, n, len(scores))
+    if (np.diff(ends) < 0).any() or ends[-1] != len(scores):
+        raise ValueError("no calibration")
+    return tuple(np.split(scores, ends[:-1]))
 
 
 def _whole(array: NDArray[Any], n: int, end: int) -> NDArray[Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.stored_references import StoredReferences
-from kineme.library.recognition.calibration_cache import calibrated, sample_comparison
+from kineme.library.recognition.calibration_cache import calibrated, calibrated_once, sample_comparison
 from kineme.library.recognition.members import Members, described_references, members_of
 from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
@@ -17,7 +18,8 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.recognition.answer import Answer, Neighbor, is_one
-from kineme.recognition.known_classes import KnownClasses, fit_known_classes
+from kineme.recognition.conformal import calibrate
+from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
@@ -52,7 +54,7 @@ class LibraryRecognizer:
 
     def _small(self, members: Members) -> KnownClasses:
         self._ids = members.ids
-        return known_members(self.store, members)
+        return known_members(self.store, members, partial(calibrated_once, self.store, members))
 
     def _large(self, members: Members) -> TwoStageSearch:
         self._reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
@@ -71,12 +73,14 @@ class LibraryRecognizer:
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in answers]
 
 
-def known_members(store: Store, members: Members) -> KnownClasses:
+def known_members(store: Store, members: Members, calibrate_by: Calibrates = calibrate) -> KnownClasses:
     """What recognizes the symbols of a small library: all members, by their stored features."""
     how = store.specification
     references = described_references(store, members.ids, members.labels)
     references = replace(references, demonstrations=read.movements(store, members.ids))  # few: kept in memory
-    return fit_known_classes(how.comparison, references, how.weights, how.classifier, members.groups)
+    return fit_known_classes(
+        how.comparison, references, how.weights, how.classifier, members.groups, store.channels, calibrate_by
+    )
 
 
 def two_stages(store: Store, reduced: ReducedMovements, members: Members) -> TwoStageSearch:

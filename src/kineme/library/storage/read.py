@@ -20,6 +20,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
 from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import Array
 
 Ids = NDArray[np.int64]
@@ -197,6 +198,7 @@ def primitives(store: Store, ids: Ids, labels: Sequence[str | None] | None = Non
         extents=boundary[:, 3],
         labels=_labels(labels),
         names=_names(about),
+        recorded_as=None if store.channels is None else RecordedAs(store.channels),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,10 @@ from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import Symbol, symbol, symbols
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.generation.learned import Learned, has_orientation, learn_one
+from kineme.primitives.recorded_as import recorded_as
 from kineme.sampling import evenly_spaced
 
 _MEMBERS = 500  # members that a medoid is chosen from, at most, evenly spaced
@@ -44,7 +47,8 @@ def learned_of(store: Store, who: str) -> Learned:
     recording = read.movements(store, ids)[0]
     if has_orientation(recording):
         return learn_one(recording, store.specification.dmp)
-    return Learned(_primitives(store, ids), recording)
+    primitive = replace(_primitives(store, ids), recorded_as=recorded_as(Demonstrations([recording])))
+    return Learned(primitive, recording)
 
 
 def ground_symbol(

@@ -41,7 +41,9 @@ def known_symbols(store: Store) -> KnownClasses | None:
         return None
     ids, labels = evenly_many_members(store)
     how, references = store.specification, described_references(store, ids, labels)
-    return fit_known_classes(how.comparison, references, how.weights, how.classifier, groups_of(store, ids))
+    return fit_known_classes(
+        how.comparison, references, how.weights, how.classifier, groups_of(store, ids), store.channels
+    )
 
 
 def recognized(store: Store, error_rate: float = 0.05) -> Recognized:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 #: Kind -> number of coordinates that a movement primitive learns from one such channel.
@@ -31,6 +32,8 @@ class Channel(NamedTuple):
         From the head, such as ``"deg"``; None if the file does not say.
     order : str
         Components of the columns of an orientation, ``"wxyz"`` or ``"xyzw"``; else empty.
+    period : float or None
+        What an angle wraps by if its unit does not say it, by the values that were recorded; 0 if it does not wrap.
     """
 
     name: str
@@ -38,6 +41,7 @@ class Channel(NamedTuple):
     columns: tuple[str, ...]
     unit: str | None = None
     order: str = ""
+    period: float | None = None
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -48,6 +52,8 @@ class Channel(NamedTuple):
 
 
 Channels = tuple[Channel, ...]
+
+_LISTED = 12  # channels that a message names one by one
 
 
 def learned_names(channels: Channels) -> tuple[str, ...]:
@@ -63,3 +69,25 @@ def recorded_names(channels: Channels) -> tuple[str, ...]:
 def is_plain(channels: Channels) -> bool:
     """Whether every column is learned as it was recorded, but for wraps of angles."""
     return all(one.kind in ("position", "angle") for one in channels)
+
+
+def moving_kinds(channels: Channels) -> tuple[str, ...]:
+    """Kinds of the channels that are learned, in order; names are free, and so is what is discrete."""
+    return tuple(one.kind for one in channels if one.coordinates)
+
+
+def same_columns(channels: Channels | None, others: Channels | None) -> bool:
+    """Whether channels are equal, but for the periods that were told by values."""
+    if channels is None or others is None:
+        return channels is others
+    return [one._replace(period=None) for one in channels] == [one._replace(period=None) for one in others]
+
+
+def in_words(channels: Channels | None) -> str:
+    """Channels with their kinds, as messages name them; of many, how many there are of each kind."""
+    if channels is None:
+        return "plain coordinates"
+    if len(channels) > _LISTED:
+        return ", ".join(f"{n} {kind} channels" for kind, n in Counter(one.kind for one in channels).items())
+    columns = [f" in {', '.join(one.columns)}" if one.kind == "orientation" else "" for one in channels]
+    return ", ".join(f"{one.name} ({one.kind}{where})" for one, where in zip(channels, columns, strict=True))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channel, Channels, recorded_names
-from kineme.movements.channels.wraps import period_of, without_wraps
+from kineme.movements.channels.wraps import period_by_unit, period_of, without_wraps
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, product
 from kineme.movements.rotations.rotation_vectors import log
 from kineme.validation import Array
@@ -55,10 +55,31 @@ def canonical(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> 
     for one, rows in zip(channels, columns_of(channels), strict=True):
         if one.kind == "angle":
             angles = result[:, rows.start]
-            result[:, rows.start] = without_wraps(angles, offsets, period_of(angles, one.unit))
+            result[:, rows.start] = without_wraps(angles, offsets, period_of_channel(one, angles))
         elif one.kind == "orientation":
-            result[:, rows] = _continuous(result[:, rows], offsets)
+            result[:, rows] = continuous_signs(result[:, rows], offsets)
     return result
+
+
+def with_periods(channels: Channels, columns: Array) -> Channels:
+    """Channels that say what their angles wrap by; where units do not, by the values of recorded columns (total, m)."""
+    return tuple(
+        one._replace(period=_finite(period_of_channel(one, columns[:, rows.start])))
+        if one.kind == "angle" and period_by_unit(one.unit) is None
+        else one
+        for one, rows in zip(channels, columns_of(channels), strict=True)
+    )
+
+
+def period_of_channel(channel: Channel, angles: Array) -> float:
+    """What an angle wraps by: by its unit, by what its channel says, or else by these values."""
+    if channel.period is None or period_by_unit(channel.unit) is not None:
+        return period_of(angles, channel.unit)
+    return channel.period or np.inf
+
+
+def _finite(period: float) -> float:
+    return period if np.isfinite(period) else 0.0
 
 
 def learned(columns: Array, offsets: NDArray[np.intp], channels: Channels) -> Array:
@@ -108,7 +129,7 @@ def from_wxyz(q: Array, channel: Channel) -> Array:
     return q[..., ["wxyz".index(part) for part in channel.order]]
 
 
-def _continuous(q: Array, offsets: NDArray[np.intp]) -> Array:
+def continuous_signs(q: Array, offsets: NDArray[np.intp]) -> Array:
     """Quaternions (total, 4) of norm 1; along each movement neighbors lie in one hemisphere, its first stays."""
     flips = np.concatenate(([False], (q[1:] * q[:-1]).sum(axis=1) < 0))
     odd = np.logical_xor.accumulate(flips)
@@ -119,6 +140,10 @@ def _continuous(q: Array, offsets: NDArray[np.intp]) -> Array:
 
 
 def _integrated(q: Array, offsets: NDArray[np.intp]) -> Array:
-    steps = log(product(q[1:], conjugate(q[:-1])))
-    turned = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
+    turned = np.concatenate((np.zeros((1, 3)), np.cumsum(rotation_steps(q), axis=0)))
     return np.asarray(turned - np.repeat(turned[offsets[:-1]], np.diff(offsets), axis=0))
+
+
+def rotation_steps(q: Array) -> Array:
+    """Rotation vectors (k - 1, 3) from each of k quaternions (w, x, y, z) to the next one."""
+    return log(product(q[1:], conjugate(q[:-1])))

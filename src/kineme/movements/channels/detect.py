@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kineme.errors import DataError, SpecificationError
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
+from kineme.movements.channels.coordinates import in_order, with_periods
 from kineme.movements.channels.quaternion_columns import Quaternion, find_quaternions, quaternion_of, shared_name
 from kineme.movements.channels.wraps import wrap_period
 from kineme.movements.tables.columns import column_numbers
@@ -113,7 +114,7 @@ def find_channels(
             channels.append(Channel(head, kind, (head,), unit))
     if all(one.kind == "discrete" for one in channels):  # then they are what moves
         return tuple(one if one.columns[0] in given else one._replace(kind="position") for one in channels)
-    return tuple(channels)
+    return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
 
 def unit_of(head: str) -> str | None:

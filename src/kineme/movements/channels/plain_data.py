@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
@@ -28,10 +29,13 @@ def channels_from_data(data: Any, n_dims: int) -> Channels:
 
 def _channel(one: dict[str, Any]) -> Channel:
     columns, unit = tuple(one["columns"]), one["unit"]
-    channel = Channel(one["name"], one["kind"], columns, unit, one["order"])
+    period = one.get("period", 0.0)  # earlier versions did not say it
+    channel = Channel(one["name"], one["kind"], columns, unit, one["order"], period)
     texts = [channel.name, *columns, *([] if unit is None else [unit])]
     sized = len(columns) == (4 if channel.kind == "orientation" else 1)
     ordered = channel.order in ORDERS if channel.kind == "orientation" else channel.order == ""
-    if channel.kind not in KINDS or not sized or not ordered or not all(isinstance(text, str) for text in texts):
-        raise ValueError("channels should have a name, a kind, columns, a unit and an order")
+    periodic = period is None or (isinstance(period, float) and math.isfinite(period) and period >= 0)
+    told = periodic and all(isinstance(text, str) for text in texts)
+    if channel.kind not in KINDS or not (sized and ordered and told):
+        raise ValueError("channels should have a name, a kind, columns, a unit, an order and a period")
     return channel

@@ -33,14 +33,21 @@ def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
     return None
 
 
+def period_by_unit(unit: str | None) -> float | None:
+    """The period of an angle in degrees or radians; None where the unit does not say which."""
+    if unit is None or not unit.lower().startswith(("deg", "°", "rad")):
+        return None
+    return _TURN if unit.lower().startswith("rad") else 360.0
+
+
 def period_of(angles: Array, unit: str | None) -> float:
     """The period of an angle: by its unit, or, where that says nothing, by its values.
 
     These are taken for radians within one turn, else for degrees; beyond a turn of those nothing wraps, and the period
     is infinite.
     """
-    if unit is not None and unit.lower().startswith(("deg", "°", "rad")):
-        return _TURN if unit.lower().startswith("rad") else 360.0
+    if (period := period_by_unit(unit)) is not None:
+        return period
     largest = float(np.abs(angles).max(initial=0.0))
     return next((period for period in (_TURN, 360.0) if largest <= period * (1 + _SLACK)), np.inf)
 
@@ -51,12 +58,16 @@ def without_wraps(angles: Array, offsets: NDArray[np.intp], period: float) -> Ar
     A step of 3/4 of a period or more counts as a wrap. A shorter one is motion: with samples so sparse that a joint
     turns further between two of them, no rule could tell.
     """
-    steps = _steps(angles, offsets)
-    turns = np.sign(steps) * np.floor(np.abs(steps) / period + (1.0 - _JUMP))
+    turns = turns_of(_steps(angles, offsets), period)
     if not turns.any():
         return angles
     total = np.concatenate(([0.0], np.cumsum(turns)))
     return np.asarray(angles - period * (total - np.repeat(total[offsets[:-1]], np.diff(offsets))))
+
+
+def turns_of(steps: Array, period: float) -> Array:
+    """How many turns, with their sign, are jumps in each of some steps."""
+    return np.asarray(np.sign(steps) * np.floor(np.abs(steps) / period + (1.0 - _JUMP)))
 
 
 def _steps(values: Array, offsets: NDArray[np.intp]) -> Array:

@@ -35,6 +35,7 @@ class Roles(NamedTuple):
     """Column numbers by role, and the columns that are ignored.
 
     `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``.
+    `person` is one of those in `movement`.
     """
 
     time: int | None
@@ -43,6 +44,7 @@ class Roles(NamedTuple):
     label: int | None
     ignored: tuple[int, ...]
     nanoseconds: int | None = None
+    person: int | None = None
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
@@ -67,6 +69,8 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     label = _label(heads, layout, named)
     movement = _movement(heads, layout, named, label)
     taken = {*movement, label}
+    person = None if layout.person is None else _number(heads, layout.person)
+    movement = movement if person is None or person in movement else (*movement, person)
     time = _time(heads, kinds, layout, named, taken)
     beside = _nanoseconds(heads, kinds) if named else {}
     nanoseconds = None if time is None else beside.get(time)
@@ -83,7 +87,7 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
     used = {time, nanoseconds, label, *movement, *positions}
     ignored = tuple(k for k in range(len(heads)) if k not in used)
-    return Roles(time, positions, movement, label, ignored, nanoseconds)
+    return Roles(time, positions, movement, label, ignored, nanoseconds, person)
 
 
 def _number(heads: Sequence[str], column: Column) -> int:

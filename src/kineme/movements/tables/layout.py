@@ -35,12 +35,14 @@ class Layout:
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
     kinds : mapping, optional
-        Head of a column -> "position", "angle" or "discrete"; four heads separated by commas -> "wxyz" or "xyzw", the
-        order of a quaternion.
+        Heads of columns, separated by commas, -> "position", "angle" or "discrete"; of four -> "wxyz" or "xyzw", the
+        order of a quaternion. What several heads begin with, before a dot, stands for all of them.
     topic : str or sequence of str, optional
         Topics of a bag; of several, the others are interpolated to the stamps of the first.
     frame : str or sequence of str, optional
         Pairs of frames of a bag, as ``"parent:child"``: the pose of the child in the parent.
+    person : str or int, optional
+        Column that names who showed a movement; another movement begins where it changes.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Layout:
     kinds: Mapping[str, str] | None = None
     topic: str | Sequence[str] | None = None
     frame: str | Sequence[str] | None = None
+    person: Column | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)

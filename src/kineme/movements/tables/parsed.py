@@ -36,6 +36,8 @@ class Detected(NamedTuple):
         Columns that tell movements apart, that name the action, and that are ignored.
     measured_in : tuple of str
         The unit of each coordinate where the file says it, else empty; nothing at all if it says none.
+    person : tuple of str
+        The column that names who showed a movement.
     """
 
     format: str
@@ -48,6 +50,7 @@ class Detected(NamedTuple):
     label: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     measured_in: tuple[str, ...] = ()
+    person: tuple[str, ...] = ()
 
 
 def no_lines(row: int) -> None:
@@ -73,6 +76,8 @@ class Block:
         Row of the file -> its line, counted from 1, or None.
     faults : dict
         Row of the file -> what is wrong there.
+    people : list of n str or None, optional
+        Who showed each movement.
     """
 
     positions: Array
@@ -83,6 +88,7 @@ class Block:
     rows: NDArray[np.intp] | None = None
     line_of: Callable[[int], int | None] = no_lines
     faults: dict[int, str] | None = None
+    people: list[str | None] | None = None
 
     def row(self, k: int) -> int:
         """Row of the file that sample k comes from."""

@@ -72,13 +72,14 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     """The movements of a table.
 
     Movements that the file itself tells apart stay apart. With columns that tell movements apart, all rows with equal
-    texts in them, and with equal labels, are one movement, in any order. With a column of labels alone, a new movement
-    begins where the label changes or the time decreases. Otherwise the table is one movement.
+    texts in them, and with equal labels, are one movement, in any order. With a column of labels or of people alone, a
+    new movement begins where they change or the time decreases. Otherwise the table is one movement.
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
+    people = None if roles.person is None else _people(table.columns[roles.person], codes)
     rows = None if n == 1 or (np.diff(codes) >= 0).all() else np.argsort(codes, kind="stable")
     if rows is not None:
         positions, times, codes = positions[rows], times[rows], codes[rows]
@@ -97,9 +98,16 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         () if roles.label is None else (heads[roles.label],),
         tuple(heads[k] for k in roles.ignored),
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
+        () if roles.person is None else (heads[roles.person],),
     )
-    places = [""] * n if n == 1 and not roles.movement and table.segments is None else keys
-    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults))
+    places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
+    return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
+
+
+def _people(column: NDArray[Any], codes: NDArray[np.intp]) -> list[str | None]:
+    """Who showed each movement."""
+    _, firsts = np.unique(codes, return_index=True)
+    return [str(name) or None for name in column[firsts].tolist()]
 
 
 def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float, str]:
@@ -118,6 +126,11 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
     return in_seconds(stamps, units), units, known
 
 
+def _in_turns(roles: Roles) -> bool:
+    """Whether no column tells movements apart but those of labels and of people, which change from time to time."""
+    return not roles.movement or roles.movement == (roles.person,)
+
+
 def _time_heads(heads: Sequence[str], roles: Roles) -> str | None:
     """The column of times, or the two whose sum they are."""
     if roles.time is None or roles.nanoseconds is None:
@@ -133,12 +146,13 @@ def _split(table: Table, roles: Roles, times: Array) -> tuple[NDArray[np.intp], 
     if label is None and not roles.movement:
         return np.zeros(n_rows, np.intp), [""], [None]
     labels = [None] * n_rows if label is None else table.columns[label].tolist()
-    if not roles.movement:
-        changes = np.array([before != label for before, label in pairwise(labels)], dtype=bool)
+    columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
+    if _in_turns(roles):
+        told = list(zip(labels, *columns, strict=True))
+        changes = np.array([before != one for before, one in pairwise(told)], dtype=bool)
         codes = np.append(0, np.cumsum(changes | (times[1:] < times[:-1])))
         firsts = np.flatnonzero(np.diff(codes, prepend=-1))
         return codes, [str(k) for k in range(len(firsts))], [labels[k] or None for k in firsts]
-    columns: Sequence[list[str]] = [table.columns[k].tolist() for k in roles.movement]
     number_of: dict[Any, int] = {}
     keys = zip(labels, *columns, strict=True) if label is not None else zip(*columns, strict=True)
     codes = np.fromiter((number_of.setdefault(key, len(number_of)) for key in keys), np.intp, n_rows)

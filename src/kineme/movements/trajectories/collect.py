@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels, is_plain, learned_names
+from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
@@ -49,10 +49,16 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         times,
         label_array(labels, len(labels), names) if labeled else None,
         names if any(names) else None,
-        None if channels is None else learned_names(channels),
+        None if channels is None else _names_of(channels, positions.shape[1]),
         channels,
         recorded,
     )
+
+
+def _names_of(channels: Channels, n_dims: int) -> tuple[str, ...]:
+    """Names of the coordinates, or of the columns of movements that are still as recorded."""
+    names = learned_names(channels)
+    return names if len(names) == n_dims else recorded_names(channels)
 
 
 def _channels_of(trajectories: Sequence[Trajectory]) -> tuple[Channels | None, Array | None]:

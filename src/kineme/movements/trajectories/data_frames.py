@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from kineme.errors import DataError, TrajectoryError
-from kineme.movements.channels.coordinates import in_order, off_norm
+from kineme.movements.channels.coordinates import in_order
 from kineme.movements.channels.detect import find_channels
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.collect import collect_arrays
 from kineme.movements.trajectories.movements import Movements
-from kineme.validation import describe
 
 if TYPE_CHECKING:
     from kineme.movements.tables.layout import Layout
@@ -63,18 +60,7 @@ def collect_data_frames(frames: Sequence[Any], layout: Layout) -> Movements:
     )
     channels = find_channels(dimensions, movements.positions, movements.offsets, layout.kinds or {})
     movements = replace(movements, positions=in_order(movements.positions, dimensions, channels))
-    for channel, rows, norms in off_norm(movements.positions, channels):
-        raise TrajectoryError(
-            f"{_place(movements, int(rows[0]))}: expected unit quaternions in {', '.join(channel.columns)}, got norm "
-            f"{norms[rows[0]]:.6g}; check the order of the columns, or divide the quaternions by their norms"
-        )
     return of_channels(movements, channels)
-
-
-def _place(movements: Movements, row: int) -> str:
-    """The movement and the sample of a row."""
-    i = int(np.searchsorted(movements.offsets, row, side="right")) - 1
-    return f"{describe(i, movements.names)}: sample {row - movements.offsets[i]}"
 
 
 def _parse(frame: Any, i: int, layout: Layout) -> Parsed:

@@ -87,7 +87,7 @@ class Contextual(BaseEstimator):
         self.length_scale = length_scale
         self.noise = noise
 
-    def fit(self, movements: MovementsLike, parameters: ArrayLike) -> Self:
+    def fit(self, movements: Primitives | MovementsLike, parameters: ArrayLike) -> Self:
         """Learn the demonstrations and how they depend on the parameters.
 
         Parameters
@@ -162,7 +162,7 @@ class Contextual(BaseEstimator):
             if getattr(self, name) is not None:
                 check_number(name, getattr(self, name), above=0.0)
 
-    def _learned(self, movements: MovementsLike) -> Primitives:
+    def _learned(self, movements: Primitives | MovementsLike) -> Primitives:
         if not isinstance(movements, Primitives):
             return (DMP() if self.dmp is None else self.dmp).learn(movements)
         if self.dmp is not None and movements.dmp != self.dmp:

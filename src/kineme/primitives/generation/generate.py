@@ -9,17 +9,15 @@ import numpy as np
 
 from kineme.errors import SpecificationError
 from kineme.files.write_movement import ColumnNames, Columns
-from kineme.movements.channels.channel import Channels, is_plain
-from kineme.movements.channels.coordinates import as_wxyz, columns_of, from_wxyz
-from kineme.movements.rotations.quaternions import continuous
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.channels.coordinates import columns_of
+from kineme.movements.rotations.quaternions import NORM_TOLERANCE
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.generation.learned import Learned
 from kineme.primitives.pose.pose_primitives import PosePrimitives
-from kineme.validation import Array
+from kineme.primitives.recorded_as import in_primitive, in_recording
+from kineme.validation import LARGEST, Array
 
-_ROUNDING = 1e-9  # of a duration: stamps that are equal but for rounding
 _LONGEST = 10.0  # durations after which a movement around obstacles is given up
 
 
@@ -30,6 +28,7 @@ class MovementOptions:
     Attributes
     ----------
     start, goal : ndarray of shape (d,), optional
+        In the columns of the recording that are not discrete, in their order.
     duration : float, optional
         tau [s].
     rate : float
@@ -68,68 +67,66 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
         into memory, and numbers that are not finite: a robot gets no movement that was not checked.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
-        plain = replace(options, start=_in_primitive(learned, options.start), goal=_in_primitive(learned, options.goal))
+        start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
         move = _undisturbed if options.obstacles is None else _around_obstacles
-        made = move(learned.primitive, plain)
+        made = move(learned.primitive, replace(options, start=start, goal=goal))
     for name, column in made.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
                 f"expected finite {name} of the new movement, they leave the range of numbers; choose a start, a "
                 "goal and a duration nearer to those demonstrated"
             )
-    if learned.demonstration is not None and learned.demonstration.channels is not None:
+    about = learned.primitive.to_recording
+    if about is not None:
         duration = float(learned.primitive.durations[0]) if options.duration is None else options.duration
-        made["positions"] = _as_recorded(made, learned.demonstration, duration)
-        of_rates = _in_order_of_rates(learned.demonstration.channels)
-        made |= {name: made[name][:, of_rates] for name in ("velocities", "accelerations")}
+        made["positions"] = in_recording(_signed(made["positions"], learned), about, 0, made["times"] / duration)
+        made |= {name: made[name][:, about.rates_in_order] for name in ("velocities", "accelerations")}
     return Generated(made, ColumnNames(learned.columns, learned.rates))
 
 
-def _in_primitive(learned: Learned, point: Array | None) -> Array | None:
-    """A start or goal in the columns of the recording, in those of the primitive: an orientation last, w first."""
-    one = learned.demonstration
-    if point is None or one is None or one.channels is None or is_plain(one.channels):
-        return point
-    moved = [channel for channel in one.channels if channel.coordinates]
-    names = [name for channel in moved for name in channel.columns]
+def checked_point(learned: Learned, point: Array | None, name: str) -> Array | None:
+    """A start or goal in the columns of the recording that move, in those of the primitive.
+
+    Parameters
+    ----------
+    learned : Learned
+    point : ndarray of shape (columns,) or None
+    name : str
+        What the message calls it.
+
+    Raises
+    ------
+    SpecificationError
+        Another number of values, or such that no movement can start or end there.
+    """
+    if point is None:
+        return None
+    names = learned.moving_columns
     if point.shape != (len(names),):
-        raise SpecificationError(f"expected {len(names)} numbers, {', '.join(names)}, got {point.size}")
-    parts = [(channel, point[columns]) for channel, columns in zip(moved, columns_of(tuple(moved)), strict=True)]
-    return np.concatenate(
-        [part for channel, part in parts if channel.kind != "orientation"]
-        + [as_wxyz(part, channel) for channel, part in parts if channel.kind == "orientation"]
-    )
+        raise SpecificationError(f"expected {len(names)} numbers for {name}, {', '.join(names)}, got {point.size}")
+    if not (np.abs(point) <= LARGEST).all():
+        raise SpecificationError(
+            f"expected finite numbers up to {LARGEST:g} for {name}, got {point.tolist()}; choose another unit"
+        )
+    about = learned.primitive.to_recording
+    for channel, columns in [] if about is None else zip(about.moving, columns_of(about.moving), strict=True):
+        if channel.kind == "orientation" and abs(norm := np.linalg.norm(point[columns]) - 1.0) > NORM_TOLERANCE:
+            raise SpecificationError(
+                f"expected a unit quaternion for {', '.join(channel.columns)} of {name}, got norm {norm + 1.0:.6g}; "
+                "check the order of the columns, or divide it by its norm"
+            )
+    return point if about is None else in_primitive(point, about)
 
 
-def _as_recorded(made: Columns, demonstration: Trajectory, duration: float) -> Array:
-    """The new movement (T, columns) in the columns of the recording, with its discrete channels."""
-    channels, recorded = demonstration.channels, demonstration.recorded
-    assert channels is not None
-    elapsed = (demonstration.times - demonstration.times[0]) / demonstration.duration
-    now = np.searchsorted(elapsed, made["times"] / duration + _ROUNDING, side="right") - 1
-    moved, parts = 0, []
-    for one, columns in zip(channels, columns_of(channels), strict=True):
-        if one.kind == "orientation":
-            parts.append(_signed(from_wxyz(continuous(made["positions"][:, -4:]), one), recorded[0, columns]))
-        elif one.kind == "discrete":
-            parts.append(recorded[now, columns])
-        else:
-            parts.append(made["positions"][:, moved : moved + 1])
-            moved += 1
-    return np.concatenate(parts, axis=1)
-
-
-def _in_order_of_rates(channels: Channels) -> list[int]:
-    """The columns of a primitive's velocities in the order of the channels: those of an orientation it has last."""
-    kinds = [one.kind for one in channels for _ in one.coordinates]
-    plain = [k for k, kind in enumerate(kinds) if kind != "orientation"]
-    last = [k for k, kind in enumerate(kinds) if kind == "orientation"]
-    return np.argsort(plain + last).tolist()
-
-
-def _signed(q: Array, start: Array) -> Array:
-    """Quaternions along time with the sign of the recorded start: q and -q are one orientation, but not one column."""
-    return -q if q[0] @ start < 0 else q
+def _signed(columns: Array, learned: Learned) -> Array:
+    """Columns of a primitive, with orientations of the recorded sign: q and -q are one, but not in one column."""
+    if not isinstance(learned.primitive, PosePrimitives):
+        return columns
+    columns, start = columns.copy(), learned.primitive.starts[0]
+    for at in range(learned.primitive.n_positions, len(start), 4):
+        if columns[0, at : at + 4] @ start[at : at + 4] < 0:
+            columns[:, at : at + 4] *= -1.0
+    return columns
 
 
 def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
@@ -144,7 +141,7 @@ def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOption
 
 def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
     obstacles = np.asarray(options.obstacles)
-    n_dims = primitive.n_dims - 3 if isinstance(primitive, PosePrimitives) else primitive.n_dims
+    n_dims = primitive.n_positions if isinstance(primitive, PosePrimitives) else primitive.n_dims
     if obstacles.ndim != 2 or obstacles.shape[1] != n_dims or n_dims < 2:
         raise SpecificationError(
             f"expected obstacles in the {n_dims} dimensions of the movement, two or more, got shape {obstacles.shape}"

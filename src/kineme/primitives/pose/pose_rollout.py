@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.rotations.quaternions import product
 from kineme.movements.rotations.rotation_vectors import exp
 from kineme.primitives.base_rollout import BaseRollout
@@ -106,6 +106,16 @@ class PoseRollout(BaseRollout):
     def channels(self) -> Channels | None:
         """What was recorded, where that is known; see `Demonstrations.channels`."""
         return None if self.recorded_as is None else self.recorded_as.channels
+
+    @property
+    def _column_channels(self) -> Channels | None:
+        if self.references.shape[1] != 4:
+            return None
+        *positions, w, x, y, z = self.axis_names
+        return (
+            *(Channel(name, "position", (name,)) for name in positions),
+            Channel("q", "orientation", (w, x, y, z), None, "wxyz"),
+        )
 
     @property
     def _to_recording(self) -> RecordedAs | None:

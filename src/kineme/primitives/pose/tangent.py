@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.channel import Channels, is_plain, learned_names
 from kineme.movements.channels.coordinates import as_wxyz, columns_of
 from kineme.movements.preparation.preprocess import Step, preprocess
 from kineme.movements.rotations.quaternions import conjugate, normalized_rows, product
@@ -103,7 +103,7 @@ def as_poses(movements: MovementsLike) -> Demonstrations:
     demos = Demonstrations.of(movements)
     if demos.channels is not None and not is_plain(demos.channels):
         kinds = [one.kind for one in demos.channels]
-        if kinds.count("orientation") != 1 or demos.n_dims not in (3, 6):
+        if kinds.count("orientation") != 1 or len(learned_names(demos.channels)) not in (3, 6):
             raise TrajectoryError(
                 "expected channels that are an orientation, or an orientation and three positions, got "
                 f"{', '.join(f'{one.name} ({one.kind})' for one in demos.channels)}; "

@@ -8,12 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.modulate import modulated
 from kineme.primitives.discrete.rollout import Rollout, rollout
 from kineme.primitives.discrete.samples import sampled
 from kineme.primitives.discrete.via_points import ViaLike
+from kineme.primitives.styles.blending import as_activation, blended
+from kineme.primitives.styles.conditioning import updated
+from kineme.primitives.styles.likelihood import log_likelihoods, unexplained_noise
+from kineme.primitives.styles.observations import as_observation_times, as_observations
 from kineme.primitives.styles.parameters import (
     check_primitives,
     from_numbers,
@@ -22,8 +27,9 @@ from kineme.primitives.styles.parameters import (
     shared_label,
     to_numbers,
 )
-from kineme.validation import Array, as_numbers, check_choice, check_count
+from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
 
+_CERTAIN = 1e-6  # of the extent: smaller deviations count as equal when averages are blended
 _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
 
 
@@ -42,11 +48,16 @@ class AveragePrimitive:
         Centered, weighted deviations of theta from the mean; r is at most n and at most d (N + 3).
     tempo_factor : ndarray of shape (r,)
         The same for ln tau.
+    noise : float or None
+        Standard deviation of a path, at each time, around what the factor explains: how far each demonstration is from
+        the nearest weighted mean of the others. None where there are too few demonstrations to say, or so many that
+        they explain every path.
     """
 
     primitive: Primitives
     factor: Array
     tempo_factor: Array
+    noise: float | None = None
 
     @property
     def weight_factor(self) -> Array:
@@ -109,6 +120,143 @@ class AveragePrimitive:
         durations = self.primitive.durations * np.exp(normal @ self.tempo_factor)
         return from_numbers(self.primitive.dmp, theta, durations, shared_label(self.primitive))
 
+    def condition(
+        self,
+        t: ArrayLike,
+        position: ArrayLike | None = None,
+        std: ArrayLike = 0.0,
+        *,
+        velocity: ArrayLike | None = None,
+        velocity_std: ArrayLike = 0.0,
+    ) -> AveragePrimitive:
+        """The average of those movements that are at a position, or have a velocity, at some times.
+
+        The Gaussian is updated as Paraschos et al. (2013, Eq. 5 and 6) do, exactly and in its low-rank factor: what was
+        demonstrated together changes together, the duration too. Conditioning on positions one after another, in any
+        order, is conditioning on all at once. In an exact velocity the duration counts, and so does the order.
+
+        Parameters
+        ----------
+        t : float or array_like of shape (m,)
+            Times as shares of the duration, from 0 to 1.
+        position : array_like of shape (d,) or (m, d), optional
+            In the unit of the movements; NaN for dimensions that are free.
+        std : float or array_like of shape (m,) or (m, d), default 0.0
+            Standard deviation of the position: 0 meets it exactly, infinity changes nothing.
+        velocity : array_like of shape (d,) or (m, d), optional
+            Per second; NaN for dimensions that are free.
+        velocity_std : float or array_like of shape (m,) or (m, d), default 0.0
+            The same for the velocity.
+
+        Returns
+        -------
+        AveragePrimitive
+            Of the same kind: roll it out, sample it, condition it again.
+
+        Raises
+        ------
+        SpecificationError
+            Times outside 0 to 1, a negative std, neither position nor velocity, or more exact numbers than the
+            directions in which the demonstrations differ.
+        TrajectoryError
+            Positions or velocities of the wrong shape or infinite.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            A position or velocity that one of 370 such demonstrations would have, or fewer: with its distance, in units
+            and in standard deviations (Mahalanobis).
+        """
+        if position is None and velocity is None:
+            raise SpecificationError("expected a position or a velocity to condition on, got neither")
+        times, d = as_observation_times(t), self.primitive.n_dims
+        observed = (
+            None if position is None else as_observations("position", times, position, std, d),
+            None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),
+        )
+        now = updated(self.primitive, self.factor, self.tempo_factor, observed)
+        one = from_numbers(self.primitive.dmp, now.theta, now.duration, shared_label(self.primitive))
+        return AveragePrimitive(one, now.factor, now.tempo_factor, self.noise)
+
+    def log_likelihood(self, movements: Primitives | MovementsLike, noise: float | None = None) -> Array:
+        """Log probability density of the path of each movement, shape (n,), in nats.
+
+        Paths are those of primitives with this specification, at its `n_points` (T) times, equal shares of the
+        duration: the Gaussian of theta, and independent noise in all directions. The density is proper, its integral
+        over all paths of d T numbers is 1, so averages of different movements compare. Neighboring times are not
+        independent in truth: differences of log-likelihood are larger than the evidence.
+
+        Parameters
+        ----------
+        movements : Primitives of this specification, or movements as `DMP.learn` takes them
+        noise : float, optional
+            Standard deviation of the noise, in the unit of the movements; by default the attribute `noise`.
+
+        Raises
+        ------
+        SpecificationError
+            No noise given where none could be estimated; primitives of another specification or dimension.
+        """
+        sigma = self.noise if noise is None else noise
+        if sigma is None:
+            raise SpecificationError(
+                f"expected noise, which {len(self.factor)} demonstrations cannot tell; pass noise=, in the unit of the "
+                "movements"
+            )
+        check_number("noise", sigma, above=0.0)
+        deviations = to_numbers(self._of_this_kind(movements)) - to_numbers(self.primitive)
+        return log_likelihoods(self.primitive.dmp, deviations, self.factor, float(sigma))
+
+    def blend(self, other: AveragePrimitive, activation: ArrayLike) -> AveragePrimitive:
+        """One movement from two, each as much as it is active: the product of their Gaussians at each time.
+
+        ``p(x) ~ p_1(x)^(1 - a) p_2(x)^a`` (Paraschos et al. 2013, Section 2.3): where one is certain and the other is
+        not, the path is that of the certain one. The logarithm of the duration is averaged by the mean activation.
+
+        Parameters
+        ----------
+        other : AveragePrimitive
+            Of the same specification and dimension.
+        activation : float or array_like of shape (S,)
+            Of the other, from 0 to 1, at even times from start to goal; between them it is interpolated.
+
+        Raises
+        ------
+        SpecificationError
+            Another specification or dimension, or an activation outside 0 to 1.
+        """
+        a = as_activation(activation, self.primitive.dmp.n_points)
+        own, its = self.primitive, self._of_this_kind(_primitive_of(other))
+        found = blended(
+            own.dmp,
+            (to_numbers(own), self.factor),
+            (to_numbers(its), other.factor),
+            a,
+            _CERTAIN * float(max(own.extents.max(), its.extents.max())),
+        )
+        share = float(a.mean())
+        duration = own.durations ** (1.0 - share) * its.durations**share
+        label = shared_label(Primitives.concatenate([own, its])) if own.labels is not None is not its.labels else None
+        one = from_numbers(own.dmp, found.theta, duration, label)
+        tempo = np.concatenate(((1.0 - share) * self.tempo_factor, share * other.tempo_factor))
+        noises = [noise for noise in (self.noise, other.noise) if noise is not None]
+        return AveragePrimitive(one, found.factor, tempo, max(noises, default=None))
+
+    def _of_this_kind(self, movements: Primitives | MovementsLike) -> Primitives:
+        own = self.primitive
+        primitives = movements if isinstance(movements, Primitives) else own.dmp.learn(movements)
+        if primitives.dmp != own.dmp:
+            raise SpecificationError(f"expected primitives of the same specification, {own.dmp}, got {primitives.dmp}")
+        if primitives.n_dims != own.n_dims:
+            raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
+        return primitives
+
+
+def _primitive_of(other: Any) -> Primitives:
+    if not isinstance(other, AveragePrimitive):
+        raise SpecificationError(f"expected an AveragePrimitive to blend with, got {type(other).__name__}")
+    return other.primitive
+
 
 def average(primitives: Primitives, weights: ArrayLike | None = None) -> AveragePrimitive:
     """Mean and covariance of a batch of primitives, as if they were several demonstrations of one movement.
@@ -138,7 +286,8 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
     check_primitives(primitives)
     p = _shares(weights, len(primitives))
     tempo = np.log(primitives.durations / primitives.durations[0])
-    theta = np.column_stack((to_numbers(primitives).reshape(len(p), -1), tempo))
+    numbers = to_numbers(primitives)
+    theta = np.column_stack((numbers.reshape(len(p), -1), tempo))
     mean = theta[0] + p @ (theta - theta[0])  # equal demonstrations give themselves to the last bit
     rest = 1.0 - p @ p
     factor = np.sqrt(p / rest)[:, None] * (theta - mean) if rest > np.finfo(float).eps else np.zeros((0, len(mean)))
@@ -147,7 +296,8 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
     shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
     duration = primitives.durations[:1] * np.exp(mean[-1:])
     one = from_numbers(primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives))
-    return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1])
+    noise = unexplained_noise(primitives.dmp, numbers[p > 0.0] - numbers[p > 0.0].mean(axis=0))
+    return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 
 
 def average_by_label(primitives: Primitives) -> dict[Any, AveragePrimitive]:

@@ -22,6 +22,8 @@ from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.labels import label_array
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.operators import decoder
+from kineme.primitives.discrete.response import Response
+from kineme.primitives.discrete.specification import Specification
 from kineme.validation import Array
 
 
@@ -58,9 +60,13 @@ def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) ->
     )
 
 
-def path_matrix(dmp: DMP, n_samples: int, derivative: int = 0) -> Array:
+def path_matrix(dmp: Specification, n_samples: int, derivative: int = 0) -> Array:
     """From theta to the path at `n_samples` even phases, or to its derivative in u; shape (N + 3, n_samples)."""
-    response = decoder(dmp, n_samples)
+    return response_matrix(decoder(dmp, n_samples), derivative)
+
+
+def response_matrix(response: Response, derivative: int = 0) -> Array:
+    """The same at the times of a response, shape (N + 3, T)."""
     goal = response.goal[derivative]
     start = -goal if derivative else 1.0 - goal
     return np.vstack((response.Phi[derivative].T, start, goal, response.velocity[derivative]))

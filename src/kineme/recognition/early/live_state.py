@@ -19,6 +19,7 @@ class LiveStatus(Flag):
     TIME_NOT_INCREASING = auto()
     WRONG_SHAPE = auto()
     AVERAGED = auto()
+    NOT_UNIT = auto()
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -32,8 +33,10 @@ MESSAGES = {
     LiveStatus.TOO_SHORT: "fewer than four samples that can be used, or no motion yet",
     LiveStatus.NOT_FINITE: "a sample with NaN or infinity was skipped",
     LiveStatus.TIME_NOT_INCREASING: "a sample that is not later than the one before was skipped",
-    LiveStatus.WRONG_SHAPE: "expected a time and d positions, or k times and (k, d) positions; the call was skipped",
+    LiveStatus.WRONG_SHAPE: "expected a time and d positions or recorded columns, or k times and (k, d) of them, "
+    "as many as the samples before; the call was skipped",
     LiveStatus.AVERAGED: "the stream is longer than what is kept: earlier samples are averages of several",
+    LiveStatus.NOT_UNIT: "a sample with a quaternion that is not of norm 1 was skipped",
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike
 from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import N_POINTS
 from kineme.comparison.references import References
+from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.bounded_path import BoundedPath
@@ -20,6 +23,7 @@ from kineme.recognition.early.forecast import forecast
 from kineme.recognition.early.hypotheses import Hypotheses
 from kineme.recognition.early.live_state import Guess, LiveState, LiveStatus
 from kineme.recognition.early.prefixes import smoother
+from kineme.recognition.early.samples import Samples
 from kineme.runtime.compiled import load_compiled
 from kineme.runtime.parallel import single_threaded_blas
 from kineme.validation import MIN_SAMPLES, Array
@@ -49,6 +53,7 @@ class Live:
         self._decision = decision
         self._recognize = recognize
         self._path = BoundedPath(CAPACITY, comparison.n_dims)
+        self._samples = Samples(comparison.channels, comparison.n_dims)
         self._classes = references.classes.tolist()
         self.reset()
         self._rehearse()
@@ -60,9 +65,15 @@ class Live:
         self.update(example.times, example.positions)
         self.reset()
 
+    @property
+    def channels(self) -> Channels | None:
+        """What the recorded columns are that `update` takes; None if that is not known."""
+        return self._comparison.channels
+
     def reset(self) -> None:
         """Forget the movement; the next sample begins a new one."""
         self._path.clear()
+        self._samples.clear()
         self._decision.clear()
         self.skipped = 0
         self._leader, self._progress = -1, 0.0
@@ -75,7 +86,8 @@ class Live:
         t : float or array_like of shape (k,)
             Time stamps [s], increasing.
         x : array_like of shape (d,) or (k, d)
-            Positions.
+            Positions; or the recorded columns of the `channels`, in their order, quaternions and grippers too, which
+            are converted as those of a whole movement.
         """
         status = self._take_in(t, x)
         if self._path.per_row > 1:
@@ -95,28 +107,16 @@ class Live:
             Fewer than four samples could be used.
         """
         kept = self._path.kept()
-        return self._recognize(Trajectory(kept[:, 0].copy(), kept[:, 1:].copy()))
+        whole = Demonstrations([Trajectory(kept[:, 0].copy(), kept[:, 1:].copy())])
+        if self.channels is not None and is_plain(self.channels):  # converted already, and averaged since
+            whole = Demonstrations.of_movements(replace(whole.movements, channels=self.channels))
+        return self._recognize(whole[0])
 
     def _take_in(self, t: ArrayLike, x: ArrayLike) -> LiveStatus:
-        status = LiveStatus(0)
-        try:
-            times, positions = np.atleast_1d(np.asarray(t, dtype=float)), np.asarray(x, dtype=float)
-            positions = positions.reshape(len(times), -1) if np.ndim(t) == 0 else positions
-        except (TypeError, ValueError, OverflowError):
-            times, positions = np.empty(0), np.empty((0, 0))
-        if times.ndim != 1 or positions.shape != (len(times), self._comparison.n_dims):
-            self.skipped += 1
-            return LiveStatus.WRONG_SHAPE
-        finite = np.isfinite(times) & np.isfinite(positions).all(axis=1)
-        for time, position, usable in zip(times.tolist(), positions, finite.tolist(), strict=True):
-            if not usable:
-                status |= LiveStatus.NOT_FINITE
-            elif self._path.last is not None and time <= self._path.last[0]:
-                status |= LiveStatus.TIME_NOT_INCREASING
-            else:
-                self._path.append(time, position)
-                continue
-            self.skipped += 1
+        times, positions, status, skipped = self._samples.take(t, x)
+        for time, position in zip(times.tolist(), positions, strict=True):
+            self._path.append(time, position)
+        self.skipped += skipped
         return status
 
     def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:

@@ -1,0 +1,111 @@
+"""Recorded samples that come one after the other become the coordinates that are learned, as a whole recording does."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.movements.channels.channel import Channel, Channels, recorded_names
+from kineme.movements.channels.coordinates import (
+    as_wxyz,
+    columns_of,
+    continuous_signs,
+    lever_of,
+    off_norm,
+    period_of_channel,
+    rotation_steps,
+)
+from kineme.movements.channels.wraps import turns_of
+from kineme.validation import Array
+
+
+class IncrementalCoordinates:
+    """Coordinates of samples that come one by one, or some at a time; `canonical` and `learned` of all of them at once.
+
+    However the samples are divided into calls, the coordinates are the same, to the last bit.
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self._channels = channels
+        self._n_columns = len(recorded_names(channels))
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the samples; the next one begins a movement."""
+        lever = lever_of(self._channels)
+        self._parts = [_part_of(one, lever) for one in self._channels]
+
+    def usable(self, columns: Array) -> NDArray[np.bool_]:
+        """Which samples (k, m) have quaternions of norm 1, (k,)."""
+        good = np.ones(len(columns), dtype=bool)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _, rows, _ in off_norm(columns, self._channels):
+                good[rows] = False
+        return good
+
+    def take(self, columns: Array) -> Array:
+        """The coordinates (k, d) of the next k recorded samples (k, m)."""
+        parts = zip(self._parts, columns_of(self._channels), strict=True)
+        return np.concatenate([part.take(columns[:, rows]) for part, rows in parts], axis=1)
+
+
+class _Position:
+    """A column as it is."""
+
+    def take(self, column: Array) -> Array:
+        return column
+
+
+class _Discrete:
+    """No coordinate."""
+
+    def take(self, column: Array) -> Array:
+        return column[:, :0]
+
+
+class _Angle:
+    """The angle before, and the turns up to it."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._before = np.empty((0, 1))
+        self._turns = np.zeros((1, 1))
+
+    def take(self, column: Array) -> Array:
+        if not np.isfinite(self._period) or not len(column):
+            return column
+        before = self._before if len(self._before) else column[:1]
+        steps = np.diff(column, axis=0, prepend=before)
+        turns = self._turns + np.cumsum(turns_of(steps, self._period), axis=0)
+        self._before, self._turns = column[-1:].copy(), turns[-1:]
+        return np.asarray(column - self._period * turns)
+
+
+class _Orientation:
+    """The quaternion before, as it was recorded and with the sign that it got, and the rotation up to it."""
+
+    def __init__(self, channel: Channel, lever: float) -> None:
+        self._channel, self._lever = channel, lever
+        self._before, self._signed = np.empty((0, 4)), np.empty((0, 4))
+        self._turned = np.zeros((1, 3))
+
+    def take(self, columns: Array) -> Array:
+        if not len(columns):
+            return np.empty((0, 3))
+        n_before = len(self._before)
+        block = np.concatenate((self._before, columns))
+        signed = continuous_signs(block, np.array([0, len(block)]))
+        if (self._before * self._signed).sum() < 0:
+            signed = -signed
+        steps = rotation_steps(as_wxyz(np.concatenate((self._signed, signed[n_before:])), self._channel))
+        turned = np.cumsum(np.concatenate((self._turned, steps)), axis=0)
+        self._before, self._signed, self._turned = columns[-1:].copy(), signed[-1:].copy(), turned[-1:].copy()
+        return np.asarray(self._lever * turned[n_before:])
+
+
+def _part_of(one: Channel, lever: float) -> _Position | _Discrete | _Angle | _Orientation:
+    if one.kind == "orientation":
+        return _Orientation(one, lever)
+    if one.kind == "angle":
+        return _Angle(period_of_channel(one, np.full(1, np.inf)))  # of one that says no period nothing is unwrapped
+    return _Discrete() if one.kind == "discrete" else _Position()

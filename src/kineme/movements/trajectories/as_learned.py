@@ -1,0 +1,132 @@
+"""Movements that come, in the coordinates that were learned: converted by the channels, or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import (
+    Channels,
+    in_words,
+    is_plain,
+    moving_kinds,
+    recorded_names,
+)
+from kineme.movements.channels.coordinates import lever_of
+from kineme.movements.trajectories.channels import in_coordinates, of_channels
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import Trajectory
+
+_SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"
+_SAY = (
+    "choose the columns by columns= and say what they are by kinds= of read_recordings, in the shell --columns and "
+    "--kind"
+)
+
+
+def as_learned(
+    movements: MovementsLike, learned: Channels | None, n_dims: int, what: str = "movements"
+) -> Demonstrations:
+    """Movements in the `n_dims` coordinates that were learned from channels; of None nothing is known but their number.
+
+    - Without channels, positions as wide as the recorded columns are converted: angles are unwrapped, quaternions are
+      integrated, discrete columns are left out. Positions as wide as the coordinates are taken as they are, but for
+      wraps of angles.
+    - With channels, their kinds have to be those that were learned, in their order, discrete ones left aside; names are
+      free. Columns of the same names are what was learned, whatever kind their values look like.
+
+    `what` they are called in messages.
+
+    Raises
+    ------
+    TrajectoryError
+        Channels of other kinds, another number of columns, or columns of a quaternion that is not of norm 1.
+    """
+    if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
+        return _one_by_one(movements, learned, n_dims, what)
+    demos = Demonstrations.of(movements)
+    if demos.channels is not None:
+        return _of_kinds(demos, learned, n_dims, what)
+    if learned is not None and demos.n_dims == len(recorded_names(learned)):
+        return of_columns(demos, learned)
+    if demos.n_dims != n_dims:
+        raise TrajectoryError(_of_width(demos, learned, n_dims, what))
+    return demos
+
+
+def _of_several_channels(movements: Sequence[Any]) -> bool:
+    """Whether channels differ in a list: of all its movements together nothing would be known."""
+    every = {id(channels): channels for channels in (getattr(one, "channels", None) for one in movements)}
+    return len(every) > 1 and len({*every.values()}) > 1
+
+
+def _one_by_one(movements: Sequence[Any], learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
+    found: list[Trajectory] = []
+    for i, one in enumerate(movements):
+        try:
+            found += as_learned(one if hasattr(one, "demonstrations") else [one], learned, n_dims, what)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"index {i} of the list: {error}") from error
+    return Demonstrations(found)
+
+
+def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> Demonstrations:
+    """Movements with channels."""
+    channels = demos.channels or ()
+    if learned is None:  # learned as plain columns: so is what is asked
+        plain = demos if demos.n_dims == n_dims else as_recorded(demos)
+        if plain.n_dims == n_dims:
+            return plain
+        raise TrajectoryError(_of_width(demos, learned, n_dims, what))
+    if moving_kinds(channels) == moving_kinds(learned):
+        return _with_lever(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
+    if recorded_names(channels) == recorded_names(learned):
+        return of_columns(as_recorded(demos), learned)
+    if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
+        raise TrajectoryError(_of_width(demos, learned, n_dims, what))
+    raise TrajectoryError(
+        f"expected {what} recorded as {in_words(learned)}, as those that were learned, got {in_words(channels)}; "
+        f"{_SAY}, or learn these apart"
+    )
+
+
+def _of_width(demos: Demonstrations, learned: Channels | None, n_dims: int, what: str) -> str:
+    """What is wrong with movements of another width."""
+    if learned is None or is_plain(learned):
+        learned_of = "" if learned is None else f", where those that were learned are {in_words(learned)}"
+        return f"expected {what} of {n_dims} dimensions as in fit, got {demos.n_dims}{learned_of}; {_SELECT}"
+    return (
+        f"expected {what} of {len(recorded_names(learned))} columns, {in_words(learned)}, or of the {n_dims} "
+        f"coordinates that are learned of them, got {demos.n_dims} columns; {_SELECT}"
+    )
+
+
+def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
+    """Movements whose positions are recorded columns, by what these are."""
+    if all(one.kind == "position" for one in learned):
+        return demos
+    raw = replace(demos.movements, channels=None, recorded=None)
+    return Demonstrations.of_movements(of_channels(raw, learned), demos.steps)
+
+
+def as_recorded(demos: Demonstrations) -> Demonstrations:
+    """The recorded columns as plain positions, of which nothing else is known."""
+    plain = replace(demos.movements, positions=demos.recorded, recorded=None, channels=None, dimensions=None)
+    return Demonstrations.of_movements(plain, demos.steps)
+
+
+def _with_lever(demos: Demonstrations, learned: Channels) -> Demonstrations:
+    """Rotations beside positions whose unit is not known count as they do beside those that were learned."""
+    channels = demos.channels or ()
+    units = [one.unit for one in channels if one.kind == "position"]
+    ratio = 1.0 if not units or units[0] is not None else lever_of(learned) / lever_of(channels)
+    if ratio == 1.0 or is_plain(channels):
+        return demos
+    turned = np.array([one.kind == "orientation" for one in channels for _ in one.coordinates])
+    positions = demos.positions * np.where(turned, ratio, 1.0)
+    return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)

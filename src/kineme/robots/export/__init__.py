@@ -1,0 +1,1 @@
+"""Joint trajectories in the formats that robots and their programs take."""

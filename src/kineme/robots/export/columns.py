@@ -1,0 +1,42 @@
+"""A joint trajectory as columns, for CSV, NPZ, JSON and Parquet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kineme.files.write_movement import ColumnNames, Columns, encode_movement, write_movement
+from kineme.robots.execution.joint_trajectory import JointTrajectory
+
+
+def write_columns(path: Path, trajectory: JointTrajectory) -> Path:
+    """Times, joints and discrete channels under their names, then velocities ``v_NAME`` and accelerations ``a_NAME``.
+
+    Raises
+    ------
+    DataError
+        An ending that no writer has, or a file that cannot be written.
+    """
+    return write_movement(path, *as_columns(trajectory))
+
+
+def encode_columns(trajectory: JointTrajectory, ending: str = ".csv") -> bytes:
+    """The bytes of such a file."""
+    return encode_movement(*_swapped(as_columns(trajectory), ending))
+
+
+def _swapped(columns: tuple[Columns, ColumnNames], ending: str) -> tuple[Columns, str, ColumnNames]:
+    return columns[0], ending, columns[1]
+
+
+def as_columns(trajectory: JointTrajectory) -> tuple[Columns, ColumnNames]:
+    """The arrays, and what their columns are called."""
+    positions = np.column_stack((trajectory.positions, *trajectory.steps.values()))
+    columns = {
+        "times": trajectory.times,
+        "positions": positions,
+        "velocities": trajectory.velocities,
+        "accelerations": trajectory.accelerations,
+    }
+    return columns, ColumnNames((*trajectory.joints, *trajectory.steps), trajectory.joints)

@@ -1,0 +1,68 @@
+"""A movement on an arm as a picture: where its tip goes, and its joints beside their limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
+from kineme.output.text import drawable
+from kineme.primitives.rollout_figure import set_equal_scales
+from kineme.robots.checks.along import along
+from kineme.robots.robot_movement import RobotMovement
+
+_ROW = 0.8  # height of one joint [inch]
+
+
+def draw_robot_movement(made: RobotMovement) -> Figure:
+    """The path of the tip, wanted and executed, and each joint over time with its limits."""
+    trajectory, robot = made.trajectory, made.robot
+    n = robot.n_joints + len(trajectory.steps)
+    figure = new_figure(8.4, max(3.6, 1.0 + _ROW * n))
+    left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.25))  # type: ignore[misc]
+    _draw_path(left, made)
+    rows = right.subplots(n, 1, sharex=True, squeeze=False)[:, 0]
+    for j, axes in enumerate(rows[: robot.n_joints]):
+        _draw_joint(axes, made, j)
+    for axes, (name, values) in zip(rows[robot.n_joints :], trajectory.steps.items(), strict=True):
+        axes.step(trajectory.times, values, color=BLUE, where="post")
+        axes.set_ylabel(drawable(_short(name)), fontsize=8)
+    rows[-1].set_xlabel("time [s]")
+    right.align_ylabels()
+    right.suptitle("joints [rad] and their limits; the approach is shaded", fontsize=9)
+    return figure
+
+
+def _draw_path(figure: Any, made: RobotMovement) -> None:
+    executed = along(made.robot, made.trajectory).tip_positions
+    first = int(np.searchsorted(made.trajectory.times, made.begins - 1e-9))
+    axes = figure.add_subplot(projection="3d")
+    axes.plot(*executed[: first + 1].T, color=GRAY, linestyle=":", label="approach")
+    if made.path is not None:
+        axes.plot(*made.path.positions.T, color=ORANGE, linewidth=4, alpha=0.5, label="wanted")
+    axes.plot(*executed[first:].T, color=BLUE, label="executed")
+    axes.scatter(*executed[first], color=BLUE, s=24, label="start")
+    axes.scatter(*executed[-1], color=BLUE, s=40, marker="*", label="goal")
+    set_equal_scales(axes, executed)
+    for name in "xyz":
+        getattr(axes, f"set_{name}label")(f"{name} [m]")
+    figure.legend(loc="outside lower center", ncols=3)
+    figure.suptitle(f"tip of {drawable(made.robot.name)}", fontsize=9)
+
+
+def _draw_joint(axes: Any, made: RobotMovement, j: int) -> None:
+    robot, times, values = made.robot, made.trajectory.times, made.trajectory.positions[:, j]
+    axes.axvspan(0, made.begins, color=GRAY, alpha=0.12, linewidth=0)
+    axes.plot(times, values, color=BLUE)
+    room = 0.15 * max(float(np.ptp(values)), 0.5)
+    low, high = float(values.min()) - room, float(values.max()) + room
+    for limit in (robot.lower[j], robot.upper[j]):
+        if low - room <= limit <= high + room:
+            axes.axhline(limit, color=ORANGE, linestyle="--", linewidth=1)
+    axes.set_ylabel(drawable(_short(robot.joints[j])), fontsize=8)
+
+
+def _short(name: str, longest: int = 12) -> str:
+    return name if len(name) <= longest else "…" + name[1 - longest :]

@@ -1,0 +1,54 @@
+"""The shell says where recordings have other channels than a library, and refuses other kinds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import answer, run
+
+import kineme
+
+
+def _table(path, heads, bend, n=60):
+    u = np.linspace(0, 1, n)
+    s = u**3 * (10 - 15 * u + 6 * u**2)
+    columns = {heads[0]: s, heads[1]: bend * np.sin(np.pi * u), heads[2]: np.sin(2 * np.pi * u) * (bend > 1)}
+    pd.DataFrame({"t": 2 * u} | columns).to_csv(path, index=False)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for label, bend in (("low", 0.3), ("high", 1.5)):
+        (tmp_path / "shown" / label).mkdir(parents=True)
+        for k in range(2):
+            _table(tmp_path / "shown" / label / f"{k}.csv", ("x [m]", "y [m]", "z [m]"), bend + 0.05 * k)
+    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(kineme.read_recordings(tmp_path / "shown").demonstrations)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", ["recognize", "annotate"])
+def test_names_and_units_that_differ_are_said(folder, command):
+    asked = folder / "asked.csv"
+    _table(asked, ("px [mm]", "y [mm]", "z [m]"), 1.5)
+    told = answer(command, asked, "--library", folder / "actions")
+    names, units = told["notes"]
+    assert names == (
+        "Columns are compared in their order: px [mm], y [mm] of the recordings with x [m], y [m] of the library"
+    )
+    assert "Units differ and are not converted: px [mm] in mm, y [mm] in mm in the recordings, x [m] in m" in units
+    shown = run(command, asked, "--library", folder / "actions")[1]
+    assert "Columns are compared in their order" in " ".join(shown.split())
+    _table(asked, ("x [m]", "y [m]", "z [m]"), 1.5)
+    assert answer(command, asked, "--library", folder / "actions")["notes"] == []
+
+
+@pytest.mark.parametrize("command", ["recognize", "annotate"])
+def test_other_kinds_are_refused(folder, command):
+    asked = folder / "asked.csv"
+    _table(asked, ("joint1", "joint2", "joint3"), 1.5)
+    _, out, err = run(command, asked, "--library", folder / "actions")
+    said = " ".join((out + err).split())
+    assert "recorded as x [m] (position), y [m] (position), z [m] (position)" in said
+    assert "got joint1 (angle)" in said

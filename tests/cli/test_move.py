@@ -1,0 +1,94 @@
+"""``kineme move``: joints for an arm, checked before they are written."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kineme.cli import main
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+
+@pytest.fixture
+def wave(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    u = np.linspace(0, 1, 120)
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    columns = (2 * u, 0.3 * s, 0.05 * np.sin(2 * np.pi * s), 0.1 * np.sin(2 * np.pi * s), u > 0.5)
+    np.savetxt("wave.csv", np.column_stack(columns), delimiter=",", header="time,x,y,z,gripper", comments="")
+    return tmp_path
+
+
+def run(*words):
+    return CliRunner().invoke(main, ["move", *map(str, words)])
+
+
+def test_joints_are_written_with_their_names_and_the_gripper_steps(wave):
+    result = run("wave.csv", "--robot", "panda", "--at", "0.45,-0.2,0.3", "--slow-down", "-o", "joints.csv")
+    assert result.exit_code == 0, result.output
+    assert "self-collision" in result.output
+    heads = (wave / "joints.csv").read_text().splitlines()[0].split(",")
+    assert heads[:9] == ["time", *(f"panda_joint{k}" for k in range(1, 8)), "gripper"]
+    gripper = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[:, 8]
+    assert set(gripper) == {0.0, 1.0}
+    assert np.count_nonzero(np.diff(gripper)) == 1
+
+
+def test_what_fails_a_check_is_not_written_without_force(wave):
+    words = ("wave.csv", "--robot", "ur5e", "--duration", "0.3", "-o", "joints.csv")
+    result = run(*words)
+    assert result.exit_code == 1
+    assert "FAILED" in result.output
+    assert "--slow-down" in result.output
+    assert not (wave / "joints.csv").exists()
+    assert run(*words, "--force").exit_code == 0
+    assert (wave / "joints.csv").exists()
+
+
+def test_a_goal_needs_a_start(wave):
+    result = run("wave.csv", "--robot", "panda", "--goal", "0.5,0,0.4")
+    assert result.exit_code == 2
+    assert "expected --at with --goal" in result.output
+
+
+def test_the_tip_ends_at_the_goal(wave):
+    from kineme.robots import load
+    from kineme.robots.checks.along import along
+    from kineme.robots.execution.joint_trajectory import JointTrajectory
+
+    words = ("--robot", "wam", "--at", "0.45,-0.2,0.3", "--goal", "0.5,0.2,0.4", "--duration", "6", "-o", "joints.csv")
+    result = run("wave.csv", *words)
+    assert result.exit_code == 0, result.output
+    robot = load("wam")
+    q = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[-1:, 1:8]
+    still = np.zeros_like(q)
+    end = along(robot, JointTrajectory(robot.joints, np.zeros(1), q, still, still, {})).tip_positions[0]
+    np.testing.assert_allclose(end, [0.5, 0.2, 0.4], atol=5e-3)
+
+
+def test_bags_and_goals_hold_the_same_joints(wave):
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    words = ("--at", "0.45,-0.2,0.3", "--slow-down", "-o", "j.csv", "--ros1", "w.bag", "--ros2", "w.mcap")
+    result = run("wave.csv", "--robot", "panda", *words, "--action-goal", "goal.yaml")
+    assert result.exit_code == 0, result.output
+    from pathlib import Path
+
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    joints = np.loadtxt("j.csv", delimiter=",", skiprows=1)[:, 1:8]
+    for name, version in (("w.bag", Stores.ROS1_NOETIC), ("w.mcap", Stores.LATEST)):
+        with AnyReader([Path(name)], default_typestore=get_typestore(version)) as reader:
+            found = {c.topic: reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()}
+        points = found["/joint_trajectory_controller/joint_trajectory"].points
+        np.testing.assert_array_equal([point.positions for point in points], joints)
+    goal = json.loads(Path("goal.yaml").read_text())["trajectory"]
+    np.testing.assert_array_equal([point["positions"] for point in goal["points"]], joints)
+
+
+def test_an_input_is_never_written_over(wave):
+    assert run("wave.csv", "--robot", "panda", "-o", "wave.csv", "--force").exit_code == 2

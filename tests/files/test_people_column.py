@@ -1,0 +1,63 @@
+"""Who showed a movement, from a column of a table."""
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import DataError, SpecificationError
+
+ROWS = [
+    (person, label, k / 10, k * size, k * k)
+    for person, label, size in (("ann", "wave", 1), ("ann", "nod", 2), ("bob", "nod", 3), ("ann", "wave", 4))
+    for k in range(10)
+]
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["who,label,t,x,y", *(",".join(map(str, row)) for row in ROWS)]))
+    return path
+
+
+def test_a_movement_begins_where_the_person_or_the_label_changes(table):
+    read = kineme.read_recordings(table, person="who")
+    assert read.people == ["ann", "ann", "bob", "ann"]
+    assert list(read.labels) == ["wave", "nod", "nod", "wave"]
+    assert read.demonstrations.dimensions == ("x", "y")
+    assert [one.place for one in read.sources] == ["0", "1", "2", "3"]
+    assert read.detected[0][0].person == ("who",)
+
+
+def test_people_of_movements_that_columns_tell_apart(tmp_path):
+    """Rows of one movement stand anywhere; a fault costs its movement alone, with its person."""
+    rows = [
+        f"{k / 10},{demo},{who},{k + demo},{k * k}" for k in range(10) for demo, who in enumerate(("ann", "bob", ""))
+    ]
+    rows[3] = "0.1,0,ann,oops,1"
+    (tmp_path / "a.csv").write_text("\n".join(["t,demo,who,x,y", *rows]))
+    read = kineme.read_recordings(tmp_path / "a.csv", person="who", movement="demo")
+    assert read.people == ["bob", None]
+    assert len(read.problems) == 1
+    assert kineme.read_recordings(tmp_path / "a.csv", movement="demo", columns=["x", "y"]).people is None
+
+
+def test_a_column_of_subjects_that_tells_movements_apart_names_people_too(tmp_path):
+    rows = [f"{subject},{k / 10},{k},{k * subject}" for subject in (1, 2) for k in range(10)]
+    (tmp_path / "a.csv").write_text("\n".join(["subject,t,x,y", *rows]))
+    read = kineme.read_recordings(tmp_path / "a.csv", person="subject")
+    assert (read.people, read.demonstrations.dimensions) == (["1", "2"], ("x", "y"))
+
+
+@pytest.mark.parametrize(("person", "words"), [("nobody", "expected a column 'nobody'")])
+def test_a_column_that_is_not_there_is_refused(table, person, words):
+    with pytest.raises(DataError, match=words):
+        kineme.read_recordings(table, person=person)
+
+
+def test_a_file_without_columns_has_no_people_in_one(tmp_path, table):
+    np.savez(tmp_path / "a.npz", positions=np.random.default_rng(0).normal(size=(3, 10, 2)), people=["a", "b", "c"])
+    with pytest.raises(DataError, match="expected a column 'people' of a table that names people"):
+        kineme.read_recordings(tmp_path / "a.npz", person="people")
+    with pytest.raises(SpecificationError, match="not both"):
+        kineme.read_recordings(table, person="who", label_pattern="{person}.csv")
