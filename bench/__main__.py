@@ -17,6 +17,7 @@ SUBJECTS = (
     "dmp_defaults",
     "rhythm",
     "control",
+    "modulation",
     "recognize",
     "recognize_files",
     "stream",
