@@ -15,6 +15,7 @@ SUBJECTS = (
     "startup",
     "reconstruction",
     "dmp_defaults",
+    "adapting",
     "rhythm",
     "control",
     "modulation",

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from PIL import Image
 from walk_through import walk
 
@@ -101,6 +102,55 @@ def styles() -> Figure:
     return draw_morph(kineme.DMP().learn(kineme.load_lasa(["Multi_Models_3"])))
 
 
+def adapting() -> Figure:
+    """An average and what it becomes when it is conditioned; movements between tasks; an improved movement."""
+    figure = new_figure(9.6, 3.1)
+    left, middle, right = figure.subplots(1, 3)
+    mean = kineme.styles.average(_learn("bio-inspired", kineme.load_lasa(["GShape"])))
+    path, spread = mean.primitive.rollout(n_samples=101).positions[0], mean.deviation(101)
+    point = path[40, 1] - 1.5 * spread[40, 1]
+    conditioned = mean.condition(t=0.4, position=[np.nan, point], std=0.2)
+    u = np.linspace(0, 1, 101)
+    for one, color, label in ((mean, GRAY, "average"), (conditioned, ORANGE, "conditioned")):
+        y, deviation = one.primitive.rollout(n_samples=101).positions[0, :, 1], one.deviation(101)[:, 1]
+        left.fill_between(u, y - 2 * deviation, y + 2 * deviation, color=color, alpha=0.35, linewidth=0)
+        left.plot(u, y, color=color, label=label)
+    left.plot(0.4, point, "o", color="black", markersize=4)
+    left.set(title="(a) conditioned on a position", xlabel="share of the duration", ylabel="y [mm]", xlim=(0, 1))
+
+    heights = np.array([0.1, 0.2, 0.35, 0.5])
+    model = kineme.Contextual().fit([lifted(height) for height in heights], parameters=heights)
+    between = model.primitive(np.linspace(0.1, 0.5, 9)).rollout().positions
+    middle.plot(*between.transpose(2, 1, 0), color=ORANGE, linewidth=1)
+    middle.plot(
+        *np.stack([lifted(height) for height in heights]).transpose(2, 1, 0), color=GRAY, linewidth=4, alpha=0.4
+    )
+    middle.set(title="(b) between demonstrated heights", xlabel="x [m]", ylabel="y [m]")
+
+    primitive = kineme.DMP().learn([lifted(0.1)])
+    around = kineme.improve(primitive, wall)
+    for one, color, label in ((primitive, GRAY, "demonstrated"), (around.primitive, ORANGE, "improved")):
+        right.plot(*one.rollout().positions[0].T, color=color, label=label)
+    right.add_patch(Rectangle((0.45, 0.0), 0.1, 0.3, color=BLUE, alpha=0.4, linewidth=0))
+    right.set(title="(c) around what it should not touch", xlabel="x [m]", ylabel="y [m]", ylim=(-0.02, 0.5))
+    for axes in (left, right):
+        axes.legend(frameon=False, fontsize=8, loc="upper right")
+    return figure
+
+
+def lifted(height: float) -> np.ndarray:
+    """A movement over something of that height [m]."""
+    u = np.linspace(0, 1, 100)
+    return np.column_stack((u, height * np.sin(np.pi * u) ** 2))
+
+
+def wall(rollout: kineme.Rollout) -> np.ndarray:
+    """Depth inside of a wall, and a little for acceleration."""
+    x, y = rollout.positions[:, :, 0], rollout.positions[:, :, 1]
+    inside = np.where(np.abs(x - 0.5) < 0.08, np.maximum(0.33 - y, 0.0), 0.0)
+    return np.asarray(inside.max(axis=1) + 1e-5 * np.mean(rollout.accelerations**2, axis=(1, 2)))
+
+
 def reliability() -> Figure:
     """Confidence against the share of right answers, as `python -m bench --only open_set` measured it."""
     measured = Path(__file__).parents[1] / "bench" / "results" / "open_set.json"
@@ -128,6 +178,7 @@ def reliability() -> Figure:
 
 FIGURES = {
     "around-obstacles": around_obstacles,
+    "adapting": adapting,
     "reliability": reliability,
     "styles": styles,
     "three-issues": three_issues,

@@ -46,6 +46,10 @@ for taken in (demos, read, cut, rollout):
 with kineme.ActionLibrary("actions", create=True) as library:
     library.learn(read)
     reveal_type(library.recognize(movement))
+chosen: kineme.DMP = kineme.DMP().choose(demos).dmp
+between: kineme.Primitives = kineme.Contextual().fit(demos, parameters=np.arange(7.0)).primitive(0.5)
+better: kineme.Improvement = kineme.improve(primitives[:1], lambda rollout: rollout.positions[:, -1, 0])
+passing: kineme.styles.AveragePrimitive = kineme.styles.average(primitives).condition(t=0.5, position=[0.0, 1.0])
 reveal_type(recognizer.spot(movement))
 reveal_type(recognizer.stream().update(0.0, [0.0, 0.0]))
 reveal_type(kineme.anchoring.propose(demos))

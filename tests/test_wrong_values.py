@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import warnings
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ import kineme
 from kineme import (
     DMP,
     ActionLibrary,
+    Contextual,
     Demonstrations,
     DMPFeatures,
     KinemeError,
@@ -34,6 +36,7 @@ from kineme.features.random_binning import RandomBinning
 from kineme.movements.preparation.perturbations import Perturbation
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.recognition.early.hypotheses import Early
+from kineme.styles import AveragePrimitive, average
 
 WRONG = (
     None, math.nan, math.inf, -math.inf, -1, 0, 10**9, 10**30, 10**400, 1e-320, 1e-200, 1e160, 1e300, 1e308, -1e308,
@@ -131,6 +134,31 @@ def _rhythmic_controller(**wish):
     _finite(state.position, state.velocity, state.acceleration, state.time)
 
 
+@cache
+def _average():
+    return average(DMP(n_basis=8, n_points=40).learn(_demos()))
+
+
+def _condition(**wish):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", kineme.ExtrapolationWarning)
+        made = _average().condition(**({"t": 0.5, "position": [1.0, 2.0]} | wish))
+    _finite(made.primitive.rollout().positions, made.factor, made.deviation())
+
+
+def _task(**wish):
+    model = Contextual(DMP(n_basis=8, n_points=40)).fit(_demos(), [1, 2, 3, 4, 5, 7])
+    _finite(model.primitive(**wish).rollout().positions)
+
+
+def _improve(**wish):
+    def cost(rollout):
+        return np.abs(rollout.positions[:, 1]).sum(axis=1)
+
+    found = kineme.improve(**({"primitive": _primitive(), "cost": cost, "updates": 2, "rollouts": 6} | wish))
+    _finite(found.primitive.scaled_weights, found.costs)
+
+
 def _names(function):
     return [
         one.name
@@ -202,6 +230,27 @@ USES = {
         lambda **wish: repr(Trajectory(**({"times": np.arange(5), "positions": np.eye(5)} | wish))),
         ["times", "positions", "name"],
     ),
+    "choose": (lambda **wish: _finite(DMP().choose(**({"movements": _demos()} | wish)).error), _names(DMP.choose)),
+    "condition": (_condition, _names(AveragePrimitive.condition)),
+    "condition velocity": (
+        lambda **wish: _condition(**({"position": None, "velocity": [1, 0]} | wish)),
+        ["velocity", "velocity_std", "t"],
+    ),
+    "log_likelihood": (
+        lambda **wish: _finite(_average().log_likelihood(**({"movements": _demos()} | wish))),
+        ["movements", "noise"],
+    ),
+    "blend": (
+        lambda **wish: _average().blend(**({"other": _average(), "activation": 0.5} | wish)),
+        ["other", "activation"],
+    ),
+    "Contextual": (lambda **wish: Contextual(**wish).fit(_demos(), [1, 2, 3, 4, 5, 7]), _names(Contextual)),
+    "fit Contextual": (
+        lambda **wish: Contextual().fit(**({"movements": _demos(), "parameters": [1, 2, 3, 4, 5, 7]} | wish)),
+        ["movements", "parameters"],
+    ),
+    "of a task": (_task, ["parameters"]),
+    "improve": (_improve, sorted(set(_names(kineme.improve)) - {"updates", "progress"})),
     "ActionLibrary": (ActionLibrary, ["folder"]),
     "RBF": (_gram(kernels.RBF), ["sigma"]),
     "TruncatedEuclidean": (_gram(kernels.TruncatedEuclidean), ["m", "sigma"]),

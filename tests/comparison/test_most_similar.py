@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import kineme
 from kineme.comparison import most_similar as module
 from kineme.comparison.describe import describe
-from kineme.comparison.most_similar import most_similar
+from kineme.comparison.most_similar import most_similar, nearest_above
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
@@ -53,6 +53,49 @@ def test_it_is_the_one_that_comparing_all_finds(d, seed, width, spread, weights,
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_LEAST_PAIRS", 1)
         np.testing.assert_array_equal(most_similar(similarity, A, B), by_all(similarity, A, B))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    d=st.integers(1, 4),
+    seed=st.integers(0, 10**6),
+    width=st.floats(0.1, 3.0),
+    shares=st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5),
+    weights=st.none() | st.lists(st.floats(0.05, 1.0), min_size=N, max_size=N),
+    many=st.sampled_from([0.0, 1.0]),
+)
+def test_what_reaches_the_bar_is_known_and_nothing_else_seems_to(d, seed, width, shares, weights, many):
+    """With bars among the similarities, bounds by rows alone and bounds by pairs."""
+    how = ComparisonSpecification()
+    stored = describe(draw_shapes([4] * 5, d=d, seed=seed), how)
+    asked = describe(draw_shapes([4] * 5, d=d, seed=seed, spread=0.1), how)
+    widths = width * np.random.default_rng(seed).uniform(0.5, 2.0, N) * np.where(np.arange(N) < 2, 5.0, 0.3)
+    given = None if weights is None else np.array(weights) / sum(weights)
+    similarity = AveragedSimilarity(stored.procrustes, widths, "arithmetic", given)
+    first = np.array([0, 4, 6, 12, 13])
+    exact = np.maximum.reduceat(similarity.log_average(asked, stored), first, axis=1)
+    logs = np.array([np.quantile(column, share) for column, share in zip(exact.T, shares, strict=True)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_LEAST_PAIRS", 1)
+        patch.setattr(module, "_MANY", many)
+        found = nearest_above(similarity, asked, stored, first, np.exp(logs))
+    reached = exact >= logs
+    np.testing.assert_allclose(found[reached], exact[reached], rtol=1e-12)
+    assert (found[~reached] < np.broadcast_to(logs, exact.shape)[~reached]).all()
+    assert (found >= exact - 1e-5).all()
+
+
+@pytest.mark.parametrize(("bar", "bounded"), [(0.2, 0), (0.4, 1), (0.9, 0)])
+def test_pairs_are_bounded_only_where_that_may_rule_some_out(bar, bounded, monkeypatch):
+    """Point clouds have a quarter of the weights and no bound; what is far by rows has a similarity below 0.63."""
+    stored, asked = (describe(draw_shapes([1] * 40, seed=seed, spread=1.0)) for seed in (1, 2))
+    weights = np.array([2.0, 1.0, 2.0, 1.0, 2.0])
+    widths = np.array([1e-3, 1e-3, 1.0, 1.0, 1.0])
+    similarity = AveragedSimilarity(stored.procrustes, widths, "arithmetic", weights / 8)
+    inner, calls = module.pair_bounds, []
+    monkeypatch.setattr(module, "pair_bounds", lambda *given: calls.append(1) or inner(*given))
+    nearest_above(similarity, asked, stored, np.arange(0, 40, 2), np.full(20, bar))
+    assert len(calls) == bounded
 
 
 @pytest.mark.parametrize("choice", ["never", "always"])

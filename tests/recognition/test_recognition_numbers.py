@@ -17,13 +17,14 @@ from kineme.movements.preparation.perturbations import Perturbation
 from kineme.movements.segmentation.motion import observe
 from kineme.recognition import spotting
 from kineme.recognition.candidate_windows import Surroundings
+from kineme.recognition.compared_windows import Templates, compare_windows
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.early.decision import Decision
 from kineme.recognition.early.evidence import _log_priors, describe_begun
 from kineme.recognition.early.hypotheses import Early, hypotheses
 from kineme.recognition.early.prefixes import smooth_paths
 from kineme.recognition.left_out import typical_scale
-from kineme.recognition.window_scores import Manner, Templates, compare_windows, expected, score_windows
+from kineme.recognition.window_scores import Manner, expected, score_windows
 from movement_samples import draw_shapes
 
 

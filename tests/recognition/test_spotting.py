@@ -15,9 +15,20 @@ import pytest
 import kineme
 from kineme import Demonstrations, Recognizer, SpecificationError, Trajectory, TrajectoryError
 from kineme.experiments.evaluation.spotting import Counts, concatenate, count_spotted
+from kineme.movements.segmentation.motion import observe
 from kineme.movements.segmentation.segmentation import pieces_of
-from kineme.recognition.spotting import Spotted, _left_over, best_chain
-from kineme.recognition.window_scores import ComparedWindows, Expected, Manner, closest_classes, weighted_by_rarity
+from kineme.recognition import compared_windows
+from kineme.recognition.candidate_windows import Durations, candidate_windows, resampled
+from kineme.recognition.compared_windows import (
+    Candidates,
+    ComparedWindows,
+    Templates,
+    compare_candidates,
+    rarity_weights,
+    size_and_slowness,
+)
+from kineme.recognition.spotting import Spotted, _complete_scores, _left_over, best_chain
+from kineme.recognition.window_scores import Expected, Manner, closest_classes, far
 from movement_samples import draw_shapes
 
 KNOWN = ["CShape", "NShape", "Sshape", "WShape"]
@@ -225,9 +236,77 @@ def test_a_class_that_much_of_the_recording_is_near_to_counts_less():
     """A fifth of the windows is within 0.2 of the first class and 0.8 of the second."""
     distances = np.column_stack((np.linspace(0.0, 1.0, 11), np.linspace(0.6, 1.6, 11)))
     compared = _compared(distances / [1.0, 2.0])
-    weighted = weighted_by_rarity(compared, distances).scores
-    np.testing.assert_allclose(weighted, compared.scores * [2.0**0.3, 2.0**-0.3])
-    assert np.isfinite(weighted_by_rarity(compared, 0.0 * distances).scores).all()
+    candidates = Candidates(compared, rarity_weights(distances), np.ones(11, dtype=bool))
+    np.testing.assert_allclose(candidates.weighted().scores, compared.scores * [2.0**0.3, 2.0**-0.3])
+    assert np.isfinite(rarity_weights(0.0 * distances)).all()
+
+
+def _windows(shapes):
+    """A recording's windows, and what they are compared with."""
+    recording, _ = _stream(2, shapes, 0.002)
+    recognizer = _recognizer()
+    lasting = recognizer.references_.all_movements().durations
+    windows = candidate_windows(recording, Durations(lasting.min() / 2.0, lasting.max() * 3.0), 8)
+    return Templates(recognizer.comparison_, recognizer.references_, recognizer.calibration()), windows
+
+
+def test_windows_within_reach_are_compared_completely_and_no_other_seems_to_be(monkeypatch):
+    known, windows = _windows([*KNOWN, *UNKNOWN])
+    reach = far(0.05)
+    every = compare_candidates(known, windows.motion, windows.rows, reach)
+    assert every.completely.all()
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 100)
+    some = compare_candidates(known, windows.motion, windows.rows, reach)
+    assert 98 <= some.completely.sum() <= 100 < len(windows) / 4
+    np.testing.assert_allclose(some.weights, every.weights, rtol=0.02)
+    exact = every.compared.scores * some.weights
+    within, scores = exact <= reach, some.weighted().scores
+    assert 0.001 < within.mean() < 0.2
+    np.testing.assert_allclose(scores[within], exact[within], rtol=1e-5)
+    np.testing.assert_allclose(scores[some.completely], exact[some.completely], rtol=1e-5)
+    assert (scores[~within] > reach).all()
+    assert (scores <= exact * (1 + 1e-5)).all()
+    assert not np.allclose(scores, exact)
+    chosen = np.arange(0, len(windows), 7)
+    complete = _complete_scores(known, windows.motion, some, chosen)
+    np.testing.assert_allclose(complete, every.compared.scores[chosen], rtol=1e-5)
+    for name in ("rows", "log_durations", "log_sizes", "slowness"):
+        np.testing.assert_allclose(getattr(some.compared, name), getattr(every.compared, name))
+
+
+@pytest.mark.parametrize("shapes", [KNOWN, [*KNOWN, *UNKNOWN], UNKNOWN])
+def test_movements_are_the_same_where_few_windows_are_compared_completely(shapes, monkeypatch):
+    recording, _ = _stream(4, shapes, 0.002)
+    found = _recognizer().spot(recording)
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 100)
+    assert [one[:3] for one in _recognizer().spot(recording)] == [one[:3] for one in found]
+
+
+def test_progress_of_a_recording_in_which_few_windows_are_compared_completely_goes_on_to_the_end(monkeypatch):
+    known, windows = _windows(KNOWN)
+    monkeypatch.setattr(compared_windows, "_COMPLETELY", 100)
+    told = []
+    compare_candidates(known, windows.motion, windows.rows, far(0.05), told.append)
+    assert len(told) >= 2
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+
+
+def test_windows_are_the_same_compiled_and_plain(monkeypatch):
+    recording, _ = _stream(3, ["CShape"], 0.002)
+    rng = np.random.default_rng(0)
+    times = np.sort(recording.times + rng.uniform(-0.004, 0.004, len(recording.times)))
+    motion = observe(Trajectory(times, recording.positions), 0.04)
+    start = np.append(rng.uniform(times[0], times[-1] - 1.0, 20), times[0])
+    end = np.append(np.minimum(start[:-1] + rng.uniform(0.1, 9.0, 20), times[-1]), times[-1])
+    found = []
+    for choice in ("never", "always"):
+        monkeypatch.setenv("KINEME_COMPILED", choice)
+        movements = resampled(motion, start, end)
+        paths = movements.positions.reshape(21, 64, -1).transpose(0, 2, 1)
+        found.append((movements.positions, movements.offsets, movements.durations, *size_and_slowness(paths)))
+    for plain, compiled in zip(*found, strict=True):
+        np.testing.assert_allclose(compiled, plain, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize(("rests", "least"), [(True, 0.8), (False, 0.72)])

@@ -46,9 +46,7 @@ def fill_grid(dims, sides, numbers, rotations, squares):  # type: ignore[no-unty
     n, m = squares.shape[1], squares.shape[2]
     work, second = new_work(dims, sizes), np.zeros(LANES, np.intp)
     for start in range(0, m, LANES):
-        width = min(LANES, m - start)
-        for lane in range(LANES):
-            second[lane] = start + min(lane, width - 1)
+        width = _choose(start, m, second)
         pack(dims, B, second, numbers, work.b)
         for i in range(n):
             if n > 1 or start == 0:
@@ -68,9 +66,7 @@ def fill_by_rows(dims, sides, numbers, rotations, squares):  # type: ignore[no-u
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
     for start in range(0, n, LANES):
-        width = min(LANES, n - start)
-        for lane in range(LANES):
-            first[lane] = start + min(lane, width - 1)
+        width = _choose(start, n, first)
         pack(dims, A, first, numbers, work.a)
         for j in range(m):
             if m > 1 or start == 0:
@@ -110,9 +106,7 @@ def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # typ
     n, m = squares.shape[1], squares.shape[2]
     work, first = new_work(dims, sizes), np.zeros(LANES, np.intp)
     for start in range(0, n, LANES):
-        width = min(LANES, n - start)
-        for lane in range(LANES):
-            first[lane] = start + min(lane, width - 1)
+        width = _choose(start, n, first)
         pack(dims, A, first, numbers, work.a)
         for j in range(m):
             for lane in range(LANES):
@@ -121,6 +115,15 @@ def fill_bounds(dims, sides, numbers, rotations, every_segment, squares):  # typ
             for k in range(2):
                 for lane in range(width):
                     squares[k, start + lane, j] = work.squares[k, lane]
+
+
+@_jit
+def _choose(start, n, chosen):  # type: ignore[no-untyped-def]
+    """The next 16 of n movements, the last one again where fewer remain; return how many there are."""
+    width = min(LANES, n - start)
+    for lane in range(LANES):
+        chosen[lane] = start + min(lane, width - 1)
+    return width
 
 
 @_jit

@@ -16,6 +16,7 @@ from kineme.movements.segmentation.rest import Rest
 from kineme.movements.segmentation.segment import moving
 from kineme.movements.trajectories.movements import Movements
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
 MIN_SAMPLES = 8  # of a window
@@ -26,6 +27,7 @@ _DEPTH = 0.2  # prominence, in the logarithm of speed, of a minimum that is a bo
 _FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
 _SLOW = 0.02  # share of the peak speed below which a sample counts as at rest
 _MOST_REST = 0.6  # share of a window at rest
+_OPERATIONS_PER_SAMPLE = 8  # of a window and dimension
 _DRIFT = 0.2  # share of the peak speed: a drift that covers less path between boundaries gets none
 
 
@@ -190,9 +192,14 @@ def resampled(motion: Motion, start: Array, end: Array) -> Movements:
     """The smoothed recording from `start` to `end` (n,) [s], each at `N_POINTS` even times."""
     t, x = motion.times, motion.positions
     share = np.linspace(0.0, 1.0, N_POINTS)
+    offsets: NDArray[np.intp] = np.arange(len(start) + 1) * N_POINTS
+    if use_compiled(_OPERATIONS_PER_SAMPLE * len(start) * N_POINTS * x.shape[1]):
+        windows = np.empty((len(start), N_POINTS, x.shape[1]))
+        fill = compiled_module("kineme.recognition._windows").fill_windows
+        fill(*map(np.ascontiguousarray, (t, x, start, end)), share, windows)
+        return Movements(windows.reshape(-1, x.shape[1]), offsets, np.asarray(end - start))
     at = (start[:, None] + (end - start)[:, None] * share).ravel()
     below = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
     weight = ((at - t[below]) / (t[below + 1] - t[below]))[:, None]
     positions = x[below] * (1.0 - weight) + x[below + 1] * weight
-    offsets: NDArray[np.intp] = np.arange(len(start) + 1) * N_POINTS
     return Movements(np.ascontiguousarray(positions), offsets, np.asarray(end - start))

@@ -334,8 +334,8 @@ class Recognizer(ClassifierMixin, BaseEstimator):
             `confidence` and `p_known` are those of an `Answer`. Rests are left out. Without time stamps in fit,
             movements are looked for between a quarter of the typical stretch between rests and four times it.
         """
+        from kineme.recognition.compared_windows import Templates
         from kineme.recognition.spotting import spot
-        from kineme.recognition.window_scores import Templates
 
         return spot(Templates(*self._fitted, self.calibration()), recording, error_rate, max_pieces)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from kineme.comparison.scores import nearest, nearest_each, score
 from kineme.errors import TrajectoryError
 from kineme.movements.segmentation.bouts import Rows
+from kineme.movements.segmentation.motion import Motion
 from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.segmentation.segmentation import pieces_of
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -18,21 +19,25 @@ from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.candidate_windows import MIN_SAMPLES, Durations, Windows, candidate_windows, surroundings
+from kineme.recognition.compared_windows import (
+    Candidates,
+    Progress,
+    Templates,
+    compare_candidates,
+    compare_windows,
+)
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import check_error_rate
 from kineme.recognition.window_scores import (
     Manner,
-    Progress,
     ScoredWindows,
-    Templates,
+    alike_windows,
     closest_classes,
-    compare_windows,
     durations_of,
     expected,
     far,
     manner_of,
     score_windows,
-    weighted_by_rarity,
 )
 from kineme.validation import Array, check_count
 
@@ -123,9 +128,8 @@ def _chosen(
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
     motion, typical = windows.motion, expected(known.references)
-    compared = compare_windows(known, motion, windows.rows, progress)
-    distances = compared.scores * known.calibration.scales
-    compared = weighted_by_rarity(compared, distances)
+    candidates = compare_candidates(known, motion, windows.rows, far(error_rate), progress)
+    compared = candidates.weighted()
     around = surroundings(motion, windows.bouts, compared.rows)
     manner = Manner()
     for _ in range(_PASSES - 1):
@@ -134,9 +138,21 @@ def _chosen(
         manner = manner_of(compared, typical, chosen, scored.best)
     chosen = _best_windows(compared.rows, score_windows(compared, typical, around, manner, error_rate))
     rows = compared.rows[chosen]
+    spans = motion.times[compared.rows]
+    alike = np.unique(np.concatenate((chosen, *alike_windows(spans, chosen)))).astype(np.intp)
+    distances = _complete_scores(known, motion, candidates, alike) * known.calibration.scales
     distances /= far(error_rate) * np.exp(np.log(known.calibration.scales).mean())
-    classes = closest_classes(compared, distances, typical, manner, motion.times[compared.rows], chosen)
+    again = np.searchsorted(alike, chosen).tolist()
+    classes = closest_classes(compared.take(alike), distances, typical, manner, spans[alike], again)
     return np.column_stack((rows[:, 0], rows[:, 1] + 1)), classes
+
+
+def _complete_scores(known: Templates, motion: Motion, candidates: Candidates, chosen: NDArray[np.intp]) -> Array:
+    """Nonconformity of chosen windows to every class, (n, C)."""
+    scores = candidates.compared.scores[chosen]
+    partly = ~candidates.completely[chosen]
+    scores[partly] = compare_windows(known, motion, candidates.compared.rows[chosen[partly]]).scores
+    return scores
 
 
 def _best_windows(rows: Rows, scored: ScoredWindows) -> list[int]:

@@ -3,47 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.comparison.comparison import Comparison
 from kineme.comparison.references import References
-from kineme.comparison.scores import nearest, score
 from kineme.movements.preparation.resample import relative_rows
-from kineme.movements.segmentation.bouts import Rows
-from kineme.movements.segmentation.motion import Motion
-from kineme.movements.trajectories.demonstrations import Demonstrations
-from kineme.recognition.candidate_windows import N_POINTS, Surroundings, resampled
-from kineme.recognition.conformal import Calibration
-from kineme.recognition.left_out import LEAST
+from kineme.recognition.candidate_windows import N_POINTS, Surroundings
+from kineme.recognition.compared_windows import ComparedWindows, size_and_slowness
 from kineme.validation import Array
 
-_TILE = 4096  # windows described at a time
 _REACH = 0.975  # nonconformity at which a window counts as far, in that which members exceed at the error rate
 _TEMPO, _SIZE = 0.4, 0.2  # cost of a duration, or a size, e times what is expected
 _DEAD = 0.1  # logarithm of a ratio of durations that costs nothing while the tempo of the recording is unknown
 _EDGE, _FAR_FROM_REST, _SPANNED = 0.14, 0.03, 0.02  # costs of what surrounds a window
 _REST_INSIDE = 1.2  # cost of a share of rest beyond the demonstrated one
-_SLOW = 0.2  # share of the mean speed of a window below which it rests
 _PER_MOVEMENT = 0.165  # cost of one more movement, in typical durations
-_COMMON = 0.2  # share of the windows of a recording whose distance to a class, or less, is common
-_RARITY = 0.3  # power with which distances count in common ones
 _ALIKE = 0.9  # intersection over union from which two windows are about one movement
 _MANNER = 0.25  # share of the costs of duration and size that counts when the class is chosen
-
-Progress = Callable[[float], object]  # takes the share that is done
-
-
-class Templates(NamedTuple):
-    """What windows are compared with."""
-
-    comparison: Comparison
-    references: References
-    calibration: Calibration
 
 
 class Expected(NamedTuple):
@@ -71,27 +50,6 @@ class Manner:
     size: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class ComparedWindows:
-    """n windows, compared with C classes.
-
-    Attributes
-    ----------
-    rows : ndarray of shape (n, 2)
-        First and last sample.
-    scores : ndarray of shape (n, C)
-        Nonconformity to each class.
-    log_durations, log_sizes, slowness : ndarray of shape (n,)
-        Slowness is the share of the duration that is slow.
-    """
-
-    rows: Rows
-    scores: Array
-    log_durations: Array
-    log_sizes: Array
-    slowness: Array
-
-
 class ScoredWindows(NamedTuple):
     """Best class of each window and its score, (n,); above 0 where it counts as known."""
 
@@ -108,7 +66,7 @@ def durations_of(references: References) -> Array | None:
 def expected(references: References) -> Expected:
     """Medians over the references of each class."""
     demos = references.all_movements()
-    sizes, slowness = _size_and_slowness(relative_rows(demos, 0, len(demos), N_POINTS))
+    sizes, slowness = size_and_slowness(relative_rows(demos, 0, len(demos), N_POINTS))
     lasting = durations_of(references)
     known = None if lasting is None else np.log(lasting)
 
@@ -118,39 +76,21 @@ def expected(references: References) -> Expected:
     return Expected(None if known is None else medians(known), medians(sizes), medians(slowness))
 
 
-def _size_and_slowness(paths: Array) -> tuple[Array, Array]:
-    """Logarithm of the size of each path (n, d, T), and the share of its steps that are far below the mean step."""
-    size = np.sqrt(paths.var(axis=2).sum(axis=1))
-    steps = np.linalg.norm(np.diff(paths, axis=2), axis=1)
-    slow = (steps <= _SLOW * steps.mean(axis=1, keepdims=True)).mean(axis=1)
-    return np.log(np.maximum(size, np.finfo(float).tiny)), slow
+def alike_windows(spans: Array, chosen: list[int]) -> list[NDArray[np.intp]]:
+    """Of each chosen window, those that have nine tenths of the union with it, itself among them.
 
-
-def compare_windows(known: Templates, motion: Motion, rows: Rows, progress: Progress | None = None) -> ComparedWindows:
-    """Compare the windows from sample rows[:, 0] to rows[:, 1] with the references, tile by tile."""
-    start, end = motion.times[rows].T
-    scores = np.empty((len(rows), len(known.references.classes)))
-    sizes, slowness = np.empty((2, len(rows)))
-    for first in range(0, len(rows), _TILE):
-        tile = slice(first, first + _TILE)
-        demos = Demonstrations.of_movements(resampled(motion, start[tile], end[tile]))
-        paths = demos.positions.reshape(len(demos), N_POINTS, -1).transpose(0, 2, 1)
-        sizes[tile], slowness[tile] = _size_and_slowness(paths)
-        scores[tile] = known.calibration.scores(score(known.comparison, known.references, demos, nearest)[0])
-        if progress is not None:
-            progress(min(1.0, (first + len(demos)) / len(rows)))
-    return ComparedWindows(rows, scores, np.log(end - start), sizes, slowness)
-
-
-def weighted_by_rarity(compared: ComparedWindows, distances: Array) -> ComparedWindows:
-    """Scores of windows, larger for classes that much of the recording is near to.
-
-    Simple shapes are part of many movements: of a sphere drawn in space, a half is a circle. Scores of class c are
-    divided by ``m_c^0.3``, with m_c the distance that a fifth of the windows is within, over the geometric mean of all
-    classes.
+    `spans` (n, 2) are start and end of each [s], sorted by starts.
     """
-    common = np.log(np.maximum(np.quantile(distances, _COMMON, axis=0), LEAST))
-    return replace(compared, scores=compared.scores * np.exp(_RARITY * (common.mean() - common)))
+    found = []
+    for i in chosen:
+        start, end = spans[i]
+        reach = (1.0 / _ALIKE - 1.0) * (end - start)
+        first, last = np.searchsorted(spans[:, 0], (start - reach, start + reach), side="right")
+        near = spans[first:last]
+        shared = np.minimum(near[:, 1], end) - np.maximum(near[:, 0], start)
+        union = np.maximum(near[:, 1], end) - np.minimum(near[:, 0], start)
+        found.append(first + np.flatnonzero(shared >= _ALIKE * union))
+    return found
 
 
 def closest_classes(
@@ -181,15 +121,7 @@ def closest_classes(
         Windows.
     """
     costs = distances + _MANNER * _manner_costs(compared, typical, manner)
-    found = np.empty(len(chosen), dtype=np.intp)
-    for k, i in enumerate(chosen):
-        start, end = spans[i]
-        reach = (1.0 / _ALIKE - 1.0) * (end - start)
-        near = slice(*np.searchsorted(spans[:, 0], (start - reach, start + reach), side="right"))
-        shared = np.minimum(spans[near, 1], end) - np.maximum(spans[near, 0], start)
-        union = np.maximum(spans[near, 1], end) - np.minimum(spans[near, 0], start)
-        found[k] = costs[near][shared >= _ALIKE * union].min(axis=0).argmin()
-    return found
+    return np.array([costs[near].min(axis=0).argmin() for near in alike_windows(spans, chosen)], dtype=np.intp)
 
 
 def far(error_rate: float) -> float:

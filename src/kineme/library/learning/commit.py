@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kineme.library.learning.deduplicate import Batch, Stored, find_stored
 from kineme.library.learning.serialize import evenly_sampled, serialize
 from kineme.library.storage.channels import channels_to_text
-from kineme.library.storage.read import people_of
+from kineme.library.storage.read import people_by_movement
 from kineme.library.storage.rows import Row, among, as_text, listed, next_key
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import NOW, Store
@@ -145,7 +145,7 @@ def _assign_labels(change: Change, batch: Batch, keys: list[int]) -> tuple[str, 
 def _without_person(connection: Any, batch: Batch, keys: list[int]) -> dict[int, str]:
     """Movement -> who showed it, for movements of which that is said and was not known."""
     said = {key: group for key, group in zip(keys, batch.groups, strict=True) if group is not None}
-    known = people_of(connection, list(said), NOW) if said else {}
+    known = people_by_movement(connection, list(said), NOW) if said else {}
     return {key: group for key, group in said.items() if key not in known}
 
 

@@ -17,9 +17,9 @@ from kineme.library.recognition.members import Members, members_of
 from kineme.library.recognition.recognize import known_members
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.recognition.compared_windows import Templates
 from kineme.recognition.known_classes import KnownClasses
 from kineme.recognition.spotting import Spotted, spot
-from kineme.recognition.window_scores import Templates
 from kineme.sampling import evenly_spaced
 
 _MOST = 1000  # movements that a recording is searched for

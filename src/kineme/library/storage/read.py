@@ -236,13 +236,13 @@ def groups(store: Store, ids: Ids) -> NDArray[np.object_]:
     people: dict[int, str] = {}
     for k in range(0, len(ids), _ROWS):
         with store.reading() as connection:
-            people |= people_of(connection, ids[k : k + _ROWS].tolist(), store.as_of)
+            people |= people_by_movement(connection, ids[k : k + _ROWS].tolist(), store.as_of)
     result = np.empty(len(ids), dtype=object)
     result[:] = [people.get(key) for key in ids.tolist()]
     return result
 
 
-def people_of(connection: sqlite3.Connection, keys: Sequence[int], version: int) -> dict[int, str]:
+def people_by_movement(connection: sqlite3.Connection, keys: Sequence[int], version: int) -> dict[int, str]:
     """Movement -> who showed it, of those of which that was known at a version."""
     if not has_table(connection, "shown_by") or not connection.execute("SELECT 1 FROM shown_by LIMIT 1").fetchone():
         return {}

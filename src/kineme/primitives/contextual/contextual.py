@@ -14,7 +14,7 @@ from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.parameters import from_numbers, map_rows, path_matrix, shared_label, to_numbers
-from kineme.validation import Array, as_numbers, check_choice, check_number
+from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
 
 _SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
 _AS_GOOD, _EXACT = 1.05, 1e-6  # times the least error; times that of ignoring the parameters
@@ -193,9 +193,10 @@ def _standardized(C: Array, center: Array, scale: Array) -> Array:
 
 
 def _finite(C: Array) -> Array:
-    if not np.isfinite(C).all():
-        i = int(np.argmin(np.isfinite(C).all(axis=1)))
-        raise TrajectoryError(f"parameters {i}: expected finite numbers, got {C[i].tolist()}")
+    usable = np.abs(C) <= LARGEST
+    if not usable.all():
+        i = int(np.argmin(usable.all(axis=1)))
+        raise TrajectoryError(f"parameters {i}: expected finite numbers up to {LARGEST:g}, got {C[i].tolist()}")
     return C
 
 

@@ -17,9 +17,11 @@ from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.improvement.exploration import exploration_factor
 from kineme.primitives.improvement.methods import METHODS, Search
 from kineme.primitives.styles.parameters import check_primitives
-from kineme.validation import Array, as_numbers, check_choice, check_count, check_number, check_switch
+from kineme.validation import Array, as_numbers, check_choice, check_count, check_number, check_seed, check_switch
 
 _FEWEST_BASIS = 4
+_MOST = 100_000  # rollouts, and updates
+_WIDEST = 1e3  # extents
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,10 @@ def improve(  # noqa: PLR0913 - one parameter per option
     check_primitives(primitive)
     _check_options(primitive, rollouts, updates, method, exploration, target, smallest)
     check_switch("progress", progress)
+    if not callable(cost):
+        raise SpecificationError(f"expected cost to be a function of a Rollout, got {cost!r}")
+    if not isinstance(seed, np.random.Generator):
+        check_seed("seed", seed)
     unit = exploration_factor(primitive.dmp)
     factor = unit * primitive.extents.max() * exploration
     paths = unit @ decoder(primitive.dmp, primitive.dmp.n_points).Phi[0].T
@@ -202,10 +208,10 @@ def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its o
             f"expected at least {_FEWEST_BASIS} basis functions, so that the shape can change and the end stay, got "
             f"{primitive.dmp.n_basis}"
         )
-    check_count("rollouts", rollouts, 5)
-    check_count("updates", updates, 1)
+    check_count("rollouts", rollouts, 5, most=_MOST)
+    check_count("updates", updates, 1, most=_MOST)
     check_choice("method", method, list(METHODS))
-    check_number("exploration", exploration, above=0.0)
+    check_number("exploration", exploration, above=0.0, most=_WIDEST)
     check_number("smallest", smallest, least=0.0)
     if target is not None:
         check_number("target", target)
