@@ -20,7 +20,7 @@ def advance(spring, table, avoidance, state, u, du, influences, motion):  # type
     `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading, rounding).
     """
     K, D, _ = spring
-    goal, rate, ratio, push, obstacles, velocities = influences
+    goal, ratio, rate, push, obstacles, velocities = influences
     d = len(goal)
     shape, total, end = np.empty(d + 1), push.copy(), motion[:2]
     if len(obstacles):

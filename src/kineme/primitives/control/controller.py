@@ -7,20 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
 from kineme.primitives.control import inputs
 from kineme.primitives.control.clock import Clock
 from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options
-from kineme.primitives.control.plan import Influences, Plan
+from kineme.primitives.control.plan import SHORTEST, Influences, Plan, check_controlled
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
-from kineme.validation import Array, check_number
+from kineme.validation import Array
 
 _NOTHING = Status(0)
-_SHORTEST = 1e-12  # durations; shorter steps are lost in rounding
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
@@ -60,17 +58,10 @@ class Controller:
     state: State
 
     def __init__(self, plan: Plan, dt: float, options: Options) -> None:
-        if not isinstance(plan, Plan):
-            raise SpecificationError(
-                f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
-            )
-        check_number("dt", dt, above=0.0)
+        check_controlled(plan, dt)
         self.dt, self.options = float(dt), options
         self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
         self._set_tau(plan.duration)
-        if not self._fits(self.dt):
-            most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
-            raise SpecificationError(f"expected dt of at most {most} {self._tau:g} s, got {dt!r} s")
         self._limits = limits_from(options, self._n_dims)
         self._limited = self._limits.exist
         self._settle = float(options.settle or plan.settle)
@@ -87,8 +78,7 @@ class Controller:
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events = _NOTHING
-        goal, ratio = self._follow(0.0)
-        influences = Influences(goal, self._zeros, ratio, self._zeros, self._nowhere, self._nowhere)
+        influences = Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
         self.state = self._report(*self._derivatives())
         return self.state
@@ -181,7 +171,7 @@ class Controller:
         return self.dt, self._tempo
 
     def _fits(self, dt: float) -> bool:
-        return _SHORTEST * self._tau <= dt <= self._longest
+        return SHORTEST * self._tau <= dt <= self._longest
 
     def _set_tau(self, tau: float) -> None:
         """The duration of u = 1, and with it the longest step."""
@@ -228,12 +218,9 @@ class Controller:
         """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
         target = self._goal.target + self._origin if goal is None else self._read_goal(goal)
         moving = None if velocity is None else self._read_goal_velocity(velocity)
-        if target is not None and (moving is not None or velocity is None):
-            remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
-            aimed = self._goal.aim(target - self._origin, moving, remaining)
-        else:
-            aimed = False
-        if not aimed:
+        unread = moving is None and velocity is not None
+        remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
+        if unread or target is None or not self._goal.aim(target - self._origin, moving, remaining):
             self._events |= Status.GOAL_REJECTED
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
@@ -242,12 +229,11 @@ class Controller:
             self._obstacles = self._obstacle_velocities = self._nowhere
             return
         n = self._plan.n_positions
-        x = inputs.rows(obstacles, n)
-        v = inputs.rows(velocities, n) if velocities is not None or x is None else np.zeros_like(x)
-        if x is None or v is None or x.shape != v.shape or n < 2:
+        read = inputs.moving_points(obstacles, velocities, n)
+        if read is None:
             self._events |= Status.OBSTACLES_REJECTED
         else:
-            self._obstacles, self._obstacle_velocities = x - self._origin[:n], v
+            self._obstacles, self._obstacle_velocities = read[0] - self._origin[:n], read[1]
 
     def _couple(self, coupling: Any) -> Array:
         push = self._read_coupling(coupling)
@@ -270,11 +256,9 @@ class Controller:
         velocities = self._obstacle_velocities
         if len(velocities):
             velocities = velocities / self._rate
-        goal_rate = self._zeros
-        if goal_velocity is not None:
-            goal_rate = goal_velocity / self._rate
-            goal = goal + self._plan.D / self._plan.K * goal_rate
-        influences = Influences(goal, goal_rate, ratio, push, self._obstacles, velocities)
+        goal_rate = self._zeros if goal_velocity is None else goal_velocity / self._rate
+        goal = goal if goal_velocity is None else self._goal.ahead(goal, goal_rate)
+        influences = Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
         motion = self._advance(self._motion[:2], self._clock.u, du, influences)
         if self._usable(motion):
             self._motion = motion

@@ -86,6 +86,10 @@ class MovingGoal(FilteredValue):
         self.velocity, self._ratio, self._arrival = velocity, ratio, arrival
         return True
 
+    def ahead(self, goal: Array, rate: Array) -> Array:
+        """The goal that is followed without a lag where it moves by `rate` per unit of u."""
+        return goal + self._plan.D / self._plan.K * rate
+
     def follow(self, dt: float) -> tuple[Array, Array]:
         """Go on by dt; returns the goal in force at the start of it and the ratio that belongs to it.
 

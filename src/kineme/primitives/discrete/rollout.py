@@ -201,23 +201,6 @@ def rollout(
     )
 
 
-def own_primitives(movement: Rollout) -> Learned:
-    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights."""
-    some = movement.primitives
-    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
-    weights = some.scaled_weights * movement.ratio[:, :, None]
-    if movement.change is not None:
-        weights += movement.change.coefficients @ movement.change.directions
-    return replace(
-        some,
-        scaled_weights=weights,
-        starts=movement.starts.copy(),
-        goals=movement.goals.copy(),
-        velocities=movement.velocities_at_start.copy(),
-        durations=movement.durations.copy(),
-    )
-
-
 def check_durations(name: str, durations: Array) -> None:
     """Refuse durations of 0 seconds or less, and those whose squares leave the range of numbers."""
     usable = (durations >= SHORTEST_STEP) & (durations <= LARGEST_STAMP)
