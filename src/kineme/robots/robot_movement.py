@@ -13,14 +13,16 @@ from scipy.spatial.transform import Rotation
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
-from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.movements.segmentation.segment import as_recording
+from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.robots.checks.check import Check, Preflight
-from kineme.robots.checks.preflight import preflight
+from kineme.robots.checks.preflight import TRACKED, preflight
 from kineme.robots.execution.approach import approach
 from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
 from kineme.robots.execution.retime import fastest
 from kineme.robots.execution.timing import Timing, as_generated, slowed, timed
-from kineme.robots.kinematics.choose import choose_place, choose_posture
+from kineme.robots.kinematics.choose import check_reached, choose_place, choose_posture
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import TaskPath, task_path
 from kineme.robots.models.robot import Robot
@@ -91,7 +93,7 @@ def move(  # noqa: PLR0913 - one parameter per option
 
     Parameters
     ----------
-    movement : Rollout, PoseRollout, Trajectory or what holds one of them
+    movement : Trajectory, Rollout, PoseRollout, primitive, or what else holds one movement
         Positions of the tip in the frame of the robot, of two or three dimensions, alone or with orientations; or
         positions of the joints. In meters and radians, unless its channels name another unit. Its discrete channels
         are kept as `steps`.
@@ -145,7 +147,9 @@ def move(  # noqa: PLR0913 - one parameter per option
         path, joints = None, _joints(wanted, robot)
     else:
         ik = InverseKinematics(robot, follow)
-        path, joints = _inverse(ik, _path(ik, wanted, orientation, plane), place)
+        path, joints = _inverse(ik, _path(ik, wanted, orientation, plane), place, at)
+        if not force:
+            check_reached(robot, path, joints, ik.costs, TRACKED)
     held = {name: _held(values, wanted.times, name) for name, values in {**wanted.steps, **(steps or {})}.items()}
     asked = _Asked(robot, CubicSpline(wanted.times if path is None else path.times, joints), path, at, rate, held)
     made = _in_time(asked, timing)
@@ -165,11 +169,9 @@ class _Wanted(NamedTuple):
 
 
 def _wanted(movement: Any, robot: Robot, space: str) -> _Wanted:
-    one = movement
-    if not isinstance(one, Trajectory):
-        from kineme.movements.segmentation.segment import as_recording
-
-        one = as_recording(movement)
+    if isinstance(movement, Primitives | PosePrimitives):
+        movement = movement.rollout()
+    one = as_recording(movement)
     columns = np.asarray(one.recorded, dtype=float)
     space = space_of(one.channels, columns, robot) if space == "auto" else space
     roles = roles_of(one.channels, columns.shape[1], space)
@@ -198,13 +200,15 @@ def _path(ik: InverseKinematics, wanted: _Wanted, orientation: ArrayLike | None,
     return task_path(wanted.times, wanted.positions, at_rest if turned is None else turned, plane, ik.tip_position)
 
 
-def _inverse(ik: InverseKinematics, path: TaskPath, place: str) -> tuple[TaskPath, Array]:
+def _inverse(ik: InverseKinematics, path: TaskPath, place: str, stands: Array) -> tuple[TaskPath, Array]:
     """The path where it is executed, and the joints along it."""
-    chosen = choose_place(ik, path) if place == "free" else choose_posture(ik, path)
+    choose = choose_place if place == "free" else choose_posture
+    chosen = choose(ik.robot, path, ik.costs, stands)
     path = path._replace(positions=path.positions + chosen.shift)
     if len(path.times) < _DENSE:
         path = path.at(np.linspace(0.0, path.times[-1], _DENSE))
     ik.reset(chosen.start)
+    ik.solve(path.positions[0], path.rotations[0])
     return path, ik.follow(path.positions, path.rotations)
 
 
