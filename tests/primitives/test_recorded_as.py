@@ -213,3 +213,30 @@ def test_what_is_made_of_primitives_knows_what_was_recorded():
     stepping = kineme.styles.average(kineme.DMP().learn(recordings(PLAIN, 5))).primitive
     assert stepping.channels == PLAIN  # when the gripper of an average steps nobody has shown
     assert stepping.to_recording is None
+
+
+def test_a_join_keeps_the_gripper_of_each_part():
+    primitives = kineme.DMP().learn(recordings(PLAIN, 4))
+    for overlap in (0.0, 0.5):
+        both = kineme.join([primitives[:2], primitives[2:]], shift=True, overlap=overlap)
+        assert both.channels == PLAIN
+        for i, made in enumerate(both.rollout(n_samples=4001)):
+            begin = primitives.durations[i] - overlap
+            since = primitives.recorded_as.steps.shares.reshape(4, 2)[:, 1]
+            expected = [since[i] * primitives.durations[i], begin, begin + since[i + 2] * primitives.durations[i + 2]]
+            found = made.times[np.flatnonzero(np.diff(made.recorded[:, -1])) + 1] - made.times[0]
+            np.testing.assert_allclose(found, expected, atol=1.1 * made.duration / 4000)
+    turning = kineme.blend(primitives[0], primitives[1], (0.4, 0.6))
+    assert turning.channels == PLAIN
+    assert turning.to_recording is None
+    other = kineme.DMP().learn([np.random.default_rng(0).normal(size=(50, 2)).cumsum(axis=0)])
+    assert kineme.join([primitives[0], other], shift=True).channels is None
+
+
+def test_a_batch_of_which_some_steps_are_unknown_has_none():
+    primitives = kineme.DMP().learn(recordings(PLAIN, 4))
+    average = kineme.styles.average(primitives).primitive
+    some = kineme.Primitives.concatenate([average, primitives])
+    assert some.channels == PLAIN
+    assert some.to_recording is None
+    assert len(some.rollout().positions) == 5
