@@ -14,7 +14,8 @@ from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.orientation import PoseDMP, exp, product
-from kineme.primitives.generation.generate import _in_order_of_rates
+from kineme.primitives.pose.tangent import as_poses
+from kineme.primitives.recorded_as import RecordedAs
 
 Q = Channel("q", "orientation", ("qx", "qy", "qz", "qw"), None, "xyzw")
 XYZ = tuple(Channel(axis, "position", (axis,)) for axis in "xyz")
@@ -112,7 +113,7 @@ def test_channels_that_are_no_pose_are_refused_by_name():
     both, _ = poses()
     two = replace(both.movements, channels=(*XYZ[:2], Q, GRIPPER), positions=both.positions[:, 1:])
     with pytest.raises(kineme.TrajectoryError, match=r"x \(position\), y \(position\), q \(orientation\)"):
-        PoseDMP().learn(Demonstrations.of_movements(two))
+        as_poses(Demonstrations.of_movements(two))
 
 
 @pytest.mark.parametrize(("unit", "lever"), [("m", 0.2), (None, 0.2), ("cm", 20.0), ("mm", 200.0), ("furlong", 0.2)])
@@ -147,4 +148,4 @@ def test_movements_of_other_channels_have_none_together():
 
 
 def test_rates_follow_an_orientation_between_positions():
-    assert _in_order_of_rates((XYZ[0], Q, GRIPPER, *XYZ[1:])) == [0, 3, 4, 5, 1, 2]
+    assert RecordedAs((XYZ[0], Q, GRIPPER, *XYZ[1:])).rates_in_order == [0, 3, 4, 5, 1, 2]
