@@ -48,7 +48,6 @@ EXEMPT = {
     "primitives.base_rollout.BaseRollout.to_dataframe": "one table",
     "primitives.rollout_figure.draw_rollout": "one picture",
     "primitives.rollout_figure.draw_rollout_into": "one picture",
-    "primitives.pose.pose_rollout.PoseRollout.axis_names": "of columns",
     "primitives.pose.pose_rollout.PoseRollout.rate_names": "of columns",
     "primitives.pose.pose_primitives.PosePrimitives.controller": "one movement by contract",
     "primitives.discrete.dmp.Primitives.controller": "one movement by contract",
