@@ -18,6 +18,7 @@ SUBJECTS = (
     "adapting",
     "rhythm",
     "control",
+    "modulation",
     "recognize",
     "recognize_files",
     "stream",

@@ -176,7 +176,36 @@ def reliability() -> Figure:
     return figure
 
 
+def via_points() -> Figure:
+    """A shape through points of its own, and the average of six demonstrations through two points of the seventh."""
+    demos = kineme.load_lasa(["GShape", "Multi_Models_3"])
+    primitives = kineme.DMP().learn(demos)
+    g, rest, last = primitives[0], kineme.styles.average(primitives[8:]), primitives[7]
+    figure = new_figure(9.6, 3.4)
+    left, right = figure.subplots(1, 2)
+    points = np.array([[-25.0, -5.0], [8.0, -10.0]])
+    via = list(zip((0.4, 0.7), points, strict=True))
+    left.plot(*g.rollout().positions[0].T, color=GRAY, linewidth=4, alpha=0.5, label="as demonstrated")
+    left.plot(*g.rollout(via=via).positions[0].T, color=BLUE, label="through two points")
+    on = g.rollout(via=via, end_velocity=[-25.0, 0.0])
+    left.plot(*on.positions[0].T, color=ORANGE, linestyle="--", label="and on at the goal")
+    left.plot(*points.T, "o", color="black", markersize=6)
+    shown = last.rollout(n_samples=301).positions[0]
+    asked = {"start": last.starts, "goal": last.goals, "velocity": last.velocities}
+    guided = rest.rollout(**asked, via=[(1 / 3, shown[100]), (2 / 3, shown[200])])
+    right.plot(*shown.T, color=GRAY, linewidth=4, alpha=0.5, label="seventh demonstration")
+    right.plot(*rest.rollout(**asked).positions[0].T, color=GREEN, linestyle=":", label="average of six others")
+    right.plot(*guided.positions[0].T, color=BLUE, label="through two points of the seventh")
+    right.plot(*shown[[100, 200]].T, "o", color="black", markersize=6)
+    for axes in (left, right):
+        axes.set(xlabel="x [mm]", aspect="equal")
+        axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    left.set_ylabel("y [mm]")
+    return figure
+
+
 FIGURES = {
+    "via-points": via_points,
     "around-obstacles": around_obstacles,
     "adapting": adapting,
     "reliability": reliability,

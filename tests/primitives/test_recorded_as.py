@@ -190,3 +190,26 @@ def test_steps_that_are_none_are_refused(tmp_path, name, spoil):
     np.savez(path, **arrays)
     with pytest.raises(kineme.DataError, match=name):
         kineme.Primitives.load(path)
+
+
+def test_what_is_made_of_primitives_knows_what_was_recorded():
+    """Averages, variants, tasks between those that were shown: the columns keep names, kinds and units."""
+    joints = PLAIN[:2]
+    primitives = kineme.DMP().learn(recordings(joints, 5))
+    average = kineme.styles.average(primitives)
+    point = average.primitive.rollout(n_samples=5).positions[0, 2]
+    better = kineme.improve(primitives[:1], lambda rollout: rollout.positions[:, 3, 0], updates=1)
+    made = (
+        average.primitive,
+        average.sample(3, seed=0),
+        average.condition(t=0.5, position=point).primitive,
+        average.blend(average, 0.5).primitive,
+        kineme.Contextual().fit(primitives, parameters=np.arange(5.0)).primitive([0.5, 1.5]),
+        better.primitive,
+    )
+    for one in made:
+        assert one.channels == joints
+        assert one.rollout().demonstrations.channels == joints
+    stepping = kineme.styles.average(kineme.DMP().learn(recordings(PLAIN, 5))).primitive
+    assert stepping.channels == PLAIN  # when the gripper of an average steps nobody has shown
+    assert stepping.to_recording is None

@@ -171,7 +171,9 @@ def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
     points = primitives.starts + 0.4 * ends
     points[ends[:, 0] > 0, 1] = np.nan
     path = primitives.rollout(via=[(0.4, points)], end_velocity=0.2 * ends / tau[:, None])
-    return moved(demos, Primitives.from_rollout(path).rollout())
+    own = Primitives.from_rollout(path).rollout()
+    least = own.least_duration(velocity=1.0) / extents(demos)
+    return [one | {"least": np.array(least[i])} for i, one in enumerate(moved(demos, own))]
 
 
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:

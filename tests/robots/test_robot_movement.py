@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import kineme
 from kineme.errors import TrajectoryError
+from kineme.orientation import PoseDMP
 from kineme.robots import InfeasibleError, load, move
+from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
 
@@ -73,3 +76,73 @@ def test_force_returns_what_did_not_pass():
     robot = load("ur5e")
     made = move(stroke(robot, 0.4), robot, force=True)
     assert not made.preflight.passed
+
+
+def test_a_pose_out_of_reach_in_the_middle_is_said_with_time_place_and_distance():
+    robot = load("panda")
+    there = stroke(robot)
+    lifted = there.positions + np.column_stack((np.zeros((150, 2)), 1.2 * np.sin(np.pi * np.linspace(0, 1, 150))))
+    high = kineme.Trajectory(times=there.times, positions=lifted)
+    with pytest.raises(
+        TrajectoryError, match=r"reach \(0\.\d+, .*, 1\.\d+\) m at 1\.\d+ s: its tip stays 0\.\d+ m away"
+    ):
+        move(high, robot)
+    assert not move(high, robot, force=True).preflight.passed
+
+
+def test_a_primitive_of_poses_moves_the_tip_as_it_was_shown():
+    robot = load("panda")
+    ik = InverseKinematics(robot)
+    u = np.linspace(0, 1, 120)[:, None]
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    turned = Rotation.from_matrix(ik.tip_rotation) * Rotation.from_euler("z", 0.6 * s)
+    shown = np.hstack((ik.tip_position + s * [0.05, 0.25, -0.1], turned.as_quat(scalar_first=True)))
+    primitive = PoseDMP().learn([shown])
+    made = move(primitive.rollout(duration=3.0)[0], robot)
+    end = along(robot, made.trajectory)
+    np.testing.assert_allclose(end.tip_positions[-1], shown[-1, :3], atol=1e-4)
+    assert Rotation.from_matrix(end.tip_rotations[-1].T @ turned[-1].as_matrix()).magnitude() < 1e-3
+    again = move(primitive, robot, timing="slowed")
+    np.testing.assert_allclose(again.trajectory.positions[-1], made.trajectory.positions[-1], atol=1e-6)
+
+
+def test_several_movements_are_refused():
+    robot = load("panda")
+    with pytest.raises(TrajectoryError, match="expected one recording, got 2 movements"):
+        move(kineme.DMP().learn([stroke(robot), stroke(robot)]).rollout(), robot)
+
+
+def recorded(heads, columns, folder):
+    """A recording in a file, whose heads say what its columns are."""
+    path = folder / "movement.csv"
+    np.savetxt(path, columns, delimiter=",", header=",".join(heads), comments="")
+    return kineme.read_recordings(path)[0]
+
+
+def test_angles_in_degrees_as_many_as_the_joints_move_the_joints(tmp_path):
+    robot = load("ur5e")
+    u = np.linspace(0, 1, 60)[:, None]
+    joints = robot.rest + 0.3 * np.sin(np.pi * u) ** 2 * np.array([1, -1, 1, 0.5, 0.3, -1])
+    columns = np.hstack((3 * u, np.degrees(joints), u > 0.4))
+    made = move(recorded(["time [s]", *(f"joint{k} [deg]" for k in range(6)), "gripper"], columns, tmp_path), robot)
+    assert made.path is None
+    np.testing.assert_allclose(made.trajectory.positions[-1], joints[-1], atol=1e-6)
+    changes = np.flatnonzero(np.diff(made.trajectory.steps["gripper"]))
+    assert len(changes) == 1
+    assert made.trajectory.times[changes[0] + 1] - made.begins == pytest.approx(1.2, abs=0.06)
+
+
+def test_positions_in_millimeters_are_meters_for_the_arm(tmp_path):
+    robot = load("panda")
+    there = stroke(robot)
+    columns = np.column_stack((there.times, 1e3 * there.positions))
+    made = move(recorded(["time", "x [mm]", "y [mm]", "z [mm]"], columns, tmp_path), robot)
+    np.testing.assert_allclose(made.path.positions[-1], there.positions[-1], atol=1e-6)
+
+
+def test_two_dimensional_movements_lie_in_their_plane():
+    robot = load("wam")
+    there = stroke(robot)
+    made = move(kineme.Trajectory(times=there.times, positions=there.positions[:, 1:]), robot, plane="yz")
+    np.testing.assert_allclose(made.path.positions[:, 0], InverseKinematics(robot).tip_position[0], atol=1e-12)
+    np.testing.assert_allclose(made.path.positions[-1, 1:], there.positions[-1, 1:], atol=1e-9)

@@ -21,7 +21,7 @@ from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options
 from kineme.cli.source import read_source
 
-_OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot")
+_OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot", "view")
 _NEW_FILE = click.Path(path_type=Path)
 
 
@@ -34,8 +34,8 @@ _NEW_FILE = click.Path(path_type=Path)
 @click.option("--as-recorded", is_flag=True, help="Execute it where it was recorded: in the frame of the robot.")
 @click.option("--goal", type=Numbers(), help="End in the frame of the robot.  [default: as demonstrated]")
 @click.option("--duration", type=Finite(), help="Duration in seconds.  [default: as demonstrated]")
-@click.option("--scale", type=Finite(), default=1.0, show_default=True, help="Meters for one unit of the recording.")
-@click.option("--joints", is_flag=True, help="SOURCE is a movement of the joints, not of the tip.")
+@click.option("--scale", type=Finite(), help="Meters for one unit of the recording.  [default: as its heads say]")
+@click.option("--joints", is_flag=True, help="SOURCE moves the joints, not the tip.  [default: by its columns]")
 @click.option("--plane", type=click.Choice(["xy", "xz", "yz"]), default="xy", show_default=True,
               help="Where the axes of a movement in the plane lie.")  # fmt: skip
 @click.option("--orientation", type=Numbers(), help="Of the tip: w,x,y,z.  [default: as demonstrated, else as at rest]")
@@ -55,6 +55,9 @@ _NEW_FILE = click.Path(path_type=Path)
 @click.option("--ros2", type=_NEW_FILE, help="A .mcap, or a folder, of ROS 2 with the same.")
 @click.option("--action-goal", type=_NEW_FILE, help="A .yaml or .json file for ros2 action send_goal.")
 @click.option("--plot", type=_NEW_FILE, help="Path and joints beside their limits: a .png, .svg or .pdf file.")
+@click.option(
+    "--view", type=_NEW_FILE, help="An .html page in which the arm moves; opens in a browser, needs no network."
+)
 @json_option
 @force_option
 def move(**options: Any) -> None:
@@ -96,17 +99,17 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
     from kineme.robots.robot_movement import InfeasibleError
     from kineme.robots.robot_movement import move as move_robot
 
-    generated = _generated(options)
+    generated, space = _generated(robot, options)
     timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
     try:
         return move_robot(
             generated.movement,
             robot,
-            space="joints" if options["joints"] else "tip",
+            space=space,
             orientation=options["orientation"],
             follow=options["follow"],
             plane=options["plane"],
-            place="as given" if options["at"] or options["as_recorded"] or options["joints"] else "free",
+            place="as given" if options["at"] or options["as_recorded"] or space == "joints" else "free",
             timing=timing,
             rate=options["rate"],
             start=options["start"],
@@ -122,22 +125,26 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
         raise
 
 
-def _generated(options: dict[str, Any]) -> Any:
-    """The movement of the tip [m] or of the joints."""
+def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
+    """The movement, of the tip [m] or of the joints, and which of the two."""
     from kineme.robots.placed import placed
+    from kineme.robots.roles import space_of
 
-    if options["goal"] and not (options["at"] or options["as_recorded"] or options["joints"]):
+    learned = read_source(options)
+    space = "joints" if options["joints"] else space_of(learned.primitive.channels, learned.example, robot)
+    if options["goal"] and not (options["at"] or options["as_recorded"] or space == "joints"):
         raise click.UsageError("expected --at with --goal: where the movement starts; or --as-recorded")
-    return placed(
-        read_source(options),
+    generated = placed(
+        learned,
         options["at"],
         options["goal"],
         options["duration"],
         scale=options["scale"],
         rate=options["rate"],
-        joints=options["joints"],
+        joints=space == "joints",
         plane=options["plane"],
     )
+    return generated, space
 
 
 def _summary(made: Any) -> str:
@@ -187,3 +194,7 @@ def _write(made: Any, options: dict[str, Any]) -> None:
         from kineme.robots.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(made), options["plot"])
+    if options["view"]:
+        from kineme.robots.view.write_view import write_view
+
+        write_view(options["view"], made)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.channels.channel import Channel
-from kineme.movements.channels.coordinates import as_wxyz, columns_of
+from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
 from kineme.robots.kinematics.task_path import PLANES
+from kineme.robots.roles import Roles, roles_of
 from kineme.validation import Array, as_numbers
 
 
@@ -30,7 +30,7 @@ def placed(  # noqa: PLR0913 - one parameter per option
     goal: ArrayLike | None = None,
     duration: float | None = None,
     *,
-    scale: float = 1.0,
+    scale: float | None = None,
     rate: float = 100.0,
     joints: bool = False,
     plane: str = "xy",
@@ -45,8 +45,9 @@ def placed(  # noqa: PLR0913 - one parameter per option
         goal is then that from the demonstrated start.
     duration : float, optional
         [s]
-    scale : float, default 1
-        Meters for one unit of the recording, as 0.001 for millimeters.
+    scale : float, optional
+        Meters (of the joints radians) for one unit of the recording, as 0.001 for millimeters; by default as the heads
+        of its columns say, and where they do not, 1.
     rate : float, default 100
         Samples per second, at least.
     joints : bool, default False
@@ -61,12 +62,13 @@ def placed(  # noqa: PLR0913 - one parameter per option
     SpecificationError
         A start or goal of another number of coordinates.
     """
-    found = _columns(learned, joints)
+    found = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip")
+    _check_tip(found, learned, joints)
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     n = len(found.positions)
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
-    unit = 1.0 if joints else scale
+    unit = found.units if scale is None else np.full(n, scale)
     start = shown[0, found.positions]
     origin = start * unit if begin is None else begin[axes]
     target = None
@@ -74,7 +76,8 @@ def placed(  # noqa: PLR0913 - one parameter per option
         wanted = shown[-1].copy()
         wanted[found.positions] = start + (end[axes] - origin) / unit
         target = wanted[found.moving]
-    made = generate(learned, MovementOptions(goal=target, duration=duration, rate=rate)).columns
+    options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
+    made = generate(learned, options).columns
     moved = (made["positions"][:, found.positions] - start) * unit + origin
     if begin is not None and not joints and n == 2:
         in_space = np.tile(begin, (len(moved), 1))
@@ -86,40 +89,13 @@ def placed(  # noqa: PLR0913 - one parameter per option
     return Placed(Trajectory(times=made["times"], positions=moved), steps)
 
 
-class _Columns(NamedTuple):
-    """Columns of a recording by what an arm does with them."""
-
-    positions: list[int]
-    moving: list[int]  # all but the discrete ones
-    orientation: tuple[Channel, slice] | None
-    discrete: dict[str, int]
-
-
-def _columns(learned: Learned, joints: bool) -> _Columns:
-    channels = learned.primitive.channels
-    if channels is None:
-        everything = list(range(len(learned.columns)))
-        return _checked(_Columns(everything, everything, None, {}), learned, joints)
-    at = list(zip(channels, columns_of(channels), strict=True))
-    kinds = ("angle", "position") if joints else ("position",)
-    turned = [(one, columns) for one, columns in at if one.kind == "orientation"]
-    found = _Columns(
-        [columns.start for one, columns in at if one.kind in kinds],
-        [k for one, columns in at if one.kind != "discrete" for k in range(columns.start, columns.stop)],
-        turned[0] if len(turned) == 1 and not joints else None,
-        {one.name: columns.start for one, columns in at if one.kind == "discrete"},
-    )
-    return _checked(found, learned, joints)
-
-
-def _checked(found: _Columns, learned: Learned, joints: bool) -> _Columns:
+def _check_tip(found: Roles, learned: Learned, joints: bool) -> None:
     if not joints and len(found.positions) not in (2, 3):
         raise TrajectoryError(
             f"expected two or three positions of the tip, got {len(found.positions)} among "
             f"{', '.join(learned.columns)}; choose columns, or say that it is a movement of the joints (joints=True, "
             "--joints)"
         )
-    return found
 
 
 def _point(point: ArrayLike | None, name: str, n: int) -> Array | None:

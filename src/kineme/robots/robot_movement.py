@@ -12,21 +12,24 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from kineme.errors import TrajectoryError
-from kineme.movements.trajectories.trajectory import Trajectory
-from kineme.robots.checks.check import Preflight
-from kineme.robots.checks.preflight import preflight
+from kineme.movements.channels.coordinates import as_wxyz
+from kineme.movements.segmentation.segment import as_recording
+from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.pose.pose_primitives import PosePrimitives
+from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.checks.preflight import TRACKED, preflight
 from kineme.robots.execution.approach import approach
 from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
 from kineme.robots.execution.retime import fastest
 from kineme.robots.execution.timing import Timing, as_generated, slowed, timed
-from kineme.robots.kinematics.choose import choose_place, choose_posture
+from kineme.robots.kinematics.choose import check_reached, choose_place, choose_posture
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import TaskPath, task_path
 from kineme.robots.models.robot import Robot
+from kineme.robots.roles import SPACES, roles_of, space_of
 from kineme.validation import Array, as_numbers, check_choice, check_number
 
 _TIMINGS = ("generated", "slowed", "fastest")
-_SPACES = ("tip", "joints")
 _DENSE = 150  # poses at least for which the joints are solved, whatever the duration
 _ROUNDS = 4  # of slowing down: torques do not fall as fast as velocities do
 _A_LITTLE = 1 + 1e-6
@@ -75,7 +78,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     movement: Any,
     robot: Robot,
     *,
-    space: str = "tip",
+    space: str = "auto",
     orientation: ArrayLike | None = None,
     follow: str = "full",
     plane: str = "xy",
@@ -90,14 +93,17 @@ def move(  # noqa: PLR0913 - one parameter per option
 
     Parameters
     ----------
-    movement : Rollout, PoseRollout, Trajectory or what holds one of them
-        Positions of the tip in the frame of the robot [m], of two or three dimensions, alone or with orientations; or
-        positions of the joints.
+    movement : Trajectory, Rollout, PoseRollout, primitive, or what else holds one movement
+        Positions of the tip in the frame of the robot, of two or three dimensions, alone or with orientations; or
+        positions of the joints. In meters and radians, unless its channels name another unit. Its discrete channels
+        are kept as `steps`.
     robot : Robot
-    space : {"tip", "joints"}, default "tip"
-        Of what the positions are.
+    space : {"auto", "tip", "joints"}, default "auto"
+        Of what the positions are. "auto": of the joints, if there are as many angles as the robot has joints; without
+        channels, if there are as many columns, neither two, three nor a pose. Else of the tip.
     orientation : array_like of shape (4,), optional
-        Unit quaternion w, x, y, z of the tip, for movements without orientations; by default that of the rest posture.
+        Unit quaternion w, x, y, z of the tip throughout; by default as in the movement, and where it has none, that of
+        the rest posture.
     follow : {"full", "axis", "free"}, default "full"
         How much of the orientation is followed; see `InverseKinematics`.
     plane : {"xy", "xz", "yz"}, default "xy"
@@ -131,38 +137,47 @@ def move(  # noqa: PLR0913 - one parameter per option
     DataError
         The extra ``robot`` is not installed.
     """
-    check_choice("space", space, _SPACES)
+    check_choice("space", space, SPACES)
     check_choice("timing", timing, _TIMINGS)
     check_choice("place", place, ("as given", "free"))
     check_number("rate", rate, above=0.0)
-    times, positions = _one(movement)
+    wanted = _wanted(movement, robot, space)
     at = robot.rest if start is None else _posture(start, robot)
-    if space == "joints":
-        if positions.shape[1] != robot.n_joints:
-            raise TrajectoryError(
-                f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {positions.shape[1]} columns"
-            )
-        path, joints = None, positions
+    if wanted.space == "joints":
+        path, joints = None, _joints(wanted, robot)
     else:
         ik = InverseKinematics(robot, follow)
-        path, joints = _inverse(ik, _path(ik, times, positions, orientation, plane), place)
-    held = {name: _held(values, times, name) for name, values in (steps or {}).items()}
-    asked = _Asked(robot, CubicSpline(times if path is None else path.times, joints), path, at, rate, held)
+        path, joints = _inverse(ik, _path(ik, wanted, orientation, plane), place, at)
+        if not force:
+            check_reached(robot, path, joints, ik.costs, TRACKED)
+    held = {name: _held(values, wanted.times, name) for name, values in {**wanted.steps, **(steps or {})}.items()}
+    asked = _Asked(robot, CubicSpline(wanted.times if path is None else path.times, joints), path, at, rate, held)
     made = _in_time(asked, timing)
     if not made.preflight.passed and not force:
         raise InfeasibleError(_refusal(made), made.preflight)
     return made
 
 
-def _one(movement: Any) -> tuple[Array, Array]:
-    """Times from 0 and positions of one movement."""
-    one = movement
-    if not isinstance(one, Trajectory):
-        from kineme.movements.segmentation.segment import as_recording
+class _Wanted(NamedTuple):
+    """One movement as an arm is asked for it, T samples."""
 
-        one = as_recording(movement)
-    times = np.asarray(one.times, dtype=float)
-    return times - times[0], np.asarray(one.positions, dtype=float)
+    times: Array  # (T,) [s], from 0
+    space: str
+    positions: Array  # (T, d) [m] or [rad]
+    orientations: Array | None  # (T, 4), w, x, y, z
+    steps: dict[str, Array]
+
+
+def _wanted(movement: Any, robot: Robot, space: str) -> _Wanted:
+    if isinstance(movement, Primitives | PosePrimitives):
+        movement = movement.rollout()
+    one = as_recording(movement)
+    columns = np.asarray(one.recorded, dtype=float)
+    space = space_of(one.channels, columns, robot) if space == "auto" else space
+    roles = roles_of(one.channels, columns.shape[1], space)
+    turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
+    steps = {name: columns[:, k] for name, k in roles.discrete.items()}
+    return _Wanted(one.times - one.times[0], space, columns[:, roles.positions] * roles.units, turned, steps)
 
 
 def _posture(start: ArrayLike, robot: Robot) -> Array:
@@ -172,20 +187,28 @@ def _posture(start: ArrayLike, robot: Robot) -> Array:
     return q
 
 
-def _path(ik: InverseKinematics, times: Array, positions: Array, orientation: ArrayLike | None, plane: str) -> TaskPath:
-    turned = Rotation.from_matrix(ik.tip_rotation).as_quat(scalar_first=True) if orientation is None else orientation
-    if positions.shape[1] == 7:
-        positions, turned = positions[:, :3], positions[:, 3:]
-    return task_path(times, positions, turned, plane, ik.tip_position)
+def _joints(wanted: _Wanted, robot: Robot) -> Array:
+    n = wanted.positions.shape[1]
+    if n != robot.n_joints:
+        raise TrajectoryError(f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {n} columns")
+    return wanted.positions
 
 
-def _inverse(ik: InverseKinematics, path: TaskPath, place: str) -> tuple[TaskPath, Array]:
+def _path(ik: InverseKinematics, wanted: _Wanted, orientation: ArrayLike | None, plane: str) -> TaskPath:
+    turned = wanted.orientations if orientation is None else orientation
+    at_rest = Rotation.from_matrix(ik.tip_rotation).as_quat(scalar_first=True)
+    return task_path(wanted.times, wanted.positions, at_rest if turned is None else turned, plane, ik.tip_position)
+
+
+def _inverse(ik: InverseKinematics, path: TaskPath, place: str, stands: Array) -> tuple[TaskPath, Array]:
     """The path where it is executed, and the joints along it."""
-    chosen = choose_place(ik, path) if place == "free" else choose_posture(ik, path)
+    choose = choose_place if place == "free" else choose_posture
+    chosen = choose(ik.robot, path, ik.costs, stands)
     path = path._replace(positions=path.positions + chosen.shift)
     if len(path.times) < _DENSE:
         path = path.at(np.linspace(0.0, path.times[-1], _DENSE))
     ik.reset(chosen.start)
+    ik.solve(path.positions[0], path.rotations[0])
     return path, ik.follow(path.positions, path.rotations)
 
 
@@ -241,7 +264,8 @@ def _checked(asked: _Asked, timing: Timing) -> RobotMovement:
 def _refusal(made: RobotMovement) -> str:
     failed = made.preflight.failed
     lines: Sequence[str] = [
-        f"{c.what} of {c.where} at {c.time:.2f} s: {c.worst:.3g}, limit {c.limit:.3g} {c.unit}" for c in failed[:4]
+        f"{c.what} of {c.where} at {c.time:.2f} s{_wanted_at(made, c)}: {c.worst:.3g}, limit {c.limit:.3g} {c.unit}"
+        for c in failed[:4]
     ]
     more = f" and {len(failed) - 4} more" if len(failed) > 4 else ""
     duration = made.trajectory.duration - made.begins
@@ -252,3 +276,11 @@ def _refusal(made: RobotMovement) -> str:
         else "No speed helps: choose another place, orientation or posture"
     )
     return f"{made.robot.name} cannot execute this: {'; '.join(lines)}{more}. {remedy}"
+
+
+def _wanted_at(made: RobotMovement, check: Check) -> str:
+    """Where the tip was to be when it was farthest from there."""
+    if check.what != "tracking" or made.path is None:
+        return ""
+    position = made.path.positions[int(np.argmin(np.abs(made.path.times - check.time)))]
+    return f", from ({', '.join(f'{x:.3f}' for x in position)}) m"

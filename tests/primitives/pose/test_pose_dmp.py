@@ -232,3 +232,12 @@ def test_what_does_not_turn_is_refused_by_name():
     still = np.tile(random_quaternions(0), (20, 1))
     with pytest.raises(TrajectoryError, match="trajectory 1: expected a movement, got 20 samples at the same place"):
         PoseDMP().learn([tumble(0), still])
+
+
+def test_an_end_velocity_is_that_at_the_goal_which_is_then_met_exactly(poses):
+    goals = np.concatenate((np.random.default_rng(4).normal(size=(6, 3)), random_quaternions(4, 6)), axis=1)
+    rates = np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.2])
+    movement = poses.rollout(goal=goals, end_velocity=rates)
+    np.testing.assert_allclose(movement.positions[:, -1, :3], goals[:, :3], atol=1e-9)
+    assert angle_between(movement.orientations[:, -1], goals[:, 3:]).max() < 1e-7
+    np.testing.assert_allclose(movement.velocities[:, -1], np.tile(rates, (6, 1)), atol=1e-6)

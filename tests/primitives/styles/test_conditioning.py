@@ -127,6 +127,21 @@ def test_a_velocity_is_met_in_units_per_second_whatever_becomes_of_the_duration(
     np.testing.assert_allclose(both.velocities[0, 50], velocity, rtol=1e-6, atol=1e-6 * np.abs(velocity).max())
 
 
+def test_the_deviation_of_a_velocity_is_per_second(dmp, model):
+    """With one duration for all the formula is linear: the rows of the derivative, over tau."""
+    mean = model(dmp)
+    mean = replace(mean, tempo_factor=0.0 * mean.tempo_factor)
+    tau = float(mean.primitive.durations[0])
+    assert abs(tau - 1.0) > 0.1
+    velocity = mean.primitive.rollout(n_samples=AT).velocities[0, 25, 0] + 1.0
+    found = mean.condition(t=0.25, velocity=[velocity, np.nan], velocity_std=0.7)
+    center, covariance = dense(mean)
+    row = np.zeros(len(center))
+    row[: dmp.n_basis + 3] = path_matrix(dmp, AT, 1)[:, 25] / tau
+    gain = covariance @ row / (row @ covariance @ row + 0.7**2)
+    np.testing.assert_allclose(dense(found)[0], center + gain * (velocity - row @ center), rtol=1e-7, atol=1e-7)
+
+
 def test_asking_again_for_what_is_met_changes_nothing_and_a_contradiction_is_refused(dmp, model):
     mean = model(dmp)
     point = path_of(mean)[40] + 0.3

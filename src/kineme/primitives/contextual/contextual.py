@@ -13,7 +13,14 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
 from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.styles.parameters import from_numbers, map_rows, path_matrix, shared_label, to_numbers
+from kineme.primitives.styles.parameters import (
+    from_numbers,
+    map_rows,
+    path_matrix,
+    shared_label,
+    shared_recording,
+    to_numbers,
+)
 from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
 
 _SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
@@ -152,7 +159,8 @@ class Contextual(BaseEstimator):
         w = self._solved.weights(_standardized(C, self.center_, self.scale_))
         theta = np.tensordot(w, to_numbers(self.primitives_), axes=1)
         durations = np.exp(w @ np.log(self.primitives_.durations))
-        return from_numbers(self.dmp_, theta, durations, shared_label(self.primitives_))
+        about = shared_recording(self.primitives_)
+        return from_numbers(self.dmp_, theta, durations, shared_label(self.primitives_), about)
 
     def _check(self) -> None:
         check_choice("regression", self.regression, REGRESSIONS)

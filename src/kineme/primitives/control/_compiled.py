@@ -20,31 +20,32 @@ def advance(spring, table, avoidance, state, u, du, influences, motion):  # type
     `spring` is (K, D, intervals per unit of u), `table` a `ShapeTable`, `avoidance` (gamma, beta, fading, rounding).
     """
     K, D, _ = spring
-    goal, ratio, push, obstacles, velocities = influences
+    goal, ratio, rate, push, obstacles, velocities = influences
     d = len(goal)
     shape, total, end = np.empty(d + 1), push.copy(), motion[:2]
     if len(obstacles):
         _steer(avoidance, state, obstacles, velocities, 0.0, total)
-        _carry(spring, table, state, u, 0.5 * du, goal, ratio, total, shape, end)
+        _carry(spring, table, state, u, 0.5 * du, goal, rate, ratio, total, shape, end)
         total[:] = push
         _steer(avoidance, end, obstacles, velocities, 0.5 * du, total)
-    _carry(spring, table, state, u, du, goal, ratio, total, shape, end)
+    _carry(spring, table, state, u, du, goal, rate, ratio, total, shape, end)
     total[:] = push
     _steer(avoidance, end, obstacles, velocities, du, total)
     _look_up(table, u + du, shape)
     for k in range(d):
-        forcing = shape[k] * ratio[k] + shape[d] * goal[k] + total[k]
-        motion[2, k] = K * (goal[k] - motion[0, k]) - D * motion[1, k] + forcing
+        aim = goal[k] + du * rate[k]
+        forcing = shape[k] * ratio[k] + shape[d] * aim + total[k]
+        motion[2, k] = K * (aim - motion[0, k]) - D * motion[1, k] + forcing
 
 
 @jit
-def _carry(spring, table, state, u, du, goal, ratio, push, shape, end):  # type: ignore[no-untyped-def]
+def _carry(spring, table, state, u, du, goal, rate, ratio, push, shape, end):  # type: ignore[no-untyped-def]
     """Position and dx/du at u + du; an interval of quadrature never contains u = 1."""
     K, D, per_u = spring
     d = len(goal)
     impulse = np.empty((len(NODES), 2))
     for k in range(d):
-        end[0, k], end[1, k] = state[0, k] - goal[k], state[1, k]
+        end[0, k], end[1, k] = state[0, k] - goal[k], state[1, k] - rate[k]
     to_end = min(max(1.0 - u, 0.0), du)
     for begin, length in ((u, to_end), (u + to_end, du - to_end)):
         n = math.ceil(per_u * length)
@@ -60,13 +61,16 @@ def _carry(spring, table, state, u, du, goal, ratio, push, shape, end):  # type:
                 x, v = end[0, k], end[1, k]
                 end[0, k], end[1, k] = c00 * x + c01 * v, c10 * x + c11 * v
             for q in range(len(NODES)):
-                _look_up(table, begin + h * (i + NODES[q]), shape)
+                now = begin + h * (i + NODES[q])
+                _look_up(table, now, shape)
                 for k in range(d):
-                    forcing = shape[k] * ratio[k] + shape[d] * goal[k] + push[k]
+                    aim = goal[k] + (now - u) * rate[k]
+                    forcing = shape[k] * ratio[k] + shape[d] * aim + push[k] - D * rate[k]
                     end[0, k] += impulse[q, 0] * forcing
                     end[1, k] += impulse[q, 1] * forcing
     for k in range(d):
-        end[0, k] += goal[k]
+        end[0, k] += goal[k] + du * rate[k]
+        end[1, k] += rate[k]
 
 
 @jit

@@ -34,13 +34,13 @@ def advance(
     with np.errstate(all="ignore"):  # the caller looks at the result
         push = influences.push
         if not len(influences.obstacles):
-            return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), u + du, influences, push)
+            return _with_acceleration(plan, _carry(plan, state, u, du, influences, push), (u, du), influences, push)
         turn = _turn(plan, avoidance, state, 0.0, influences)
         middle = _carry(plan, state, u, 0.5 * du, influences, push + turn)
         turn = _turn(plan, avoidance, middle, 0.5 * du, influences)
         end = _carry(plan, state, u, du, influences, push + turn)
         turn = _turn(plan, avoidance, end, du, influences)
-        return _with_acceleration(plan, end, u + du, influences, push + turn)
+        return _with_acceleration(plan, end, (u, du), influences, push + turn)
 
 
 def _turn(plan: Plan, avoidance: ObstacleAvoidance, state: Array, passed: float, influences: Influences) -> Array:
@@ -55,25 +55,29 @@ def _turn(plan: Plan, avoidance: ObstacleAvoidance, state: Array, passed: float,
 
 def _carry(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
     """Position and dx/du (2, d) at u + du, under a constant push."""
+    """In the frame of the goal, which the spring pulls to and which moves on: ``y = x - goal``."""
+    rate = influences.goal_rate
+    y = np.vstack((state[0] - influences.goal, state[1] - rate))
     to_end = min(max(1.0 - u, 0.0), du)  # an ungated forcing term has a kink at u = 1
-    for begin, length in ((u, to_end), (u + to_end, du - to_end)):
+    for begin, length, passed in ((u, to_end, 0.0), (u + to_end, du - to_end, to_end)):
         if length > 0:
-            state = _carry_smoothly(plan, state, begin, length, influences, push)
-    return state
+            y = _carry_smoothly(plan, y, (begin, length, passed), influences, push)
+    return np.vstack((y[0] + influences.goal + du * rate, y[1] + rate))
 
 
-def _carry_smoothly(plan: Plan, state: Array, u: float, du: float, influences: Influences, push: Array) -> Array:
+def _carry_smoothly(
+    plan: Plan, y: Array, part: tuple[float, float, float], influences: Influences, push: Array
+) -> Array:
+    u, du, passed = part
     n = math.ceil(plan.intervals * du)
     h = du / n
     carry, impulse = step_matrices(plan.K, plan.D, h)
-    nodes = u + h * (np.arange(n)[:, None] + NODES)
-    forcing = _forcing(plan, nodes.ravel(), influences, push).reshape(n, len(NODES), -1)
-    state = state.copy()
-    state[0] -= influences.goal
-    for driven in np.einsum("qz,kqd->kzd", impulse, forcing):
-        state = carry @ state + driven
-    state[0] += influences.goal
-    return state
+    nodes = (h * (np.arange(n)[:, None] + NODES)).ravel()
+    aims = influences.goal + (passed + nodes)[:, None] * influences.goal_rate
+    forcing = _forcing(plan, u + nodes, aims, influences, push - plan.D * influences.goal_rate)
+    for driven in np.einsum("qz,kqd->kzd", impulse, forcing.reshape(n, len(NODES), -1)):
+        y = carry @ y + driven
+    return y
 
 
 @lru_cache(maxsize=64)
@@ -84,12 +88,16 @@ def step_matrices(stiffness: float, damping: float, h: float) -> tuple[Array, Ar
     return carry, np.column_stack((s01, s11)) * (h * NODE_WEIGHTS)[:, None]
 
 
-def _forcing(plan: Plan, u: Array, influences: Influences, push: Array) -> Array:
-    """What acts besides spring and damper at u (T,), shape (T, d)."""
+def _forcing(plan: Plan, u: Array, aims: Array, influences: Influences, push: Array) -> Array:
+    """What acts besides spring and damper at u (T,), with the goals (T, d) then; shape (T, d)."""
     shape = plan.shape(u)
-    return shape[:, :-1] * influences.ratio + shape[:, -1:] * influences.goal + push
+    return shape[:, :-1] * influences.ratio + shape[:, -1:] * aims + push
 
 
-def _with_acceleration(plan: Plan, state: Array, u: float, influences: Influences, push: Array) -> Array:
-    forcing = _forcing(plan, np.array([u]), influences, push)
-    return np.vstack((state, plan.K * (influences.goal - state[0]) - plan.D * state[1] + forcing))
+def _with_acceleration(
+    plan: Plan, state: Array, step: tuple[float, float], influences: Influences, push: Array
+) -> Array:
+    u, du = step
+    aim = influences.goal + du * influences.goal_rate
+    forcing = _forcing(plan, np.array([u + du]), aim, influences, push)
+    return np.vstack((state, plan.K * (aim - state[0]) - plan.D * state[1] + forcing))

@@ -7,20 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
 from kineme.primitives.control import inputs
 from kineme.primitives.control.clock import Clock
 from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options
-from kineme.primitives.control.plan import Influences, Plan
+from kineme.primitives.control.plan import SHORTEST, Influences, Plan, check_controlled
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
-from kineme.validation import Array, check_number
+from kineme.validation import Array
 
 _NOTHING = Status(0)
-_SHORTEST = 1e-12  # durations; shorter steps are lost in rounding
 _STANDSTILL = 1e-30  # durations; a step as short as this is none
 
 
@@ -60,17 +58,10 @@ class Controller:
     state: State
 
     def __init__(self, plan: Plan, dt: float, options: Options) -> None:
-        if not isinstance(plan, Plan):
-            raise SpecificationError(
-                f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
-            )
-        check_number("dt", dt, above=0.0)
+        check_controlled(plan, dt)
         self.dt, self.options = float(dt), options
         self._plan, self._n_dims, self._origin = plan, plan.n_dims, plan.origin
         self._set_tau(plan.duration)
-        if not self._fits(self.dt):
-            most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
-            raise SpecificationError(f"expected dt of at most {most} {self._tau:g} s, got {dt!r} s")
         self._limits = limits_from(options, self._n_dims)
         self._limited = self._limits.exist
         self._settle = float(options.settle or plan.settle)
@@ -87,7 +78,7 @@ class Controller:
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
         self._events = _NOTHING
-        influences = Influences(*self._follow(0.0), self._zeros, self._nowhere, self._nowhere)
+        influences = Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
         self.state = self._report(*self._derivatives())
         return self.state
@@ -101,6 +92,7 @@ class Controller:
         coupling: ArrayLike | None = None,
         obstacles: ArrayLike | None = None,
         *,
+        goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
     ) -> State:
@@ -112,7 +104,10 @@ class Controller:
             Measured now, at the time of `state`; see `feedback`. A velocity is read at the tempo of the last step. With
             feedback="phase", no position does not slow the phase, and one that cannot be used slows it like the last.
         goal : array_like of shape (d,), optional
-            A new goal, for this step and all later ones.
+            A new goal, for this step and all later ones: where it is now.
+        goal_velocity : array_like of shape (d,), optional
+            Velocity of the goal, per second, which then moves on by itself, until the next goal. It is followed without
+            a lag; without a velocity, what moves at v is trailed by ``D / K tau v``, that is 0.2 tau v.
         tempo : float, default 1.0
             Speed of the phase during this step. The path does not depend on it; velocities are in proportion to it, so
             change it gradually. 0 is a pause.
@@ -128,30 +123,29 @@ class Controller:
         State
         """
         self._events = _NOTHING
-        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
         return self.state
 
     def _step(  # noqa: PLR0913, PLR0917 - as `step`
         self,
         position: Any,
         velocity: Any,
-        goal: Any,
+        goal: tuple[Any, Any],
         tempo: Any,
         coupling: Any,
-        obstacles: Any,
-        obstacle_velocities: Any,
+        obstacles: tuple[Any, Any],
         dt: Any,
     ) -> None:
-        """`step`, after the events of the last one are forgotten."""
+        """`step`, after the events of the last one are forgotten; goal and obstacles with their velocities."""
         dt, tempo = self._pace(dt, tempo)
         last = self._motion
         if position is not None or velocity is not None:
             self._measure(position, velocity)
         else:
             self._slowing = 0.0
-        if goal is not None:
-            self._aim(goal)
-        self._sense(obstacles, obstacle_velocities)
+        if goal[0] is not None or goal[1] is not None:
+            self._aim(*goal)
+        self._sense(*obstacles)
         push = self._zeros if coupling is None else self._couple(coupling)
         velocity_before = self._derivatives()[0] if self._limited else self._zeros
         self._rate = tempo / (self._tau * (1.0 + self._slowing))
@@ -177,7 +171,7 @@ class Controller:
         return self.dt, self._tempo
 
     def _fits(self, dt: float) -> bool:
-        return _SHORTEST * self._tau <= dt <= self._longest
+        return SHORTEST * self._tau <= dt <= self._longest
 
     def _set_tau(self, tau: float) -> None:
         """The duration of u = 1, and with it the longest step."""
@@ -214,12 +208,19 @@ class Controller:
     def _read_goal(self, value: Any) -> Array | None:
         return inputs.vector(value, self._n_dims)
 
+    def _read_goal_velocity(self, value: Any) -> Array | None:
+        return inputs.vector(value, self._n_dims)
+
     def _read_coupling(self, value: Any) -> Array | None:
         return inputs.vector(value, self._n_dims)
 
-    def _aim(self, goal: Any) -> None:
-        target = self._read_goal(goal)
-        if target is None or not self._goal.aim(target - self._origin):
+    def _aim(self, goal: Any, velocity: Any = None) -> None:
+        """Set a goal, or let the one in force move; what cannot be used of one of them spoils both."""
+        target = self._goal.target + self._origin if goal is None else self._read_goal(goal)
+        moving = None if velocity is None else self._read_goal_velocity(velocity)
+        unread = moving is None and velocity is not None
+        remaining = (1.0 - self._clock.u) / (self._rate or 1.0 / self._tau)  # below 0 after the end
+        if unread or target is None or not self._goal.aim(target - self._origin, moving, remaining):
             self._events |= Status.GOAL_REJECTED
 
     def _sense(self, obstacles: Any, velocities: Any) -> None:
@@ -228,12 +229,11 @@ class Controller:
             self._obstacles = self._obstacle_velocities = self._nowhere
             return
         n = self._plan.n_positions
-        x = inputs.rows(obstacles, n)
-        v = inputs.rows(velocities, n) if velocities is not None or x is None else np.zeros_like(x)
-        if x is None or v is None or x.shape != v.shape or n < 2:
+        read = inputs.moving_points(obstacles, velocities, n)
+        if read is None:
             self._events |= Status.OBSTACLES_REJECTED
         else:
-            self._obstacles, self._obstacle_velocities = x - self._origin[:n], v
+            self._obstacles, self._obstacle_velocities = read[0] - self._origin[:n], read[1]
 
     def _couple(self, coupling: Any) -> Array:
         push = self._read_coupling(coupling)
@@ -245,6 +245,7 @@ class Controller:
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
         goal, ratio = self._follow(dt)
+        goal_velocity = self._goal.velocity
         self._clock.add_time(dt)
         du = self._rate * dt
         if du <= _STANDSTILL:
@@ -255,7 +256,9 @@ class Controller:
         velocities = self._obstacle_velocities
         if len(velocities):
             velocities = velocities / self._rate
-        influences = Influences(goal, ratio, push, self._obstacles, velocities)
+        goal_rate = self._zeros if goal_velocity is None else goal_velocity / self._rate
+        goal = goal if goal_velocity is None else self._goal.ahead(goal, goal_rate)
+        influences = Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
         motion = self._advance(self._motion[:2], self._clock.u, du, influences)
         if self._usable(motion):
             self._motion = motion

@@ -32,6 +32,15 @@ def rows(value: Any, n_dims: int) -> Array | None:
     return np.ascontiguousarray(array) if array.shape[1] == n_dims else None
 
 
+def moving_points(positions: Any, velocities: Any, n_dims: int) -> tuple[Array, Array] | None:
+    """Points (m, d) and their velocities, at rest where there are none; None unless d is at least 2."""
+    x = rows(positions, n_dims)
+    v = rows(velocities, n_dims) if velocities is not None or x is None else np.zeros_like(x)
+    if x is None or v is None or x.shape != v.shape or n_dims < 2:
+        return None
+    return x, v
+
+
 def number(value: Any) -> float:
     """`value` as a float; NaN for what is none."""
     try:

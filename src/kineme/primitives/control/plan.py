@@ -6,20 +6,23 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from kineme.validation import Array
+from kineme.errors import SpecificationError
+from kineme.validation import Array, check_number
 
+SHORTEST = 1e-12  # durations; shorter steps are lost in rounding
 _ROUNDING = 64 * np.finfo(np.float64).eps
 
 
 class Influences(NamedTuple):
     """What acts on the movement during one step, held constant over it; in normalized time, relative to the origin."""
 
-    goal: Array  # (d,)
+    goal: Array  # (d,), at the start of the step; ahead of a goal that moves, see `MovingGoal`
     ratio: Array  # (d,), what scale f is multiplied by
+    goal_rate: Array  # (d,), with which the goal goes on during the step
     push: Array  # (d,), an external acceleration
     obstacles: Array  # (m, n_positions), at the start of the step
     obstacle_velocities: Array  # (m, n_positions); with these the obstacles go on during the step
@@ -92,3 +95,15 @@ class Plan:
     def intervals(self) -> float:
         """Quadrature intervals per unit of u: two between neighboring centers, and as many as the spring is fast."""
         return max(2.0 * self.n_gaps, math.sqrt(self.K), 0.5 * self.D)
+
+
+def check_controlled(plan: Any, dt: Any) -> None:
+    """Refuse what is no plan, and steps that are too long or too short for it."""
+    if not isinstance(plan, Plan):
+        raise SpecificationError(
+            f"expected the plan of one movement, got {type(plan).__name__}; write primitives[0].controller(dt)"
+        )
+    check_number("dt", dt, above=0.0)
+    if not SHORTEST * plan.duration <= dt <= plan.longest_step * plan.duration:
+        most = "the duration," if plan.longest_step == 1.0 else f"{plan.longest_step:g} periods of"
+        raise SpecificationError(f"expected dt of at most {most} {plan.duration:g} s, got {dt!r} s")

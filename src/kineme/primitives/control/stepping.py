@@ -41,5 +41,5 @@ def _compiled(plan: Plan, avoidance: ObstacleAvoidance) -> Advance:
         return motion
 
     row, nowhere = np.zeros(d), np.zeros((0, plan.n_positions))
-    advance(np.zeros((2, d)), 0.0, 0.0, Influences(row, row, row, nowhere, nowhere))
+    advance(np.zeros((2, d)), 0.0, 0.0, Influences(row, row, row, row, nowhere, nowhere))
     return advance

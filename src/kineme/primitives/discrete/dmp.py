@@ -298,7 +298,7 @@ class Primitives(Learned):
 
         They move so without being told; they are saved, recognized, controlled and moved to other goals like any other.
         """
-        from kineme.primitives.discrete.rollout import own_primitives
+        from kineme.primitives.discrete.own_primitives import own_primitives
 
         own = own_primitives(movement)
         return cls._of_rows(

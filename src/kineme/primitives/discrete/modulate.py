@@ -67,7 +67,8 @@ def modulated(
         change = _shown_change(movement, asked, observed, errors, factor)
     if asked.stretch.any():
         _warn_loose(movement, asked, errors - change.coefficients @ (change.directions @ observed.weights.T))
-    return replace(movement, change=change)
+    fixed = movement.fixed_velocity or (velocity is not None and bool(velocity.any()))
+    return replace(movement, change=change, fixed_velocity=fixed)
 
 
 class _Observed(NamedTuple):

@@ -9,7 +9,8 @@ from kineme.primitives.control.options import check_one, one_vector
 from kineme.primitives.control.plan import Plan
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.modulate import modulated
-from kineme.primitives.discrete.rollout import own_primitives, rollout
+from kineme.primitives.discrete.own_primitives import own_primitives
+from kineme.primitives.discrete.rollout import rollout
 from kineme.primitives.discrete.via_points import ViaLike
 from kineme.validation import Array, check_number
 

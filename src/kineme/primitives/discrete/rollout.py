@@ -56,7 +56,8 @@ class Rollout(BaseRollout):
     durations: Array  # (n,), tau
     n_samples: int
     end: float = 1.0  # of the last sample, in durations
-    change: Change | None = None  # of the weights in force: via points, end velocity, limits
+    change: Change | None = None  # of the weights in force: via points, end velocity
+    fixed_velocity: bool = False  # whether a velocity was asked for that does not scale with the tempo
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -83,6 +84,33 @@ class Rollout(BaseRollout):
     def accelerations(self) -> Array:
         """Accelerations (n, T, d), per second squared."""
         return self._derivative(2)
+
+    def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
+        """The least duration of each movement (n,) [s] in which the same path stays within limits, in closed form.
+
+        Of one path, velocities are in proportion to 1 / tau and accelerations to 1 / tau^2, so it is
+        ``tau max(|v_k| / velocity_k, sqrt(|a_k| / acceleration_k))``, the maximum over samples and dimensions k.
+        ``rollout(duration=...)`` moves so; initial velocities scale with the rest.
+
+        Parameters
+        ----------
+        velocity, acceleration : float or array_like of shape (d,), optional
+            Largest absolute value, per second and per second squared: of all dimensions, or one each.
+
+        Raises
+        ------
+        SpecificationError
+            No limit, or one that is not above 0; a rollout that was given an initial or end velocity other than 0, for
+            its path depends on the duration.
+        """
+        from kineme.primitives.discrete.least_duration import least_durations
+
+        if self.fixed_velocity:
+            raise SpecificationError(
+                "expected a movement whose velocities scale with its tempo, got one with velocity= or end_velocity= "
+                "above 0: its path depends on the duration; try durations, and look at velocities and accelerations"
+            )
+        return least_durations(self.durations, (self.velocities, self.accelerations), (velocity, acceleration))
 
     @property
     def _shares(self) -> Array:
@@ -162,24 +190,14 @@ def rollout(
     tempo = primitives.durations / durations
     velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
     return Rollout(
-        primitives, _ratio(primitives, goals - starts), starts, goals, velocities, durations, primitives.dmp.n_points
-    )
-
-
-def own_primitives(movement: Rollout) -> Learned:
-    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights."""
-    some = movement.primitives
-    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
-    weights = some.scaled_weights * movement.ratio[:, :, None]
-    if movement.change is not None:
-        weights += movement.change.coefficients @ movement.change.directions
-    return replace(
-        some,
-        scaled_weights=weights,
-        starts=movement.starts.copy(),
-        goals=movement.goals.copy(),
-        velocities=movement.velocities_at_start.copy(),
-        durations=movement.durations.copy(),
+        primitives,
+        _ratio(primitives, goals - starts),
+        starts,
+        goals,
+        velocities,
+        durations,
+        primitives.dmp.n_points,
+        fixed_velocity=options["velocity"] is not None and bool(options["velocity"].any()),
     )
 
 

@@ -37,6 +37,9 @@ class MovementOptions:
         Continue until within this distance of the goal.
     obstacles : ndarray of shape (m, d), optional
         Points to steer around.
+    meet_goal : bool
+        Whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one. Otherwise
+        it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
     """
 
     start: Array | None = None
@@ -45,6 +48,7 @@ class MovementOptions:
     rate: float = 100.0
     settle: float | None = None
     obstacles: Array | None = None
+    meet_goal: bool = False
 
 
 class Generated(NamedTuple):
@@ -130,7 +134,12 @@ def _signed(columns: Array, learned: Learned) -> Array:
 
 
 def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOptions) -> Columns:
-    made = primitive.rollout(options.start, options.goal, options.duration, rate=options.rate, settle=options.settle)
+    end = None
+    if options.meet_goal:
+        end = primitive.rollout(duration=options.duration, rate=options.rate).velocities[:, -1]
+    made = primitive.rollout(
+        options.start, options.goal, options.duration, end_velocity=end, rate=options.rate, settle=options.settle
+    )
     return {
         "times": made.times[0],
         "positions": made.positions[0],

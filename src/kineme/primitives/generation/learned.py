@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from kineme.files.container import kind_of
 from kineme.movements.channels.channel import learned_names, recorded_names
 from kineme.movements.trajectories.movements import axis_names
@@ -62,6 +64,11 @@ class Learned:
     def recorded(self) -> Array | None:
         """The demonstration in these columns, shape (T, columns)."""
         return None if self.demonstration is None else self.demonstration.recorded
+
+    @property
+    def example(self) -> Array:
+        """The movement as it was learned, in the columns of the recording, shape (T, columns)."""
+        return np.asarray(self.primitive.rollout()[0].recorded)
 
 
 def learn_one(demonstration: Trajectory, dmp: DMP) -> Learned:

@@ -78,6 +78,7 @@ class PoseController(Controller):
         coupling: ArrayLike | None = None,
         obstacles: ArrayLike | None = None,
         *,
+        goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
         pose: ArrayLike | None = None,
@@ -92,6 +93,8 @@ class PoseController(Controller):
             Measured now: angular velocity in the world frame [rad/s], for poses after the linear velocity.
         coupling : array_like of shape (3,) or (6,), optional
             External angular acceleration during this step, for poses after the linear one.
+        goal_velocity : array_like of shape (3,) or (6,), optional
+            Velocity of the goal, in the columns of `velocity`; its orientation goes on as a rotation vector does.
         obstacles, obstacle_velocities : array_like of shape (m, 3), optional
             Points that the position steers around; orientations without a position have none.
         tempo, dt : float, optional
@@ -107,7 +110,7 @@ class PoseController(Controller):
             warnings.warn("pose= is deprecated: write step(position=...)", DeprecationWarning, stacklevel=2)
             position = pose
         self._events = Status(0)
-        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
         return self.state
 
     def _read_position(self, value: Any) -> Array | None:
@@ -118,6 +121,9 @@ class PoseController(Controller):
 
     def _read_velocity(self, value: Any, position: Array | None) -> Array | None:
         return self._as_rates(value, self._origin + self._motion[0] if position is None else position)
+
+    def _read_goal_velocity(self, value: Any) -> Array | None:
+        return self._as_rates(value, self._origin + self._goal.target)
 
     def _read_coupling(self, value: Any) -> Array | None:
         return self._as_rates(value, self._origin + self._motion[0])  # J p'' is the part that is linear in p''

@@ -139,6 +139,7 @@ class PosePrimitives(Batch):
         duration: ArrayLike | None = None,
         *,
         velocity: ArrayLike | None = None,
+        end_velocity: ArrayLike | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
         settle: float | None = None,
@@ -156,6 +157,8 @@ class PosePrimitives(Batch):
         velocity : array_like of shape (d - 1,) or (n, d - 1), optional
             Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
             the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
+        end_velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            The same at the goal, at the end of the duration; the goal is then met exactly.
         settle : float, optional
             Go on past the duration until every position and every component of the rotation vector [rad] stays within
             this distance of the goal.
@@ -173,6 +176,7 @@ class PosePrimitives(Batch):
             tangent_goal,
             duration,
             velocity=tangent_velocity,
+            end_velocity=end_velocity,  # at the goal the rotation vector is 0, and its rate the angular velocity
             rate=rate,
             n_samples=n_samples,
             settle=settle,

@@ -71,6 +71,7 @@ class RhythmicController(Controller):
         coupling: ArrayLike | None = None,
         obstacles: ArrayLike | None = None,
         *,
+        goal_velocity: ArrayLike | None = None,
         obstacle_velocities: ArrayLike | None = None,
         dt: float | None = None,
         amplitude: float | None = None,
@@ -80,7 +81,7 @@ class RhythmicController(Controller):
 
         Parameters
         ----------
-        position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt : optional
+        position, velocity, goal, tempo, coupling, obstacles, goal_velocity, obstacle_velocities, dt : optional
             See `Controller.step`; the goal is a new baseline.
         amplitude : float, optional
             A new amplitude, for this step and all later ones.
@@ -97,7 +98,7 @@ class RhythmicController(Controller):
             self._set_amplitude(amplitude)
         if period is not None:
             self._set_period(period)
-        self._step(position, velocity, goal, tempo, coupling, obstacles, obstacle_velocities, dt)
+        self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)
         return self.state
 
     @property

@@ -15,6 +15,7 @@ from kineme.primitives.discrete.modulate import modulated
 from kineme.primitives.discrete.rollout import Rollout, rollout
 from kineme.primitives.discrete.samples import sampled
 from kineme.primitives.discrete.via_points import ViaLike
+from kineme.primitives.recorded_as import merged
 from kineme.primitives.styles.blending import as_activation, blended
 from kineme.primitives.styles.conditioning import updated
 from kineme.primitives.styles.likelihood import log_likelihoods, unexplained_noise
@@ -25,6 +26,7 @@ from kineme.primitives.styles.parameters import (
     map_rows,
     path_matrix,
     shared_label,
+    shared_recording,
     to_numbers,
 )
 from kineme.validation import Array, as_numbers, check_choice, check_count, check_number
@@ -118,7 +120,9 @@ class AveragePrimitive:
         normal = np.random.default_rng(seed).standard_normal((n, len(self.factor)))
         theta = to_numbers(self.primitive) + np.tensordot(normal, self.factor, axes=1)
         durations = self.primitive.durations * np.exp(normal @ self.tempo_factor)
-        return from_numbers(self.primitive.dmp, theta, durations, shared_label(self.primitive))
+        return from_numbers(
+            self.primitive.dmp, theta, durations, shared_label(self.primitive), self.primitive.recorded_as
+        )
 
     def condition(
         self,
@@ -175,7 +179,9 @@ class AveragePrimitive:
             None if velocity is None else as_observations("velocity", times, velocity, velocity_std, d),
         )
         now = updated(self.primitive, self.factor, self.tempo_factor, observed)
-        one = from_numbers(self.primitive.dmp, now.theta, now.duration, shared_label(self.primitive))
+        one = from_numbers(
+            self.primitive.dmp, now.theta, now.duration, shared_label(self.primitive), self.primitive.recorded_as
+        )
         return AveragePrimitive(one, now.factor, now.tempo_factor, self.noise)
 
     def log_likelihood(self, movements: Primitives | MovementsLike, noise: float | None = None) -> Array:
@@ -237,7 +243,7 @@ class AveragePrimitive:
         share = float(a.mean())
         duration = own.durations ** (1.0 - share) * its.durations**share
         label = shared_label(Primitives.concatenate([own, its])) if own.labels is not None is not its.labels else None
-        one = from_numbers(own.dmp, found.theta, duration, label)
+        one = from_numbers(own.dmp, found.theta, duration, label, merged([own.recorded_as, its.recorded_as]))
         tempo = np.concatenate(((1.0 - share) * self.tempo_factor, share * other.tempo_factor))
         noises = [noise for noise in (self.noise, other.noise) if noise is not None]
         return AveragePrimitive(one, found.factor, tempo, max(noises, default=None))
@@ -295,7 +301,9 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
         factor = np.linalg.qr(factor, mode="r")  # the same covariance from as few rows as it has columns
     shape = (primitives.n_dims, primitives.dmp.n_basis + 3)
     duration = primitives.durations[:1] * np.exp(mean[-1:])
-    one = from_numbers(primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives))
+    one = from_numbers(
+        primitives.dmp, mean[:-1].reshape(1, *shape), duration, shared_label(primitives), shared_recording(primitives)
+    )
     noise = unexplained_noise(primitives.dmp, numbers[p > 0.0] - numbers[p > 0.0].mean(axis=0))
     return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 

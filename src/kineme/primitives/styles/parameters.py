@@ -13,6 +13,7 @@ sizes the two agree.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.response import Response
 from kineme.primitives.discrete.specification import Specification
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.validation import Array
 
 
@@ -44,8 +46,10 @@ def check_primitives(primitives: Any) -> None:
         )
 
 
-def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) -> Primitives:
-    """Primitives from theta (n, d, N + 3) and tau (n,) [s]; all of them get `label`, unless it is None."""
+def from_numbers(
+    dmp: DMP, theta: Array, durations: Array, label: Any = None, about: RecordedAs | None = None
+) -> Primitives:
+    """Primitives from theta (n, d, N + 3) and tau (n,) [s]; all of them get `label`, unless it is None, and `about`."""
     path = map_rows(theta, path_matrix(dmp, dmp.n_points))
     labels: NDArray[Any] | None = None if label is None else label_array([label] * len(theta))
     return Primitives(
@@ -57,6 +61,7 @@ def from_numbers(dmp: DMP, theta: Array, durations: Array, label: Any = None) ->
         durations=durations,
         extents=np.ptp(path, axis=2),
         labels=labels,
+        recorded_as=about,
     )
 
 
@@ -75,6 +80,11 @@ def response_matrix(response: Response, derivative: int = 0) -> Array:
 def map_rows(theta: Array, matrix: Array) -> Array:
     """``theta @ matrix``, shape (n, d, n_samples), as one product: a stack would become as many small ones."""
     return (theta.reshape(-1, theta.shape[2]) @ matrix).reshape(*theta.shape[:2], matrix.shape[1])
+
+
+def shared_recording(primitives: Primitives) -> RecordedAs | None:
+    """What the primitives were recorded as, without the steps of discrete channels: those are of one movement each."""
+    return None if primitives.recorded_as is None else replace(primitives.recorded_as, steps=None)
 
 
 def shared_label(primitives: Primitives) -> Any:

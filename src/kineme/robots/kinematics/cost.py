@@ -11,14 +11,15 @@ _TOLERATED = 1e-4  # distance from the path that costs nothing [m]
 _PER_METER = 1e3
 
 
-def cost_of(robot: Robot, times: Array, joints: Array, errors: Array) -> float:
-    """Cost of joint positions (T, n) at times (T,), with the tip off by errors (T,) [m]; smaller is better.
+def costs_of(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
+    """Costs (m,) of m ways of joint positions (T, m, n) at times (T,), tips off by (T, m) [m]; smaller is better.
 
     The sum of: 1000 times the largest error beyond 0.1 mm; the largest share of the limits of velocity; the fourth
     power of the largest share of the range of a joint, which rises where a joint comes close to a stop. A posture near
     a singularity costs by the velocities it takes.
     """
-    missed = _PER_METER * max(0.0, float(errors.max()) - _TOLERATED)
-    speed = np.abs(np.diff(joints, axis=0)) / np.diff(times)[:, None] / robot.velocity
+    missed = _PER_METER * np.maximum(0.0, errors.max(axis=0) - _TOLERATED)
+    speed = np.abs(np.diff(joints, axis=0)) / np.diff(times)[:, None, None] / robot.velocity
     middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
-    return missed + float(speed.max()) + float((np.abs(joints - middle) / half).max()) ** 4
+    stops = (np.abs(joints - middle) / half).max(axis=(0, 2))
+    return np.asarray(missed + speed.max(axis=(0, 2)) + stops**4)

@@ -35,6 +35,12 @@ class InverseKinematics:
     time_step : float, optional
         Time between two steps [s]: joints then move no faster than their limits of velocity allow.
 
+    Attributes
+    ----------
+    robot : Robot
+    costs : ndarray of shape (3,)
+        Of turning about x, y, z of the tip [1/rad], besides 1 per meter.
+
     Raises
     ------
     DataError
@@ -55,8 +61,8 @@ class InverseKinematics:
         self._data = robot.model.createData()
         self._time_step = 1.0 if time_step is None else time_step
         partial = 1.0 if robot.n_joints >= 6 else _PARTIAL
-        costs = [partial * cost for cost in ORIENTATIONS[orientation]]
-        self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=costs, gain=1.0)
+        self.costs = partial * np.array(ORIENTATIONS[orientation])
+        self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
         self._posture = PostureTask(cost=_POSTURE)
         self._posture.set_target(robot.rest)
         self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]

@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.stats import qmc
 
-from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.descent import Reached, descend
+from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
 _APART = 0.3  # two postures that differ by less in every joint count as one [rad]
-_STEPS = 25
+_STEPS = 30
+_STARTS = 16
+_TOLERANCE = 1e-4  # from the pose [m]
 
 
-def postures(
-    ik: InverseKinematics, position: Array, rotation: Array, n_starts: int = 8, tolerance: float = 1e-4
-) -> list[Array]:
-    """Joint positions that bring the tip to one pose, found from the rest posture and from spread random ones.
+def postures(robot: Robot, position: Array, rotation: Array, costs: Array) -> Reached:
+    """Joint positions that bring the tip to one pose, from the rest posture and from spread random ones.
 
-    The same starts every time (a Halton sequence within the limits, at most half a turn to each side), so that the same
-    question has the same answer.
+    The nearest comes first. If none reaches it, that which comes nearest is alone.
     """
-    robot = ik.robot
-    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-    spread = qmc.Halton(robot.n_joints, scramble=False).random(n_starts)[1:]
-    found: list[Array] = []
-    for start in [robot.rest, *(lower + spread * (upper - lower))]:
-        ik.reset(start)
-        q = ik.solve(position, rotation, most=_STEPS)
-        if ik.error <= tolerance and all(np.abs(q - other).max() > _APART for other in found):
-            found.append(q)
-    return found
+    found = descend(robot, _starts(robot), position, rotation, costs, _STEPS)
+    order = np.argsort(found.errors, kind="stable")
+    kept = [int(order[0])]
+    for i in order[1:]:
+        apart = np.abs(found.joints[kept] - found.joints[i]).max(axis=1)
+        if found.errors[i] <= _TOLERANCE and apart.min() > _APART:
+            kept.append(int(i))
+    return Reached(found.joints[kept], found.errors[kept])
+
+
+@lru_cache(maxsize=8)
+def _starts(robot: Robot) -> Array:
+    """The same every time, so that the same question has the same answer.
+
+    A Halton sequence within the limits, at most half a turn to each side.
+    """
+    lower, upper = np.clip((-np.pi, np.pi), robot.lower[:, None], robot.upper[:, None]).T
+    spread = qmc.Halton(robot.n_joints, scramble=False).random(_STARTS)[1:]
+    return np.vstack((robot.rest, lower + spread * (upper - lower)))

@@ -1,0 +1,27 @@
+"""Generated movements as primitives: what was asked for becomes what they do by themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kineme.primitives.discrete.learned import Learned
+from kineme.primitives.discrete.rollout import Rollout
+
+
+def own_primitives(movement: Rollout) -> Learned:
+    """The movements as n primitives of their own: each with this start, goal, velocity, duration and weights."""
+    some = movement.primitives
+    some = some if len(some) == len(movement) else some[np.zeros(len(movement), dtype=np.intp)]
+    weights = some.scaled_weights * movement.ratio[:, :, None]
+    if movement.change is not None:
+        weights += movement.change.coefficients @ movement.change.directions
+    return replace(
+        some,
+        scaled_weights=weights,
+        starts=movement.starts.copy(),
+        goals=movement.goals.copy(),
+        velocities=movement.velocities_at_start.copy(),
+        durations=movement.durations.copy(),
+    )
