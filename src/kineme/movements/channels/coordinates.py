@@ -16,12 +16,12 @@ from kineme.validation import Array
 
 _LEVER = 0.2  # m
 _UNITS_PER_METER = (
-    (1e-3, "km kilometer kilometre"),
-    (1.0, "m meter metre"),
-    (1e1, "dm decimeter decimetre"),
-    (1e2, "cm centimeter centimetre"),
-    (1e3, "mm millimeter millimetre"),
-    (1e6, "um µm micrometer micrometre micron"),
+    (1e-3, "km kilometer"),
+    (1.0, "m meter"),
+    (1e1, "dm decimeter"),
+    (1e2, "cm centimeter"),
+    (1e3, "mm millimeter"),
+    (1e6, "um µm micrometer micron"),
     (1 / 0.0254, "in inch inche"),
     (1 / 0.3048, "ft foot feet"),
 )
