@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kineme.validation import Array
 
 _QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
 Statistics = dict[str, list[Any]]  # min, max, mean, std, count and quantiles, a number for each entry
 
 
-def statistics_of(values: Array) -> Statistics:
+def statistics_of(values: NDArray[Any]) -> Statistics:
     """Statistics of one feature over the frames of an episode, values of shape (T,) or (T, d)."""
     rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
     found = {"min": rows.min(axis=0), "max": rows.max(axis=0), "mean": rows.mean(axis=0), "std": rows.std(axis=0)}

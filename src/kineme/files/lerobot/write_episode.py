@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.errors import DataError
 from kineme.files.lerobot.info import MARKER, read_json
@@ -105,7 +106,7 @@ def _append(folder: Path, info: dict[str, Any], features: Features, task: str) -
     tasks = tasks if known else [*tasks, task]
     place = _next_place(folder, number)
     frame = np.arange(length)
-    columns: dict[str, Array] = {
+    columns: dict[str, NDArray[Any]] = {
         **{name: np.asarray(values, dtype=np.float32) for name, values in features.items()},
         "timestamp": (frame / info["fps"]).astype(np.float32),
         "frame_index": frame,
@@ -174,7 +175,7 @@ def _write_tasks(folder: Path, tasks: Sequence[str]) -> None:
     _write(folder / _TASKS, columns, {"pandas": json.dumps(index)})
 
 
-def _column(values: Array) -> Any:
+def _column(values: NDArray[Any]) -> Any:
     import pyarrow as pa
 
     if values.ndim == 1:
