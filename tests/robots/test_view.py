@@ -25,7 +25,7 @@ from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
 from kineme.robots.view import shapes as shapes_module
-from kineme.robots.view.scene_data import MOST_SAMPLES
+from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import view_page
 
@@ -174,6 +174,12 @@ def test_a_hostile_name_is_shown_and_never_obeyed(tmp_path):
     assert "alert" not in parsed.data["urdf"]
     assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page
     assert parsed.data["tip"] == "l3"
+
+
+def test_data_cannot_end_their_script_element():
+    data = {"name": "</script><!--<script>"}
+    assert "<" not in as_script_data(data)
+    assert json.loads(as_script_data(data)) == data
 
 
 def test_failed_checks_stand_first_and_are_marked(tmp_path):
