@@ -95,7 +95,8 @@ def panda():
 
 def _overlap(a, b):
     return all(
-        a[at] < b[at] + b[size] - 0.5 and b[at] < a[at] + a[size] - 0.5 for at, size in (("x", "width"), ("y", "height"))
+        a[at] < b[at] + b[size] - 0.5 and b[at] < a[at] + a[size] - 0.5
+        for at, size in (("x", "width"), ("y", "height"))
     )
 
 
@@ -117,6 +118,7 @@ def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, 
     page.evaluate("kineme.show(0)")  # where the time is said with the longest words
     boxes = [page.locator(name).bounding_box() for name in ("#now", "#speed", "#reset", "#play")]
     assert not [True for a, b in combinations(boxes, 2) if _overlap(a, b)]
+    assert page.evaluate("(now => now.scrollWidth <= now.offsetWidth)(document.getElementById('now'))")
 
 
 def test_the_canvas_shows_the_arm_and_not_the_ground_alone(opened, panda):
