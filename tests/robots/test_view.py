@@ -212,7 +212,7 @@ def test_meshes_are_in_the_page_and_those_that_are_not_there_become_cylinders(tm
     drawn = {link.get("name"): [shape[0].tag for shape in link.iter("geometry")] for link in urdf.findall("link")}
     assert drawn == {"l0": ["mesh"], "l1": ["mesh"], "l2": ["cylinder"], "l3": []}
     assert {one.get("filename") for one in urdf.iter("mesh")} == {"0"}
-    assert "drawn as cylinders, as their meshes are not here: lower" in page
+    assert "drawn as cylinders up to the next joint: lower; their meshes are not there" in page
 
 
 def test_meshes_beyond_the_largest_size_are_left_out(tmp_path, monkeypatch):
