@@ -11,3 +11,7 @@ from kineme.robots.checks.preflight import preflight as preflight
 from kineme.robots.checks.check import Preflight as Preflight
 from kineme.robots.checks.check import Check as Check
 from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinematics
+
+# Live
+from kineme.robots.arm_controller import ArmController as ArmController
+from kineme.robots.arm_controller import ArmState as ArmState

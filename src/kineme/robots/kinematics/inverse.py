@@ -65,6 +65,7 @@ class InverseKinematics:
         self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
         self._posture = PostureTask(cost=_POSTURE)
         self._posture.set_target(robot.rest)
+        self._fastest: Array | None = None if time_step is None else robot.velocity
         self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]
         if time_step is not None:
             limited = robot.model.copy()
@@ -154,5 +155,7 @@ class InverseKinematics:
             safety_break=False,
             damping=_DAMPING,
         )
+        if self._fastest is not None:  # the solver keeps limits to 1e-6 only
+            velocity = np.clip(velocity, -self._fastest, self._fastest)
         self._configuration.integrate_inplace(velocity, dt)
         return float(np.abs(velocity).max()) * dt
