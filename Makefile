@@ -10,6 +10,7 @@
 # make figures  the pictures of docs/
 # make reference  docs/reference.md, from the stubs that list the public names
 # make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
+# make scene  what draws the arm in the page of kineme move --view, from the npm packages; vendored.json names them
 # make lock   renew the pinned requirements
 
 PYTHON ?= python3
@@ -17,7 +18,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest ros2 always soak fuzz bench evaluate figures reference tables lock clean
+.PHONY: demo test test-pythons test-lowest ros2 always soak fuzz bench evaluate figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -109,6 +110,13 @@ reference: $(DEV)/ready
 
 tables: $(DEV)/ready
 	$(DEV)/bin/python docs/make_tables.py
+
+# After another version: its numbers and sums in vendored.json, which tests compare.
+SCENE = src/kineme/robots/view/vendor
+scene:
+	mkdir -p out/scene && cp $(SCENE)/scene.js $(SCENE)/package.json out/scene/
+	cd out/scene && npm install --silent --no-package-lock && npm run build
+	cp out/scene/scene.min.js $(SCENE)/
 
 lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt

@@ -92,3 +92,11 @@ def test_bags_and_goals_hold_the_same_joints(wave):
 
 def test_an_input_is_never_written_over(wave):
     assert run("wave.csv", "--robot", "panda", "-o", "wave.csv", "--force").exit_code == 2
+
+
+def test_a_page_in_which_the_arm_moves_is_written(wave):
+    words = ("wave.csv", "--robot", "panda", "--at", "0.45,-0.2,0.3", "--slow-down", "--view", "wave.html")
+    assert run(*words).exit_code == 0
+    assert "panda_joint7 over time" in (wave / "wave.html").read_text(encoding="utf-8")
+    assert "wave.html" in run(*words).output  # is there already
+    assert run(*words, "--force").exit_code == 0

@@ -253,3 +253,22 @@ def test_angles_of_a_stored_library_wrap_by_what_they_were_recorded_with(tmp_pat
         assert [answer.ranked[0] for answer in library.recognize(list(angles))] == list("abab")
         learned = LibraryRecognizer(library.store).model().comparison.checked(list(angles))
         np.testing.assert_allclose(learned.positions, demos.positions, atol=1e-9)
+
+
+@pytest.mark.parametrize("first", ["in steps", "continuously"])
+def test_columns_of_the_same_names_are_learned_as_the_library_has_them(tmp_path, first):
+    t = np.linspace(0, 2, 60)
+
+    def recorded(gripper, seed):
+        x = np.sin(3 * t + 0.1 * seed)
+        return Demonstrations.of(pd.DataFrame({"t": t, "x": x, "y": t, "gripper": gripper}))
+
+    shown = {"in steps": recorded(np.round(t / 2), 0), "continuously": recorded(np.clip(t - 0.5, 0, 1), 1)}
+    assert [one.kind for one in shown["in steps"].channels] != [one.kind for one in shown["continuously"].channels]
+    with ActionLibrary(tmp_path / "grips", create=True) as made:
+        made.learn(shown.pop(first), ["grip"])
+        before = made.channels
+        made.learn(shown.popitem()[1], ["grip"])
+        assert made.channels == before
+        assert len(made) == 2
+        assert {one.label for one in made.recognize(recorded(np.round(t / 2), 0))} == {"grip"}

@@ -371,3 +371,30 @@ def test_bad_input_is_refused(arguments, error, message):
 def test_it_is_fitted_first():
     with pytest.raises(ValueError, match="not fitted"):
         Recognizer().spot(np.zeros((20, 2)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
+@pytest.mark.parametrize("rest", [0, 50])
+def test_a_robot_that_repeats_its_movements_exactly_is_recognized(noise, rest):
+    # Its demonstrations differ less from each other than from themselves with a hundredth cut off, as a search does.
+    rng = np.random.default_rng(0)
+    t = np.linspace(0, 1, 150)
+    s = 10 * t**3 - 15 * t**4 + 6 * t**5
+    shapes = {
+        "wave": np.column_stack((0.3 * np.sin(4 * np.pi * s), 0.1 * s, 0.2 * s**2)),
+        "reach": np.column_stack((0.4 * s, 0.1 * np.sin(np.pi * s), 0.3 * s)),
+        "circle": np.column_stack((0.2 * np.cos(2 * np.pi * s) - 0.2, 0.2 * np.sin(2 * np.pi * s), 0.05 * s)),
+    }
+
+    def recorded(x):
+        return Trajectory(np.arange(len(x)) / 100, x + noise * rng.normal(size=x.shape))
+
+    names = [name for name in shapes for _ in range(3)]
+    recognizer = Recognizer().fit([recorded(shapes[name]) for name in names], names)
+    x, shown = np.zeros((1, 3)), ["wave", "circle", "reach", "circle"]
+    for name in shown:
+        moved = shapes[name] - shapes[name][0] + x[-1]
+        x = np.concatenate((x, moved, np.repeat(moved[-1:], rest, axis=0)))
+    found = recognizer.spot(recorded(x))
+    assert [one.label for one in found] == shown
+    assert min(one.p_known for one in found) > 1e-3

@@ -21,7 +21,7 @@ from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options
 from kineme.cli.source import read_source
 
-_OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot")
+_OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot", "view")
 _NEW_FILE = click.Path(path_type=Path)
 
 
@@ -55,6 +55,9 @@ _NEW_FILE = click.Path(path_type=Path)
 @click.option("--ros2", type=_NEW_FILE, help="A .mcap, or a folder, of ROS 2 with the same.")
 @click.option("--action-goal", type=_NEW_FILE, help="A .yaml or .json file for ros2 action send_goal.")
 @click.option("--plot", type=_NEW_FILE, help="Path and joints beside their limits: a .png, .svg or .pdf file.")
+@click.option(
+    "--view", type=_NEW_FILE, help="An .html page in which the arm moves; opens in a browser, needs no network."
+)
 @json_option
 @force_option
 def move(**options: Any) -> None:
@@ -191,3 +194,7 @@ def _write(made: Any, options: dict[str, Any]) -> None:
         from kineme.robots.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(made), options["plot"])
+    if options["view"]:
+        from kineme.robots.view.write_view import write_view
+
+        write_view(options["view"], made)

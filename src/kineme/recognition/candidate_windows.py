@@ -21,7 +21,7 @@ from kineme.validation import Array
 
 MIN_SAMPLES = 8  # of a window
 N_POINTS = 64  # even samples by which a window is described
-_RESOLUTION = 0.04  # share of the peak speed that must be distinguished from rest
+RESOLUTION = 0.04  # share of the peak speed that must be distinguished from rest
 _SHARE = 0.12  # distance of boundaries, in durations of the shortest windows between them
 _DEPTH = 0.2  # prominence, in the logarithm of speed, of a minimum that is a boundary
 _FLOOR = 0.02  # of the peak speed: lower speeds count as equally slow
@@ -96,7 +96,7 @@ def candidate_windows(recording: Trajectory, durations: Durations | None, most_b
     most_bouts : int
         Most stretches between rests that a window may span.
     """
-    motion = observe(recording, _RESOLUTION)
+    motion = observe(recording, RESOLUTION)
     rest = Rest()
     bouts = moving(motion, rest.pieces(motion), rest.resolution)
     if not len(bouts):

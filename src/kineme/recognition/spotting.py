@@ -28,6 +28,7 @@ from kineme.recognition.compared_windows import (
 )
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import check_error_rate
+from kineme.recognition.cut_movements import calibration_of_cut
 from kineme.recognition.window_scores import (
     Manner,
     ScoredWindows,
@@ -80,9 +81,9 @@ def spot(
 
     `progress` is called now and then with the share of the windows that is compared.
     """
-    comparison, references, calibration = known
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
+    comparison, references, calibration = known = known._replace(calibration=calibration_of_cut(known))
     lasting = durations_of(references)
     whole = _as_timed(recording) if lasting is not None else as_recording(recording)
     whole = comparison.checked([whole], "a recording")[0]

@@ -15,3 +15,4 @@ from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinemat
 # Live
 from kineme.robots.arm_controller import ArmController as ArmController
 from kineme.robots.arm_controller import ArmState as ArmState
+from kineme.robots.view.write_view import write_view as write_view

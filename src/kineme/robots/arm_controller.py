@@ -14,7 +14,7 @@ from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.postures import postures
-from kineme.robots.models.robot import Robot
+from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
 
 _REACHED = 1e-3  # farther from the start than this, no posture reaches it [m]
@@ -85,6 +85,7 @@ class ArmController:
         orientation: ArrayLike | None = None,
         follow: str = "full",
     ) -> None:
+        check_robot(robot)
         d = len(controller.state.position)
         if d not in (3, 7):
             raise TrajectoryError(

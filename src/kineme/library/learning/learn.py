@@ -18,7 +18,15 @@ from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
-from kineme.movements.channels.channel import in_words, is_plain, learned_names, recorded_names, same_columns
+from kineme.movements.channels.channel import (
+    Channels,
+    in_words,
+    is_plain,
+    learned_names,
+    moving_kinds,
+    recorded_names,
+    same_columns,
+)
 from kineme.movements.trajectories.as_learned import as_recorded, of_columns
 from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -147,14 +155,21 @@ def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
-    """Recorded columns without channels as those of the library, and generated ones as they are learned."""
+    """Columns without channels, or of the same names, as those of the library; generated ones as they are learned."""
     ours, n_dims = store.channels, store.n_dims
     if demos.channels is None:
         known = ours is not None and demos.n_dims == len(recorded_names(ours))
         return of_columns(demos, ours) if ours is not None and known else demos
     if ours is None and n_dims == demos.n_dims > len(learned_names(demos.channels)):
         return as_recorded(demos)
+    if ours is not None and _look_otherwise(demos.channels, ours):
+        return of_columns(as_recorded(demos), ours)
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
+
+
+def _look_otherwise(channels: Channels, ours: Channels) -> bool:
+    """Whether columns are of the same names but of other kinds, as of a gripper that moves in steps or continuously."""
+    return moving_kinds(channels) != moving_kinds(ours) and recorded_names(channels) == recorded_names(ours)
 
 
 def _check_dimensions(store: Store, demos: Demonstrations) -> None:

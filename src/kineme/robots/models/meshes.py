@@ -21,7 +21,7 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
             mesh = collision.find("geometry/mesh")
             if mesh is None:
                 continue
-            found = _resolve(mesh.get("filename", ""), path)
+            found = find_mesh(mesh.get("filename", ""), path)
             if found is None:
                 link.remove(collision)
                 missing.append(str(link.get("name")))
@@ -30,7 +30,8 @@ def resolve_meshes(robot: ElementTree.Element, path: Path) -> list[str]:
     return missing
 
 
-def _resolve(name: str, path: Path) -> Path | None:
+def find_mesh(name: str, path: Path) -> Path | None:
+    """Where the mesh lies that the URDF at `path` calls `name`; None where it is not there."""
     within = next((name.removeprefix(prefix) for prefix in _PREFIXES if name.startswith(prefix)), name)
     folders = path.resolve().parents
     return next((folder / within for folder in folders if within and (folder / within).is_file()), None)

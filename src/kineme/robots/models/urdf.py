@@ -45,7 +45,7 @@ def read_chain(path: Path, tip: str | None) -> Chain:
         No such file, no URDF, a tip that does not exist, several chains and no tip, a joint without limits or with a
         mimic joint in the chain; each with the name of the joint or link.
     """
-    robot = _root(path)
+    robot = read_root(path)
     parents = {_child(joint, path): joint for joint in robot.findall("joint")}
     links = [str(link.get("name")) for link in robot.findall("link")]
     tip = _tip(tip, links, parents, path)
@@ -67,7 +67,14 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     return Chain(ElementTree.tostring(robot, "unicode"), joints, limits, tip, free, missing)
 
 
-def _root(path: Path) -> ElementTree.Element:
+def read_root(path: Path) -> ElementTree.Element:
+    """The root of a URDF file.
+
+    Raises
+    ------
+    DataError
+        No such file, one of more than 20 MB, no XML, or XML that is no URDF.
+    """
     try:
         if path.stat().st_size > _LARGEST:
             raise DataError(f"{path}: expected a URDF of at most {_LARGEST / 1e6:.0f} MB, got {path.stat().st_size:,}")

@@ -1,0 +1,275 @@
+// The page's script: time moves the arm, the trace of its tip, and the cursors of the charts.
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const byId = (id) => document.getElementById(id);
+  const [play, slider, now, speed, reset, canvas] = ["play", "time", "now", "speed", "reset", "canvas"].map(byId);
+  const times = data.times;
+  const duration = times[times.length - 1];
+  const charts = [...document.querySelectorAll(".chart")].map((chart) => ({
+    cursor: chart.querySelector(".cursor"),
+    output: chart.querySelector("output"),
+    width: chart.querySelector("svg").viewBox.baseVal.width,
+  }));
+  const view = sceneOrNothing();
+  let time = 0;
+  let last = null; // when the page was drawn last, while it plays
+
+  /** The last sample at or before a time, and how far the time lies between it and the next one. */
+  function sampleAt(at) {
+    let low = 0;
+    let high = times.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= at) low = middle;
+      else high = middle;
+    }
+    const share = high > low ? Math.min(Math.max((at - times[low]) / (times[high] - times[low]), 0), 1) : 0;
+    return share === 1 ? [high, 0] : [low, share];
+  }
+
+  function between(rows, [i, share]) {
+    return share === 0 ? rows[i] : rows[i].map((value, k) => value + share * (rows[i + 1][k] - value));
+  }
+
+  function show(at) {
+    time = Math.min(Math.max(at, 0), duration);
+    const sample = sampleAt(time);
+    const joints = between(data.positions, sample);
+    const values = [...joints, ...data.steps.map((channel) => channel[sample[0]])];
+    const said = `${time.toFixed(2)} s`;
+    slider.value = (Number(slider.max) * time) / duration;
+    slider.setAttribute("aria-valuetext", `${time.toFixed(2)} of ${duration.toFixed(2)} seconds`);
+    now.textContent = said + (time < data.begins ? " approach" : "");
+    charts.forEach((chart, k) => {
+      const x = (chart.width * time) / duration;
+      chart.cursor.setAttribute("x1", x);
+      chart.cursor.setAttribute("x2", x);
+      const unit = chart.output.dataset.unit;
+      chart.output.textContent = unit ? `${values[k].toFixed(3)} ${unit}` : String(values[k]);
+    });
+    if (view) view.show(joints, sample[0]);
+  }
+
+  function setPlaying(on) {
+    last = on ? performance.now() : null;
+    play.textContent = on ? "Pause" : "Play";
+    if (on && time >= duration) show(0);
+    if (on) requestAnimationFrame(tick);
+  }
+
+  function tick(at) {
+    if (last === null) return;
+    show(time + (Math.max(at - last, 0) / 1000) * Number(speed.value));
+    last = at;
+    if (time >= duration) setPlaying(false);
+    else requestAnimationFrame(tick);
+  }
+
+  slider.addEventListener("input", () => {
+    setPlaying(false);
+    show((duration * Number(slider.value)) / Number(slider.max));
+  });
+  play.addEventListener("click", () => setPlaying(last === null));
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== " " || event.target.closest("button, select, summary")) return;
+    event.preventDefault();
+    setPlaying(last === null);
+  });
+  if (!data.wanted.length) byId("legend-wanted").hidden = true;
+  show(0);
+  // For tests: where the drawn arm has its tip.
+  window.kineme = { show, tip: () => view && view.tip(), frames: () => view && view.frames() };
+
+  /** The scene, or null where the browser cannot draw one: the charts and the table still work. */
+  function sceneOrNothing() {
+    try {
+      return makeScene();
+    } catch (error) {
+      const problem = byId("problem");
+      problem.textContent = `The arm cannot be drawn here: ${error.message}. The joints and the checks are shown.`;
+      problem.hidden = false;
+      reset.disabled = true;
+      return null;
+    }
+  }
+
+  function makeScene() {
+    const T = scene; // of vendor/scene.min.js
+    const renderer = new T.WebGLRenderer({ canvas, antialias: true });
+    const world = new T.Scene();
+    const camera = new T.PerspectiveCamera(40, 1, 0.01, 100);
+    camera.up.set(0, 0, 1);
+    const dark = window.matchMedia("(prefers-color-scheme: dark)");
+    const arm = readArm(T, () => draw());
+    const [middle, reach] = extent(T, arm);
+    let grid = null;
+    let frames = 0;
+
+    world.add(new T.HemisphereLight(0xffffff, 0x8890a0, 2.2));
+    const sun = new T.DirectionalLight(0xffffff, 1.8);
+    sun.position.set(1, -1.5, 2);
+    world.add(sun, arm);
+    const thin = Math.max(0.0022 * reach, 0.0006);
+    const first = Math.max(sampleAt(data.begins)[0], 1);
+    const { executed, wanted } = data;
+    const light = tube(T, wanted, 3.2 * thin, data.colors.wanted, 1, 0.5);
+    if (wanted.length > 1) world.add(light);
+    world.add(tube(T, executed.slice(0, first + 1), 0.7 * thin, data.colors.approach, 2));
+    world.add(tube(T, executed.slice(first), 0.7 * thin, data.colors.executed, 2));
+    const approach = tube(T, executed.slice(0, first + 1), 1.7 * thin, data.colors.approach, 3);
+    const movement = tube(T, executed.slice(first), 1.7 * thin, data.colors.executed, 3);
+    world.add(approach, movement, mark(T, new T.SphereGeometry(4.5 * thin), data.start, data.colors.executed));
+    world.add(mark(T, new T.OctahedronGeometry(6.5 * thin), data.goal, data.colors.goal));
+
+    const controls = new T.OrbitControls(camera, canvas);
+    controls.addEventListener("change", draw);
+    reset.addEventListener("click", home);
+    canvas.addEventListener("keydown", turn);
+    dark.addEventListener("change", paint);
+    new ResizeObserver(fit).observe(canvas.parentElement);
+    paint();
+    fit();
+    home();
+
+    function home() {
+      controls.target.copy(middle);
+      const back = camera.aspect < 1 ? 1 / camera.aspect : 1;
+      camera.position.copy(middle).addScaledVector(new T.Vector3(1.25, -1.45, 0.85).normalize(), 1.55 * reach * back);
+      controls.update();
+      draw();
+    }
+    function fit() {
+      const { clientWidth, clientHeight } = canvas.parentElement;
+      if (!clientWidth || !clientHeight) return;
+      renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+      renderer.setSize(clientWidth, clientHeight, false);
+      camera.aspect = clientWidth / clientHeight;
+      camera.updateProjectionMatrix();
+      draw();
+    }
+    function paint() {
+      const lines = dark.matches ? [0x59616b, 0x343a42] : [0xa9afb8, 0xd3d7dd];
+      world.background = new T.Color(dark.matches ? 0x1e2226 : 0xf4f5f7);
+      light.material.opacity = dark.matches ? 0.8 : 0.5;
+      if (grid) world.remove(grid);
+      grid = new T.GridHelper(2.4 * Math.max(reach, 0.2), 24, ...lines);
+      grid.rotation.x = Math.PI / 2;
+      world.add(grid);
+      draw();
+    }
+    function turn(event) {
+      const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+      const nearer = { "+": 1 / 1.15, "=": 1 / 1.15, "-": 1.15 }[event.key];
+      if (!nearer && !steps[event.key]) return;
+      event.preventDefault();
+      const away = camera.position.clone().sub(controls.target);
+      const [around, down] = steps[event.key] ?? [0, 0];
+      const length = away.length() * (nearer ?? 1);
+      const height = Math.min(Math.max(Math.acos(away.z / away.length()) + 0.08 * down, 0.05), Math.PI - 0.05);
+      const angle = Math.atan2(away.y, away.x) + 0.12 * around;
+      const flat = length * Math.sin(height);
+      away.set(flat * Math.cos(angle), flat * Math.sin(angle), length * Math.cos(height));
+      camera.position.copy(controls.target).add(away);
+      controls.update();
+      draw();
+    }
+    function draw() {
+      frames += 1;
+      renderer.render(world, camera);
+    }
+    return {
+      show(joints, sample) {
+        pose(arm, joints);
+        approach.show(sample);
+        movement.show(Math.max(sample - first, 0));
+        draw();
+      },
+      tip() {
+        arm.updateMatrixWorld(true);
+        return arm.links[data.tip].getWorldPosition(new T.Vector3()).toArray();
+      },
+      frames: () => frames,
+    };
+  }
+
+  function readArm(T, changed) {
+    // Textures of meshes are files of their own: none is requested.
+    const manager = new T.LoadingManager().setURLModifier(
+      () => "data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACH5BAAAAAAALAAAAAABAAEAAAICRAEAOw==",
+    );
+    const loader = new T.URDFLoader(manager);
+    loader.loadMeshCb = (number, _, material, done) => done(readMesh(T, manager, data.meshes[Number(number)], material));
+    manager.onLoad = changed;
+    const arm = loader.parse(data.urdf);
+    for (const name of data.joints) arm.joints[name].ignoreLimits = true; // what is executed is shown, whatever it is
+    return arm;
+  }
+
+  function readMesh(T, manager, mesh, material) {
+    const bytes = Uint8Array.from(atob(mesh.content), (mark) => mark.charCodeAt(0));
+    if (mesh.kind === "stl") return new T.Mesh(new T.STLLoader().parse(bytes.buffer), material);
+    return new T.ColladaLoader(manager).parse(new TextDecoder().decode(bytes), "").scene;
+  }
+
+  function pose(arm, joints) {
+    data.joints.forEach((name, k) => arm.setJointValue(name, joints[k]));
+  }
+
+  /** The middle of what moves, and the size of the arm and its paths [m]. */
+  function extent(T, arm) {
+    const low = [0, 0, 0];
+    const high = [0, 0, 0];
+    const include = (point) =>
+      point.forEach((value, k) => {
+        low[k] = Math.min(low[k], value);
+        high[k] = Math.max(high[k], value);
+      });
+    data.executed.forEach(include);
+    data.wanted.forEach(include);
+    for (const row of [data.positions[0], data.positions[data.positions.length >> 1], data.positions[data.positions.length - 1]]) {
+      pose(arm, row);
+      arm.updateMatrixWorld(true);
+      for (const link of Object.values(arm.links)) include(link.getWorldPosition(new T.Vector3()).toArray());
+    }
+    const middle = low.map((value, k) => (value + high[k]) / 2);
+    return [new T.Vector3(...middle), Math.max(Math.hypot(...low.map((value, k) => high[k] - value)), 0.1)];
+  }
+
+  function mark(T, geometry, point, color) {
+    const made = new T.Mesh(geometry, new T.MeshBasicMaterial({ color }));
+    made.position.set(...point);
+    return made;
+  }
+
+  /** A tube along points, drawn over those of a lower order; `show` draws the part of it up to one of the points. */
+  function tube(T, points, radius, color, order, opacity = 1) {
+    const sides = 8;
+    const corners = [];
+    const faces = [];
+    let side = new T.Vector3(0, 0, 1);
+    let along = new T.Vector3(1, 0, 0);
+    points.forEach((point, i) => {
+      const step = new T.Vector3(...(points[i + 1] ?? point)).sub(new T.Vector3(...(points[i - 1] ?? point)));
+      if (step.length() > 1e-9) along = step.normalize();
+      if (Math.abs(along.dot(side)) > 0.99) side = new T.Vector3(Math.abs(along.x) < 0.9 ? 1 : 0, Math.abs(along.x) < 0.9 ? 0 : 1, 0);
+      side = side.clone().addScaledVector(along, -along.dot(side)).normalize();
+      const other = along.clone().cross(side);
+      for (let k = 0; k < sides; k += 1) {
+        const angle = (2 * Math.PI * k) / sides;
+        const [c, s] = [radius * Math.cos(angle), radius * Math.sin(angle)];
+        corners.push(point[0] + c * side.x + s * other.x, point[1] + c * side.y + s * other.y, point[2] + c * side.z + s * other.z);
+        const [a, b] = [sides * i + k, sides * i + ((k + 1) % sides)];
+        if (i + 1 < points.length) faces.push(a, b, a + sides, b, b + sides, a + sides);
+      }
+    });
+    const geometry = new T.BufferGeometry();
+    geometry.setAttribute("position", new T.Float32BufferAttribute(corners, 3));
+    geometry.setIndex(faces);
+    const made = new T.Mesh(geometry, new T.MeshBasicMaterial({ color, opacity, transparent: true, depthWrite: opacity === 1 }));
+    made.renderOrder = order;
+    made.show = (sample) => geometry.setDrawRange(0, 6 * sides * sample);
+    made.frustumCulled = false;
+    return made;
+  }
+})();

@@ -1,0 +1,180 @@
+"""The page in which an arm moves, opened in Chromium: it draws, obeys its slider and keys, and requests nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from view_samples import HOSTILE, arm, mesh_visual, moved, write_stl
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+
+from kineme.robots import load, write_view  # noqa: E402
+from kineme.robots.checks.along import along  # noqa: E402
+
+WIDTHS = (390, 820, 1440)
+#: A triangle whose texture is the address of a file.
+COLLADA = Path(__file__).parent / "textured.dae"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser, tmp_path):
+    """A function that opens the page of a movement; at the end, nothing was requested and nothing went wrong."""
+    wrong, requests, contexts = [], [], []
+
+    def open_page(made, width=1440, **options):
+        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: message.type == "error" and wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("dialog", lambda dialog: wrong.append(dialog.message))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(write_view(tmp_path / "arm.html", made).as_uri())
+        wait_until(page, "window.kineme && kineme.frames() > 0")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert wrong == []
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
+    assert sum(url.startswith("file:") for url in requests) == len(contexts)
+
+
+def wait_until(page, expression):
+    """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
+    deadline = time.monotonic() + 20
+    while not page.evaluate(expression):
+        assert time.monotonic() < deadline, expression
+        page.wait_for_timeout(20)
+
+
+def scrub(page, share):
+    """Put the slider to a share of its way."""
+    page.evaluate(
+        """at => { const slider = document.getElementById("time"); slider.value = at * slider.max;
+        slider.dispatchEvent(new Event("input")); }""",
+        share,
+    )
+
+
+def shown(page):
+    """The time that the page says [s]."""
+    return float(page.inner_text("#now").split()[0])
+
+
+@pytest.fixture(scope="module")
+def panda():
+    from kineme.movements.trajectories.trajectory import Trajectory
+    from kineme.robots import move
+    from kineme.robots.kinematics.inverse import InverseKinematics
+
+    robot = load("panda")
+    u = np.linspace(0, 1, 150)
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    shape = np.column_stack((0 * s - 0.05, 0.4 * (s - 0.5), 0.1 * np.sin(2 * np.pi * s)))
+    return move(Trajectory(times=3 * u, positions=InverseKinematics(robot).tip_position + shape), robot)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, width, scheme):
+    page = opened(panda, width, color_scheme=scheme)
+    tips = along(panda.robot, panda.trajectory).tip_positions
+    for sample in (0, 100, 250, len(tips) - 1):
+        page.evaluate("at => kineme.show(at)", float(panda.trajectory.times[sample]))
+        np.testing.assert_allclose(page.evaluate("kineme.tip()"), tips[sample], atol=1e-5)
+    before = page.evaluate("kineme.frames()")
+    scrub(page, 0.5)
+    assert page.evaluate("kineme.frames()") > before
+    duration = panda.trajectory.duration
+    assert page.inner_text("#now") == f"{duration / 2:.2f} s"
+    assert page.get_attribute("#time", "aria-valuetext") == f"{duration / 2:.2f} of {duration:.2f} seconds"
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_canvas_shows_the_arm_and_not_the_ground_alone(opened, panda):
+    page = opened(panda)
+    colors = page.evaluate(
+        """() => new Promise(done => requestAnimationFrame(() => {
+          kineme.show(2); const c = document.getElementById("canvas");
+          const flat = new OffscreenCanvas(c.width, c.height).getContext("2d"); flat.drawImage(c, 0, 0);
+          const p = flat.getImageData(0, 0, c.width, c.height).data; const count = {blue: 0, orange: 0, green: 0};
+          for (let i = 0; i < p.length; i += 4) { const [r, g, b] = [p[i], p[i + 1], p[i + 2]];
+            if (b > 150 && r < 60) count.blue += 1; if (r > 180 && b < 140 && g < 190) count.orange += 1;
+            if (g > 130 && r < 60 && b < 140) count.green += 1; }
+          done(count); }))"""
+    )
+    assert min(colors.values()) > 30, colors
+
+
+def test_space_plays_and_pauses_and_the_end_stops(opened, panda):
+    page = opened(panda)
+    page.select_option("#speed", "2")
+    page.locator("body").press(" ")
+    wait_until(page, "Number(document.getElementById('time').value) > 50")
+    assert page.inner_text("#play") == "Pause"
+    page.locator("#time").press(" ")
+    assert page.inner_text("#play") == "Play"
+    stopped = shown(page)
+    page.wait_for_timeout(150)
+    assert shown(page) == stopped
+    scrub(page, 0.98)
+    page.click("#play")
+    wait_until(page, "document.getElementById('play').textContent === 'Play'")
+    assert shown(page) == pytest.approx(panda.trajectory.duration, abs=0.006)
+
+
+def test_keys_turn_the_view_and_the_slider(opened, panda):
+    page = opened(panda, reduced_motion="reduce")
+    before = page.evaluate("kineme.frames()")
+    page.locator("#canvas").press("ArrowLeft")
+    page.locator("#canvas").press("+")
+    assert page.evaluate("kineme.frames()") >= before + 2
+    page.locator("#time").press("End")
+    assert page.inner_text("#now") == f"{panda.trajectory.duration:.2f} s"
+    page.locator("#time").press("Home")
+    assert page.inner_text("#now") == "0.00 s approach"
+
+
+def test_hostile_names_are_text(opened, tmp_path):
+    page = opened(moved(arm(tmp_path, names=HOSTILE)))
+    assert page.locator(".chart .name").all_inner_texts() == [f"to {name}" for name in HOSTILE[1:]]
+    assert page.evaluate("kineme.tip().length") == 3
+
+
+def test_meshes_are_drawn_without_their_textures(opened, tmp_path):
+    write_stl(tmp_path / "shapes" / "link.stl")
+    shutil.copy(COLLADA, tmp_path / "shapes" / "hand.dae")
+    made = moved(arm(tmp_path, [mesh_visual("link.stl"), mesh_visual("hand.dae"), mesh_visual("gone.stl"), ""]))
+    page = opened(made)
+    page.evaluate("kineme.show(1)")
+    assert page.is_hidden("#problem")
+
+
+def test_without_webgl_the_joints_and_the_checks_remain(opened, browser, panda, tmp_path):
+    context = browser.new_context()
+    context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page = context.new_page()
+    page.goto(write_view(tmp_path / "blind.html", panda).as_uri())
+    page.wait_for_selector("#problem:not([hidden])")
+    assert "cannot be drawn here" in page.inner_text("#problem")
+    scrub(page, 1.0)
+    assert shown(page) == pytest.approx(panda.trajectory.duration, abs=0.006)
+    context.close()
