@@ -50,7 +50,7 @@ _NEW_FILE = click.Path(path_type=Path)
 @click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
 @specification_options
 @layout_options
-@click.option("--output", "-o", type=_NEW_FILE, help="A .csv, .npz or .json file of joints; - for the screen, as CSV.")
+@click.option("--output", "-o", type=_NEW_FILE, help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV.")
 @click.option("--ros1", type=_NEW_FILE, help="A .bag of ROS 1 with JointTrajectory and JointState.")
 @click.option("--ros2", type=_NEW_FILE, help="A .mcap, or a folder, of ROS 2 with the same.")
 @click.option("--action-goal", type=_NEW_FILE, help="A .yaml or .json file for ros2 action send_goal.")

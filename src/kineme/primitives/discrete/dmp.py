@@ -227,6 +227,7 @@ class Primitives(Learned):
         velocity: ArrayLike | None = None,
         via: ViaLike | None = None,
         end_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
         settle: float | None = None,
@@ -250,6 +251,9 @@ class Primitives(Learned):
             functions can.
         end_velocity : array_like of shape (d,) or (n, d), optional
             Velocity at the goal, at the end of the duration, per second; the goal is then met exactly.
+        position_limits : (low, high), optional
+            Where to stay, each a number or (d,), infinite where there is no limit; at the specification's `n_points`
+            samples. A small quadratic program for each dimension of each movement that would leave them.
         rate : float, optional
             Samples per second, at least; all movements of a batch get the same number of samples, at most 50 million
             over the number of basis functions.
@@ -270,7 +274,8 @@ class Primitives(Learned):
             A start, goal, velocity or via point of the wrong shape; numbers of movements that do not match.
         SpecificationError
             A duration of 0 or less, a rate too low to follow the dynamics, a via point outside the duration, two places
-            at one time, more via points than there are basis functions to meet them.
+            at one time, more via points than there are basis functions to meet them, position limits that the movement
+            cannot keep.
         DegenerateMovementError
             The original formulation asked to move a closed or flat demonstration to another goal.
 
@@ -289,7 +294,7 @@ class Primitives(Learned):
         from kineme.primitives.discrete.rollout import rollout
         from kineme.primitives.discrete.samples import sampled
 
-        movement = modulated(rollout(self, start, goal, duration, velocity), via, end_velocity)
+        movement = modulated(rollout(self, start, goal, duration, velocity), via, end_velocity, position_limits)
         return sampled(movement, rate, n_samples, settle)
 
     @classmethod
@@ -315,6 +320,7 @@ class Primitives(Learned):
         velocity: ArrayLike | None = None,
         via: ViaLike | None = None,
         end_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         feedback: str = "state",
         phase_stopping: float | None = None,
         goal_filter: float | None = None,
@@ -329,7 +335,7 @@ class Primitives(Learned):
         ----------
         dt : float
             Time of a step [s], at most the duration.
-        start, goal, duration, velocity, via, end_velocity : optional
+        start, goal, duration, velocity, via, end_velocity, position_limits : optional
             As in `rollout`, for one movement. Past the duration the goal attracts again, at rest.
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
             What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`.
@@ -359,7 +365,9 @@ class Primitives(Learned):
         from kineme.primitives.discrete.plan import plan_of
 
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
-        return Controller(plan_of(self, start, goal, duration, velocity, via, end_velocity), dt, options)
+        return Controller(
+            plan_of(self, start, goal, duration, velocity, via, end_velocity, position_limits), dt, options
+        )
 
     def _scale(self, feature: str) -> Array:
         """The formulation's scale (n, d, 1), refused where it is zero."""

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 from kineme.errors import ExtrapolationWarning
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.primitives.discrete.position_limits import within_limits
 from kineme.primitives.discrete.rollout import Change, Rollout, broadcast_length, per_movement
 from kineme.primitives.discrete.specification import Specification
 from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
@@ -38,20 +39,24 @@ _LOOSE = 1e-3  # of the extent: a stretch that is met less closely is said
 
 
 def modulated(
-    movement: Rollout, via: ViaLike | None, end_velocity: ArrayLike | None, factor: Array | None = None
+    movement: Rollout,
+    via: ViaLike | None,
+    end_velocity: ArrayLike | None,
+    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
+    factor: Array | None = None,
 ) -> Rollout:
-    """The movement through the via points and with the end velocity.
+    """The movement through the via points, with the end velocity and within the limits.
 
     Parameters
     ----------
     movement : Rollout
         As asked for otherwise.
-    via, end_velocity
+    via, end_velocity, position_limits
         As in `Primitives.rollout`.
     factor : ndarray of shape (r, d, N), optional
         Of the covariance of the demonstrations' scaled weights.
     """
-    if via is None and end_velocity is None:
+    if via is None and end_velocity is None and position_limits is None:
         return movement
     d = movement.starts.shape[1]
     asked = via_points(() if via is None else via, d)
@@ -68,7 +73,12 @@ def modulated(
     if asked.stretch.any():
         _warn_loose(movement, asked, errors - change.coefficients @ (change.directions @ observed.weights.T))
     fixed = movement.fixed_velocity or (velocity is not None and bool(velocity.any()))
-    return replace(movement, change=change, fixed_velocity=fixed)
+    movement = replace(movement, change=change, fixed_velocity=fixed)
+    return (
+        movement
+        if position_limits is None
+        else within_limits(movement, position_limits, asked.points, observed.weights)
+    )
 
 
 class _Observed(NamedTuple):

@@ -25,6 +25,7 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
     velocity: ArrayLike | None = None,
     via: ViaLike | None = None,
     end_velocity: ArrayLike | None = None,
+    position_limits: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> Plan:
     """The plan of one primitive, with the options of `Primitives.rollout` checked for one movement."""
     check_one(len(primitive))
@@ -38,8 +39,8 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
         duration,
         one_vector("velocity", velocity, d),
     )
-    if via is not None or end_velocity is not None:
-        movement = modulated(movement, via, one_vector("end_velocity", end_velocity, d))
+    if via is not None or end_velocity is not None or position_limits is not None:
+        movement = modulated(movement, via, one_vector("end_velocity", end_velocity, d), position_limits)
         primitive = own_primitives(movement)
         check_one(len(primitive))
     x0, tau = movement.starts[0].copy(), float(movement.durations[0])

@@ -1,0 +1,93 @@
+"""Positions kept within limits: the smoothest change of the weights under inequalities, a small quadratic program.
+
+With z the change in the coordinates of a covariance factor, minimize |z| under ``low <= path + Phi F' z <= high`` at
+the specification's samples: least distance programming, which is a nonnegative least squares problem (C. L. Lawson,
+R. J. Hanson, "Solving Least Squares Problems", 1974, chapter 23), and solved by SciPy's. The factor is conditioned on
+no change at the via points, at the goal and of the velocity there. One problem for each dimension of each movement that
+leaves the limits, a few milliseconds each; all others cost nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import nnls
+
+from kineme.errors import SpecificationError
+from kineme.primitives.condition import condition
+from kineme.primitives.discrete.operators import decoder, smoothness_factor
+from kineme.primitives.discrete.rollout import Change, Rollout
+from kineme.validation import Array, as_numbers
+
+_ROUNDING = 1e-9  # of the extent: so far outside counts as at a limit
+_MISSED = 1e-6  # of the largest position: more than this is outside
+_INFEASIBLE = 1e-8  # residual of the nonnegative problem, 0 where no change is enough
+
+
+def within_limits(movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array) -> Rollout:
+    """The movement within limits (low, high), each a number or (d,), with ``held @ W`` (K,) as it is.
+
+    `points` (1 or n, k, d) are those at which it is held.
+
+    Raises
+    ------
+    SpecificationError
+        Limits of the wrong shape or order; a start, goal or via point outside; a movement that cannot stay inside.
+    """
+    low, high = _limits(limits, movement.starts.shape[1])
+    dmp = movement.primitives.dmp
+    slack = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
+    held_at = {"start": movement.starts[:, None], "goal": movement.goals[:, None], "via points": points}
+    for name, places in held_at.items():
+        outside = (places < low - slack[:, None]) | (places > high + slack[:, None])
+        if outside.any():
+            i, j, k = (int(index) for index in np.argwhere(outside)[0])
+            raise SpecificationError(
+                f"expected the {name} within the position limits, got {places[i, j, k]:g} in dimension {k} of movement "
+                f"{i}, where they are {low[k]:g} and {high[k]:g}"
+            )
+    path = replace(movement, n_samples=dmp.n_points, end=1.0).positions  # (n, T, d)
+    leaves = ((path < low - slack[:, None]) | (path > high + slack[:, None])).any(axis=1)
+    if not leaves.any():
+        return movement
+    factor = condition(smoothness_factor(dmp), held).factor
+    effect = decoder(dmp, dmp.n_points).Phi[0] @ factor.T
+    dense = np.zeros((*movement.starts.shape, dmp.n_basis))
+    for i, k in np.argwhere(leaves):
+        dense[i, k] = _inside(effect, path[i, :, k], (low[k], high[k]), (int(i), int(k))) @ factor
+    if movement.change is not None:
+        dense += movement.change.coefficients @ movement.change.directions
+    return replace(movement, change=Change(dense, np.eye(dmp.n_basis)))
+
+
+def _limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, Array]:
+    try:
+        low, high = (np.broadcast_to(as_numbers(one, "position_limits"), n_dims) for one in limits)
+    except (TypeError, ValueError) as error:
+        raise SpecificationError(
+            f"expected position_limits=(low, high), each a number or {n_dims} of them, got {limits!r}"
+        ) from error
+    if not (low < high).all():
+        raise SpecificationError(f"expected position_limits with low below high, got {limits!r}")
+    return low, high
+
+
+def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tuple[int, int]) -> Array:
+    """The shortest z (r,) with ``low <= path + effect @ z <= high``; `where` is for the message."""
+    low, high = limits
+    G, h = np.vstack((effect, -effect)), np.concatenate((low - path, path - high))  # G z >= h
+    size = np.linalg.norm(G, axis=1)
+    felt = np.isfinite(h) & (size > _INFEASIBLE * size.max())  # neither the start nor the end can be changed
+    G, h, unit = G[felt], h[felt], np.abs(path).max() + np.abs(h[felt]).max()
+    rows = np.vstack((G.T, h / unit))
+    solution, residual = nnls(rows, np.eye(1, len(rows), len(rows) - 1)[0])
+    rest = rows @ solution
+    z = np.asarray(rest[:-1] * unit / max(1.0 - rest[-1], _INFEASIBLE))
+    if residual < _INFEASIBLE or (G @ z < h - _MISSED * unit).any():
+        raise SpecificationError(
+            f"expected a movement that can stay between {low:g} and {high:g} in dimension {where[1]}, movement "
+            f"{where[0]} cannot; start more slowly, move the via points inside, or use more basis functions"
+        )
+    return z
