@@ -116,7 +116,9 @@ def load(
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    assumed = [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
+    known = MODELS.get(os.fspath(robot))
+    assumed = [known.assumed] if known is not None and known.assumed else []
+    assumed += [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
     assumed += [f"{link} has no shape: its mesh is not there" for link in chain.without_shape]
     bounds = {
         "velocity": (velocity, max_velocity, _VELOCITY, "1/s"),
