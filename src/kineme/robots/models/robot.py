@@ -129,9 +129,7 @@ def load(
         An unknown name; a rest posture of another number of joints or outside the limits.
     """
     pinocchio = _pinocchio()
-    if not isinstance(tip, str | None):
-        raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
-    path, default_tip, default_rest, name = _find(robot)
+    path, default_tip, default_rest, name = _find(robot, tip)
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
@@ -180,7 +178,9 @@ def _pinocchio() -> Any:
     return pinocchio
 
 
-def _find(robot: str | Path) -> tuple[Path, str | None, ArrayLike | None, str]:
+def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLike | None, str]:
+    if not isinstance(tip, str | None):
+        raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
     if not isinstance(robot, str | os.PathLike):
         raise SpecificationError(f"expected the name of a robot or the path of a .urdf file, got {robot!r:.80}")
     text = os.fspath(robot)
