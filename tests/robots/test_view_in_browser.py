@@ -187,6 +187,8 @@ def test_without_webgl_the_joints_and_the_checks_remain(opened, browser, panda, 
     page.goto(write_view(tmp_path / "blind.html", panda).as_uri())
     page.wait_for_selector("#problem:not([hidden])")
     assert "cannot be drawn here" in page.inner_text("#problem")
+    assert ".." not in page.inner_text("#problem")
+    assert page.is_hidden(".legend")
     scrub(page, 1.0)
     assert shown(page) == pytest.approx(panda.trajectory.duration, abs=0.006)
     context.close()

@@ -25,6 +25,7 @@ from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.fits import trajectory_columns
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
+from kineme.primitives.recorded_as import joined, merged
 from kineme.validation import Array, check_number
 
 _SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
@@ -53,7 +54,8 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     -------
     Primitives
         With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
-        that part which has most.
+        that part which has most. Of parts that were recorded with the same channels it keeps them, and the steps of
+        discrete ones, a gripper's: those of each part, until the next one begins.
 
     Raises
     ------
@@ -85,7 +87,8 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     path = np.zeros((*times.shape, movements[0].n_dims))
     for part, begin, share in zip(laid, begins, shares, strict=True):
         path += share[:, :, None] * _at(part, (times - begin[:, None]) / part.durations[:, None])
-    return _learned(dmp, path, times, laid[0], laid[-1])
+    made = _learned(dmp, path, times, laid[0], laid[-1])
+    return replace(made, recorded_as=joined([one.recorded_as for one in movements], begins / total, durations / total))
 
 
 def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tuple[float, float]) -> Primitives:
@@ -105,7 +108,7 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     Returns
     -------
     Primitives
-        As of `join`, with the larger number of basis functions.
+        As of `join`, with the larger number of basis functions; without the steps of discrete channels.
 
     Raises
     ------
@@ -131,12 +134,14 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     pace = np.outer(movements[0].durations, 1.0 - share) + np.outer(movements[1].durations, share)  # dt / du
     steps = 0.5 * (pace[:, 1:] + pace[:, :-1]) / (dmp.n_points - 1)
     times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
-    return _learned(dmp, path, times, laid[0], laid[1])
+    about = merged([one.recorded_as for one in movements])
+    made = _learned(dmp, path, times, laid[0], laid[1])
+    return replace(made, recorded_as=None if about is None else replace(about, steps=None))
 
 
 def _moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
     """All parts as primitives of the same number of movements."""
-    if isinstance(parts, (Primitives, Rollout)) or not len(parts):
+    if isinstance(parts, (Primitives, Rollout)) or not isinstance(parts, Sequence) or not len(parts):
         raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
     for i, one in enumerate(parts):
         if not isinstance(one, (Primitives, Rollout)):

@@ -87,7 +87,9 @@
       return makeScene();
     } catch (error) {
       const problem = byId("problem");
-      problem.textContent = `The arm cannot be drawn here: ${error.message}. The joints and the checks are shown.`;
+      const why = error.message.replace(/\.$/, "");
+      problem.textContent = `The arm cannot be drawn here: ${why}. The joints and the checks are shown.`;
+      document.querySelector(".legend").hidden = true;
       problem.hidden = false;
       reset.disabled = true;
       return null;
