@@ -127,3 +127,16 @@ def test_a_stroke_and_its_mirror_image_take_as_long():
     mirrored = kineme.Trajectory(times=there.times, positions=there.positions * [1, -1, 1])
     made = [move(one, robot, timing="fastest").trajectory.duration for one in (there, mirrored)]
     assert made[0] == pytest.approx(made[1], rel=0.15)
+
+
+def test_velocities_and_accelerations_are_derivatives_also_in_slowed_ramps():
+    robot = load("ur5e", max_velocity=1.0, max_acceleration=4.0)
+    joints = np.tile(robot.rest, (60, 1))
+    joints[:, 2] += np.linspace(0, 0.8, 60)  # at full speed at both ends
+    made = move(kineme.Trajectory(times=np.linspace(0, 0.5, 60), positions=joints), robot, timing="slowed", rate=2000.0)
+    t = made.trajectory
+    assert made.factor > 1
+    np.testing.assert_allclose(np.gradient(t.positions, t.times, axis=0)[1:-1], t.velocities[1:-1], atol=5e-3)
+    moving = t.times > made.begins + 0.01
+    changes = np.gradient(t.velocities, t.times, axis=0)[moving][1:-1]
+    np.testing.assert_allclose(changes, t.accelerations[moving][1:-1], atol=0.1)
