@@ -180,16 +180,16 @@ def _as_data(made: Any) -> dict[str, Any]:
 def _write(made: Any, options: dict[str, Any]) -> None:
     from kineme.robots.export.action_goal import write_action_goal
     from kineme.robots.export.bag import write_bag
-    from kineme.robots.export.columns import encode_columns, write_columns
+    from kineme.robots.export.columns import encode_joints, write_joints
 
     trajectory = made.trajectory
-    writers = {"output": write_columns, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
+    writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
     for name, writer in writers.items():
         path = options[name]
         if path is None:
             continue
         if str(path) == "-":
-            write_bytes(encode_columns(trajectory, ".json" if options["as_json"] else ".csv"))
+            write_bytes(encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
         else:
             writer(path, trajectory)
     if options["plot"]:

@@ -11,6 +11,13 @@ from kineme.robots.checks.preflight import preflight as preflight
 from kineme.robots.checks.check import Preflight as Preflight
 from kineme.robots.checks.check import Check as Check
 from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinematics
+
+# Files for robots and for people
+from kineme.robots.export.columns import write_joints as write_joints
+from kineme.robots.export.bag import write_bag as write_bag
+from kineme.robots.export.action_goal import write_action_goal as write_action_goal
+from kineme.robots.export.lerobot import write_lerobot as write_lerobot
+from kineme.robots.figure import draw_robot_movement as draw_robot_movement
 from kineme.robots.view.write_view import write_view as write_view
 
 # Live

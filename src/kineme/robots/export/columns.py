@@ -10,7 +10,7 @@ from kineme.files.write_movement import ColumnNames, Columns, encode_movement, w
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 
 
-def write_columns(path: Path, trajectory: JointTrajectory) -> Path:
+def write_joints(path: Path, trajectory: JointTrajectory) -> Path:
     """Times, joints and discrete channels under their names, then velocities ``v_NAME`` and accelerations ``a_NAME``.
 
     Raises
@@ -21,7 +21,7 @@ def write_columns(path: Path, trajectory: JointTrajectory) -> Path:
     return write_movement(path, *as_columns(trajectory))
 
 
-def encode_columns(trajectory: JointTrajectory, ending: str = ".csv") -> bytes:
+def encode_joints(trajectory: JointTrajectory, ending: str = ".csv") -> bytes:
     """The bytes of such a file."""
     return encode_movement(*_swapped(as_columns(trajectory), ending))
 
