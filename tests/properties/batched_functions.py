@@ -164,6 +164,14 @@ def rollout_of(demos: Demonstrations) -> list[dict[str, Any]]:
     return moved(demos, primitives.rollout(**options, velocity=0.5 * ends / tau[:, None]))
 
 
+def to_moving_goals(demos: Demonstrations) -> list[dict[str, Any]]:
+    """To goals that move, each by its own velocity, through a point."""
+    primitives = DMP("bio-inspired", n_basis=20).learn(demos)
+    ends, tau = primitives.goals - primitives.starts, primitives.durations
+    points, velocities = primitives.starts + 0.4 * ends, 0.3 * (ends[:, ::-1] / tau[:, None])
+    return moved(demos, primitives.rollout(via=[(0.4, points)], goal_velocity=velocities))
+
+
 def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
     """Through a point of its own, with one dimension free, and on at the goal; as primitives of their own."""
     primitives = DMP("decoupled", n_basis=20).learn(demos)
@@ -540,6 +548,7 @@ TABLE = [
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
     Batched("Primitives.rollout via", modulated, 1e-8),
+    Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),
     step_row(Resample(60), 1e-10),

@@ -39,7 +39,7 @@ def within_limits(movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points
     low, high = _limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
     slack = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
-    held_at = {"start": movement.starts[:, None], "goal": movement.goals[:, None], "via points": points}
+    held_at = {"start": movement.starts[:, None], "goal": movement.arrivals[:, None], "via points": points}
     for name, places in held_at.items():
         outside = (places < low - slack[:, None]) | (places > high + slack[:, None])
         if outside.any():
