@@ -25,6 +25,7 @@ from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.fits import trajectory_columns
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
+from kineme.primitives.modulation.carried_over import carried_over
 from kineme.validation import Array, check_number
 
 _SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
@@ -53,7 +54,9 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     -------
     Primitives
         With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
-        that part which has most.
+        that part which has most; the movements of a batch share one specification, so all have as many as the one that
+        needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
+        same; discrete channels step when they did in the parts, in an overlap from its middle on as the next part.
 
     Raises
     ------
@@ -85,7 +88,9 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     path = np.zeros((*times.shape, movements[0].n_dims))
     for part, begin, share in zip(laid, begins, shares, strict=True):
         path += share[:, :, None] * _at(part, (times - begin[:, None]) / part.durations[:, None])
-    return _learned(dmp, path, times, laid[0], laid[-1])
+    when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
+    made = _learned(dmp, path, times, laid[0], laid[-1])
+    return carried_over(made, movements, when, (begins[1:] + 0.5 * overlap) / total)
 
 
 def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tuple[float, float]) -> Primitives:
@@ -105,7 +110,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     Returns
     -------
     Primitives
-        As of `join`, with the larger number of basis functions.
+        As of `join`, with the larger number of basis functions. Discrete channels are those of the second movement
+        from the middle of the stretch on.
 
     Raises
     ------
@@ -131,7 +137,9 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     pace = np.outer(movements[0].durations, 1.0 - share) + np.outer(movements[1].durations, share)  # dt / du
     steps = 0.5 * (pace[:, 1:] + pace[:, :-1]) / (dmp.n_points - 1)
     times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
-    return _learned(dmp, path, times, laid[0], laid[1])
+    shares = times / times[:, -1:]
+    switch = _at_phase(shares, 0.5 * (begin + end))
+    return carried_over(_learned(dmp, path, times, laid[0], laid[1]), movements, [shares, shares], switch[None])
 
 
 def _moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
@@ -181,6 +189,11 @@ def _at(movement: Rollout, u: Array) -> Array:
     before = np.minimum(place.astype(np.intp), movement.n_samples - 2)[:, :, None]
     x, share = movement.positions, place[:, :, None] - before
     return np.asarray((1.0 - share) * np.take_along_axis(x, before, 1) + share * np.take_along_axis(x, before + 1, 1))
+
+
+def _at_phase(shares: Array, u: float) -> Array:
+    """The columns (n,) of numbers at even phases (n, T) at phase u."""
+    return np.array([np.interp(u, np.linspace(0.0, 1.0, shares.shape[1]), one) for one in shares])
 
 
 def _learned(dmp: DMP, path: Array, times: Array, first: Rollout, last: Rollout) -> Primitives:
