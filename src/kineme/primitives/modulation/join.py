@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.dmp import DMP, Primitives
@@ -26,6 +26,7 @@ from kineme.primitives.discrete.fits import trajectory_columns
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.modulation.carried_over import carried_over
+from kineme.primitives.modulation.parts import moving, within
 from kineme.validation import Array, check_number
 
 _SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
@@ -65,7 +66,7 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     SpecificationError
         An overlap that is negative or longer than half a part; more than 2,000 basis functions.
     """
-    movements = _moving(parts)
+    movements = moving(parts)
     durations = np.stack([one.durations for one in movements])  # (parts, n)
     check_number("overlap", overlap, least=0.0)
     if len(movements) > 1 and overlap > 0.5 * durations.min():
@@ -120,15 +121,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     SpecificationError
         A stretch that is not within the movement.
     """
-    movements = _moving([first, second])
-    try:
-        begin, end = (float(one) for one in stretch)
-    except (TypeError, ValueError) as error:
-        raise SpecificationError(f"expected stretch=(begin, end), shares of the duration, got {stretch!r}") from error
-    if not 0.0 <= begin < end <= 1.0:
-        raise SpecificationError(
-            f"expected stretch to be 0 <= begin < end <= 1, shares of the duration, got {stretch!r}"
-        )
+    movements = moving([first, second])
+    begin, end = within(stretch, "stretch")
     dmp = _specification(movements, max(one.dmp.n_basis for one in movements))
     laid = [one.rollout(n_samples=dmp.n_points) for one in movements]
     u = np.linspace(0.0, 1.0, dmp.n_points)
@@ -140,23 +134,6 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     shares = times / times[:, -1:]
     switch = _at_phase(shares, 0.5 * (begin + end))
     return carried_over(_learned(dmp, path, times, laid[0], laid[1]), movements, [shares, shares], switch[None])
-
-
-def _moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
-    """All parts as primitives of the same number of movements."""
-    if isinstance(parts, (Primitives, Rollout)) or not len(parts):
-        raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
-    for i, one in enumerate(parts):
-        if not isinstance(one, (Primitives, Rollout)):
-            raise TrajectoryError(f"expected Primitives or Rollout as part {i}, got {type(one).__name__}")
-    moving = [one if isinstance(one, Primitives) else Primitives.from_rollout(one) for one in parts]
-    n = max(len(one) for one in moving)
-    for i, one in enumerate(moving):
-        if one.n_dims != moving[0].n_dims:
-            raise TrajectoryError(f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {one.n_dims}")
-        if len(one) not in (1, n):
-            raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(one)}")
-    return [one if len(one) == n else one[np.zeros(n, dtype=np.intp)] for one in moving]
 
 
 def _specification(movements: list[Primitives], n_basis: float) -> DMP:
