@@ -138,6 +138,13 @@ def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tm
     assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"
 
 
+def test_csv_for_other_programs_is_that_of_the_file(recording, library, tmp_path):
+    answer("annotate", recording, "-l", library, "-o", tmp_path / "rows.csv")
+    done = run("annotate", recording, "-l", library, "--csv")
+    assert done.stdout == (tmp_path / "rows.csv").read_text()
+    assert run("annotate", recording, "-l", library, "--csv", "--json").returncode == 2
+
+
 def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, tmp_path):
     table = pandas.DataFrame(truth, columns=["start", "end", "label"])
     table.to_csv(tmp_path / "labels.csv", index=False)

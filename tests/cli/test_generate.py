@@ -94,7 +94,7 @@ def test_any_number_of_dimensions(tmp_path, d):
         (("--formulation", "newest"), "'bio-inspired'"),
         (("--n-basis", 1), "n_basis to be a whole number of at least 3, got 1"),
         (("--obstacle", "1"), "expected obstacles in the 2 dimensions"),
-        (("-o", "new.xls"), ".csv, .npz, .json, got '.xls'"),
+        (("-o", "new.xls"), ".csv, .npz, .json, .parquet, got '.xls'"),
         (("-o", "new.csv", "--plot", "new.bmp"), "png, svg, pdf, got '.bmp'"),
     ],
 )

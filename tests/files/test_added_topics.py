@@ -225,14 +225,15 @@ def test_each_message_goes_into_the_file_of_its_time(tmp_path):
     about["files"].append({**later, "duration": {"nanoseconds": SECOND}, "message_count": 73})
     about["custom_data"] = {"who": "anna"}
     yaml.dump(whole, first / "metadata.yaml")
-    texts = [(START + SECOND // 4, "in a"), (START + 10 * SECOND + 9, "in b"), (START + 10 * SECOND + 10, "in b")]
+    texts = [(START - 9, "before a"), (START + SECOND // 4, "in a")]
+    texts += [(START + 10 * SECOND + 9, "in b"), (START + 10 * SECOND + 10, "in b")]
     target = copied(first, tmp_path / "named", texts)
-    assert texts_of(target / "a.db3", "sqlite3") == texts[:1]
-    assert texts_of(target / "b.db3", "sqlite3") == texts[1:]
+    assert texts_of(target / "a.db3", "sqlite3") == texts[:2]
+    assert texts_of(target / "b.db3", "sqlite3") == texts[2:]
     assert texts_of(target, "sqlite3") == texts
     assert [one for one in raw_messages(target) if one[0] != TOPIC] == raw_messages(first)
     new = yaml.load(target / "metadata.yaml")["rosbag2_bagfile_information"]
-    assert [one["message_count"] for one in new["files"]] == [74, 75]
+    assert [one["message_count"] for one in new["files"]] == [75, 75]
     assert new["custom_data"] == {"who": "anna"}
 
 

@@ -77,7 +77,8 @@ def test_transforms_at_other_rates_are_interpolated_on_the_sphere(tmp_path, kind
         if k % 2 == 1:
             messages.append(tf(m, ns, ("arm", "hand", slow[k])))
             messages.append(tf(m, ns, ("arm", "hand", slow[k]), late=1))  # repeated, as some nodes do
-    movement, _, problems = only(write_bag(tmp_path, kind, messages), "base:hand")
+    movement, how, problems = only(write_bag(tmp_path, kind, messages), "base:hand")
+    assert how.units_from == "stamps of headers"
     assert problems == ["frames base:hand: 1 stamp of transform base:arm, at which others are not known"]
     np.testing.assert_allclose(matrices(movement.recorded), (matrices(arm) @ matrices(slow))[1:], atol=1e-9)
 

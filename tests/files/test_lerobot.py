@@ -173,6 +173,8 @@ def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
         ({"codebase_version": None}, "with codebase_version and features"),
         ({"fps": 0}, "expected fps above 0 in meta/info.json, got 0"),
         ({"data_path": "../{file_index}.parquet"}, "a data_path within the data set"),
+        ({"data_path": "data/{file_index:300000000}.parquet"}, "a data_path within the data set"),
+        ({"data_path": "data/{file_index:{chunk_index}}.parquet"}, "a data_path within the data set"),
         ({"data_path": "data/{other}.parquet"}, "expected a data_path such as"),
         ({"features": {}}, "expected features of numbers"),
     ],

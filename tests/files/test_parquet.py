@@ -177,3 +177,19 @@ def test_lists_of_other_lengths_and_missing_ones_cost_their_samples():
         read(table)
     nested = pa.array([[[1.0, 2.0], [3.0, k]] for k in range(6)], pa.list_(pa.list_(pa.float64())))
     assert read({"time": T, "pose": nested}).demonstrations.n_dims == 4
+
+
+def test_a_written_movement_has_the_heads_of_csv(tmp_path):
+    rollout = kineme.DMP().learn(kineme.Trajectory(T, np.column_stack((T, X)))).rollout(n_samples=50)
+    table = parquet.read_table(kineme.write_movement(tmp_path / "x.parquet", rollout))
+    text = kineme.write_movement(tmp_path / "x.csv", rollout).read_text()
+    assert table.schema.names == text.splitlines()[0].split(",")
+    np.testing.assert_array_equal(table.column("v_y").to_numpy(), rollout.velocities[0, :, 1])
+    assert {str(kind) for kind in table.schema.types} == {"double"}
+
+
+def test_writing_without_pyarrow_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(kineme.DataError, match=r"pip install 'kineme\[parquet\]'"):
+        kineme.write_movement(tmp_path / "x.parquet", {"times": T, "positions": X[:, None]})
+    assert not list(tmp_path.iterdir())

@@ -106,7 +106,7 @@ def test_numbers_that_are_no_movement_name_the_file(tmp_path):
 
 
 def test_writing_to_an_unknown_ending_is_refused(tmp_path):
-    with pytest.raises(kineme.DataError, match=r"\.csv, \.npz, \.json, got '\.xls'"):
+    with pytest.raises(kineme.DataError, match=r"\.csv, \.npz, \.json, \.parquet, got '\.xls'"):
         write_movement(tmp_path / "a.xls", {"times": TIMES, "positions": PATH})
 
 

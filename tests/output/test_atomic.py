@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from kineme.output.atomic import name_beside, remove_leftovers, whole_file, write_atomically
+from kineme.output.atomic import name_beside, remove_leftovers, whole_file, whole_folder, write_atomically
 
 KILLED = """
 import os, sys
@@ -115,3 +116,10 @@ def test_a_folder_is_not_written_over(tmp_path, monkeypatch, name):
     with pytest.raises(IsADirectoryError, match=r"expected the name of a file to write, got the folder '.+'; add a"):
         write_atomically(Path(name), b"x")
     assert [one.name for one in tmp_path.iterdir()] == ["there"]
+
+
+@pytest.mark.parametrize("whole", [whole_file, whole_folder])
+def test_a_full_disk_is_an_error_that_names_what_was_to_be_written(tmp_path, whole):
+    with pytest.raises(OSError, match=r"full disk.*new\.mcap"), whole(tmp_path / "new.mcap"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert not list(tmp_path.iterdir())

@@ -10,6 +10,8 @@ from kineme import Demonstrations
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, PosePrimitives, exp, product
+from kineme.primitives.discrete_steps import DiscreteSteps
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives
 
 GRIPPER = Channel("gripper", "discrete", ("gripper",))
@@ -213,3 +215,16 @@ def test_what_is_made_of_primitives_knows_what_was_recorded():
     stepping = kineme.styles.average(kineme.DMP().learn(recordings(PLAIN, 5))).primitive
     assert stepping.channels == PLAIN  # when the gripper of an average steps nobody has shown
     assert stepping.to_recording is None
+
+
+def test_a_step_is_at_its_share_but_for_rounding():
+    steps = DiscreteSteps(np.array([[0.0], [1.0]]), np.array([0.0, 0.3]), np.array([0, 2]))
+    shares = np.array([0.0, 0.3 - 1e-6, 0.3 - 1e-12, 0.3, 2.0])
+    np.testing.assert_array_equal(steps.at(0, shares)[:, 0], [0, 0, 1, 1, 1])
+
+
+def test_rates_are_put_into_the_order_of_the_recording():
+    """Three of an orientation before two positions: the order there is not its own inverse."""
+    about = RecordedAs((*JOINTS[2:3], *PLAIN[:2]))
+    assert about.rate_names == ("elbow", "wrist", "tool.rx", "tool.ry", "tool.rz")
+    assert [about.rate_names[k] for k in about.rates_in_order] == ["tool.rx", "tool.ry", "tool.rz", "elbow", "wrist"]

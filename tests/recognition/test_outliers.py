@@ -5,7 +5,7 @@ import pytest
 
 import kineme
 from kineme.recognition.outlier_report import outliers_as_data, outliers_as_words
-from kineme.recognition.outliers import find_outliers, listed, tail_p_values
+from kineme.recognition.outliers import find_outliers, listed, scaled, tail_p_values
 
 
 def wrongly_labeled(labels, share, rng):
@@ -98,6 +98,18 @@ def test_p_values_are_those_of_an_exponential_law():
     p = tail_p_values(scores)
     for level in (0.01, 0.05, 0.2):
         assert (p <= level).mean() == pytest.approx(level, rel=0.15)
+
+
+def test_p_values_are_those_of_the_formula():
+    scores = np.append(np.linspace(0.5, 1.5, 21), 4.0)
+    middle, upper = np.quantile(scores, [0.5, 0.8])
+    t = (1.0 + 1.0 / np.sqrt(22)) * (upper - middle) / np.log(5 / 2)
+    np.testing.assert_allclose(tail_p_values(scores), np.minimum(1.0, np.exp(-(scores - middle) / t) / 2))
+
+
+def test_what_is_typical_of_a_label_is_shrunk_as_if_by_four_movements_of_all():
+    scores = scaled([np.full(6, 2.0), np.ones(14)])
+    np.testing.assert_allclose(scores, np.repeat([2.0 / ((6 * 2.0 + 4 * 1.0) / 10), 1.0], [6, 14]))
 
 
 def test_the_procedure_lists_as_many_as_it_may():

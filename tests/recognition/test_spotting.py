@@ -304,9 +304,11 @@ def test_windows_are_the_same_compiled_and_plain(monkeypatch):
         monkeypatch.setenv("KINEME_COMPILED", choice)
         movements = resampled(motion, start, end)
         paths = movements.positions.reshape(21, 64, -1).transpose(0, 2, 1)
+        paths = np.concatenate((paths, np.ones_like(paths[:1])))  # the last one stands still: all of it is slow
         found.append((movements.positions, movements.offsets, movements.durations, *size_and_slowness(paths)))
     for plain, compiled in zip(*found, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-12, atol=1e-12)
+    assert found[0][-1][-1] == found[1][-1][-1] == 1.0
 
 
 @pytest.mark.parametrize(("rests", "least"), [(True, 0.8), (False, 0.72)])

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import kineme
+from arm_samples import stroke
 from kineme.errors import TrajectoryError
 from kineme.orientation import PoseDMP
 from kineme.robots import InfeasibleError, load, move
@@ -15,15 +16,6 @@ from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-
-
-def stroke(robot, seconds=3.0, size=1.0, n=150):
-    """An S in front of the tip at rest, with the velocity of least jerk."""
-    u = np.linspace(0, 1, n)
-    s = 10 * u**3 - 15 * u**4 + 6 * u**5
-    scale = size * (0.25 if robot.name == "so101" else 1.0)
-    shape = np.column_stack((0 * s - 0.05, 0.42 * (s - 0.5), 0.1 * np.sin(2 * np.pi * s)))
-    return kineme.Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + scale * shape)
 
 
 @pytest.mark.parametrize("name", MODELS)

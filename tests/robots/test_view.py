@@ -25,7 +25,7 @@ from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
 from kineme.robots.view import shapes as shapes_module
-from kineme.robots.view.scene_data import MOST_SAMPLES
+from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import view_page
 
@@ -176,6 +176,12 @@ def test_a_hostile_name_is_shown_and_never_obeyed(tmp_path):
     assert parsed.data["tip"] == "l3"
 
 
+def test_data_cannot_end_their_script_element():
+    data = {"name": "</script><!--<script>"}
+    assert "<" not in as_script_data(data)
+    assert json.loads(as_script_data(data)) == data
+
+
 def test_failed_checks_stand_first_and_are_marked(tmp_path):
     passing, failing = view_page(moved(arm(tmp_path))), view_page(moved(arm(tmp_path), True, max_velocity=0.1))
     assert '<tr class="failed">' not in passing
@@ -206,7 +212,7 @@ def test_meshes_are_in_the_page_and_those_that_are_not_there_become_cylinders(tm
     drawn = {link.get("name"): [shape[0].tag for shape in link.iter("geometry")] for link in urdf.findall("link")}
     assert drawn == {"l0": ["mesh"], "l1": ["mesh"], "l2": ["cylinder"], "l3": []}
     assert {one.get("filename") for one in urdf.iter("mesh")} == {"0"}
-    assert "drawn as cylinders, as their meshes are not here: lower" in page
+    assert "drawn as cylinders up to the next joint: lower; their meshes are not there" in page
 
 
 def test_meshes_beyond_the_largest_size_are_left_out(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,13 @@ def panda():
     return move(Trajectory(times=3 * u, positions=InverseKinematics(robot).tip_position + shape), robot)
 
 
+def _overlap(a, b):
+    return all(
+        a[at] < b[at] + b[size] - 0.5 and b[at] < a[at] + a[size] - 0.5
+        for at, size in (("x", "width"), ("y", "height"))
+    )
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, width, scheme):
@@ -107,6 +115,10 @@ def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, 
     assert page.inner_text("#now") == f"{duration / 2:.2f} s"
     assert page.get_attribute("#time", "aria-valuetext") == f"{duration / 2:.2f} of {duration:.2f} seconds"
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.evaluate("kineme.show(0)")  # where the time is said with the longest words
+    boxes = [page.locator(name).bounding_box() for name in ("#now", "#speed", "#reset", "#play")]
+    assert not [True for a, b in combinations(boxes, 2) if _overlap(a, b)]
+    assert page.evaluate("(now => now.scrollWidth <= now.offsetWidth)(document.getElementById('now'))")
 
 
 def test_the_canvas_shows_the_arm_and_not_the_ground_alone(opened, panda):
@@ -175,6 +187,8 @@ def test_without_webgl_the_joints_and_the_checks_remain(opened, browser, panda, 
     page.goto(write_view(tmp_path / "blind.html", panda).as_uri())
     page.wait_for_selector("#problem:not([hidden])")
     assert "cannot be drawn here" in page.inner_text("#problem")
+    assert ".." not in page.inner_text("#problem")
+    assert page.is_hidden(".legend")
     scrub(page, 1.0)
     assert shown(page) == pytest.approx(panda.trajectory.duration, abs=0.006)
     context.close()

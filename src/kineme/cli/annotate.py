@@ -12,7 +12,7 @@ import click
 
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, force_option, json_option, library_option
-from kineme.cli.output import check_new, say
+from kineme.cli.output import check_new, say, write
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
 
@@ -46,6 +46,7 @@ class Format(click.ParamType):  # type: ignore[type-arg]
 )  # fmt: skip
 @layout_options
 @json_option
+@click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
 @force_option
 def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, form: str | None, **options: Any) -> None:
     """Annotate RECORDINGS, files, folders or patterns of them, or - for CSV from the standard input: what happens when.
@@ -56,16 +57,18 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
-    from kineme.files.annotations.tables import as_row
+    from kineme.files.annotations.tables import as_row, to_csv
     from kineme.files.annotations.writers import targets_of, write_annotations
     from kineme.files.entries import expanded, paths_of
     from kineme.library.library import ActionLibrary
     from kineme.library.recognition.annotate import annotate as find
 
-    as_json, force, error_rate = (options.pop(name) for name in ("as_json", "force", "error_rate"))
+    as_json, as_csv, force, error_rate = (options.pop(one) for one in ("as_json", "as_csv", "force", "error_rate"))
     parsed = read(recordings, options)
     movements = [(source.path, source.place) for source in parsed.sources]
     sources = [one for path in recordings for one in expanded(path)]
+    if as_csv and (as_json or output is not None):
+        raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:
         raise click.UsageError("expected --output with --format")
     if output is not None:
@@ -84,7 +87,12 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         "notes": notes,
         "problems": [str(one) for one in (*parsed.problems, *found.problems)],
     }
-    say(as_json, data, lambda: _text(data))
+    if as_csv:
+        write(to_csv(found.annotations).decode().removesuffix("\n"))
+        for line in _remarks(data):
+            write(line, err=True)
+    else:
+        say(as_json, data, lambda: _text(data))
 
 
 def _check_folder(target: Path, force: bool) -> None:
@@ -118,14 +126,17 @@ def _text(data: dict[str, Any]) -> str:
     lines = [f"{said}, {len(rows) - len(known):,} unknown, in {data['seconds']:,.1f} s"]
     if rows:
         lines.append(to_text(_totals(rows) if written else _each(rows)))
-    if not data["calibrated"]:
-        lines.append(
-            "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
-            "differ; learn more of each"
-        )
-    lines += map(printable, data["notes"])
-    lines += [f"not annotated: {printable(problem)}" for problem in data["problems"]]
-    return "\n".join([*lines, *(f"written to {printable(one)}" for one in written)])
+    return "\n".join([*lines, *_remarks(data), *(f"written to {printable(one)}" for one in written)])
+
+
+def _remarks(data: dict[str, Any]) -> list[str]:
+    """What to know of the annotations, and what has none."""
+    guess = (
+        "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
+        "differ; learn more of each"
+    )
+    problems = [f"not annotated: {printable(problem)}" for problem in data["problems"]]
+    return [*([] if data["calibrated"] else [guess]), *map(printable, data["notes"]), *problems]
 
 
 def _each(rows: list[dict[str, Any]]) -> Any:

@@ -45,7 +45,7 @@ _BAD_FIT = 0.05  # of the extent of the recording
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
 )
 @click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), default="-", show_default=True,
-              help="A .csv, .npz or .json file; - for the screen, as CSV or --json.")  # fmt: skip
+              help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV or --json.")  # fmt: skip
 @json_option
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw it: a .png, .svg or .pdf file.")
 @force_option

@@ -19,10 +19,11 @@ from kineme.cli.options import (
 )
 from kineme.cli.output import check_new, say, write, write_bytes
 from kineme.cli.reading import layout_options
-from kineme.cli.source import read_source
+from kineme.cli.source import name_of_source, read_source
 
 _OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot", "view")
 _NEW_FILE = click.Path(path_type=Path)
+_NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command(short_help="Move an arm: joints for a symbol or a recording, checked.")
@@ -50,9 +51,11 @@ _NEW_FILE = click.Path(path_type=Path)
 @click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
 @specification_options
 @layout_options
-@click.option("--output", "-o", type=_NEW_FILE, help="A .csv, .npz or .json file of joints; - for the screen, as CSV.")
+@click.option("--output", "-o", type=_NEW_FILE, help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV.")
 @click.option("--ros1", type=_NEW_FILE, help="A .bag of ROS 1 with JointTrajectory and JointState.")
 @click.option("--ros2", type=_NEW_FILE, help="A .mcap, or a folder, of ROS 2 with the same.")
+@click.option("--lerobot", type=_NEW_FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
+@click.option("--fps", type=Finite(), default=30.0, show_default=True, help="Frames per second of that data set.")
 @click.option("--action-goal", type=_NEW_FILE, help="A .yaml or .json file for ros2 action send_goal.")
 @click.option("--plot", type=_NEW_FILE, help="Path and joints beside their limits: a .png, .svg or .pdf file.")
 @click.option(
@@ -194,6 +197,11 @@ def _write(made: Any, options: dict[str, Any]) -> None:
         from kineme.robots.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(made), options["plot"])
+    if options["lerobot"]:
+        from kineme.robots.export.lerobot import write_lerobot
+
+        task = name_of_source(options)
+        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot.name)
     if options["view"]:
         from kineme.robots.view.write_view import write_view
 

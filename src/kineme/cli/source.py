@@ -37,6 +37,17 @@ def read_source(options: dict[str, Any]) -> Any:
     return learn_one(_chosen(recordings, options), dmp)
 
 
+def name_of_source(options: dict[str, Any]) -> str:
+    """The name of the symbol, or that of the file without its ending."""
+    source = options["source"]
+    if not _is_symbol(source, options["folder"]):
+        return Path(source).stem
+    from kineme.library.library import ActionLibrary
+
+    with ActionLibrary(options["folder"], read_only=True) as library:
+        return next((one.name for one in library.symbols() if one.id == source), str(source))
+
+
 def _chosen(several: Any, options: dict[str, Any]) -> Any:
     """The one that is asked for by --index, or the only one."""
     n, index = len(several), options["index"]

@@ -1,4 +1,4 @@
-"""Write one generated movement to a file: CSV, NPZ, JSON."""
+"""Write one generated movement to a file: CSV, NPZ, JSON, Parquet."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def encode_movement(columns: Columns, ending: str, names: ColumnNames | None = N
 
 
 def write_movement(path: str | Path, movement: MovementsLike | Columns, names: ColumnNames | None = None) -> Path:
-    """Write one movement to a CSV, NPZ or JSON file, whole or not at all.
+    """Write one movement to a CSV, NPZ, JSON or Parquet file, whole or not at all.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def write_movement(path: str | Path, movement: MovementsLike | Columns, names: C
     Raises
     ------
     DataError
-        An ending that no writer has, or a file that cannot be written.
+        An ending that no writer has, a file that cannot be written, or Parquet without the extra ``parquet``.
     TrajectoryError
         Several movements, or what is none; a dict without times or positions, or with arrays that do not fit them.
     TypeError
@@ -111,7 +111,8 @@ def _columns_of(movement: MovementsLike) -> tuple[Columns, ColumnNames | None]:
     return {"times": one.times, "positions": one.positions, **derivatives}, of_rollout
 
 
-def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
+def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
+    """What the columns of a table are called: time, the positions, ``v_`` and ``a_`` before names of the others."""
     axes = {name: axis_names(array.shape[-1]) for name, array in columns.items()}
     if names is not None:
         axes |= {
@@ -120,9 +121,17 @@ def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
             "accelerations": list(names.rates),
         }
     prefixes = {"positions": "", "velocities": "v_", "accelerations": "a_"}
-    heads = ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes[name])]
-    table = np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
-    lines = [",".join(map(_cell, heads)), *(",".join(map(repr, row)) for row in table.tolist())]
+    return ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes[name])]
+
+
+def _table(columns: Columns) -> Array:
+    """Times and all else side by side, in the order of `_heads`."""
+    return np.column_stack([columns["times"], *(columns[name] for name in columns if name != "times")])
+
+
+def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
+    table = _table(columns)
+    lines = [",".join(map(_cell, _heads(columns, names))), *(",".join(map(repr, row)) for row in table.tolist())]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -144,5 +153,19 @@ def _json(columns: Columns, names: ColumnNames | None) -> bytes:
     return (json.dumps({**{name: values.tolist() for name, values in columns.items()}, **named}) + "\n").encode()
 
 
+def _parquet(columns: Columns, names: ColumnNames | None) -> bytes:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise DataError("expected the package pyarrow to write Parquet; pip install 'kineme[parquet]'") from error
+    buffer = io.BytesIO()
+    arrays = [np.ascontiguousarray(column) for column in _table(columns).T]
+    parquet.write_table(pa.Table.from_arrays([*map(pa.array, arrays)], names=_heads(columns, names)), buffer)
+    return buffer.getvalue()
+
+
 #: File extension -> encoder. All of them keep every bit of the numbers.
-WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {".csv": _csv, ".npz": _npz, ".json": _json}
+WRITERS: dict[str, Callable[[Columns, ColumnNames | None], bytes]] = {
+    ".csv": _csv, ".npz": _npz, ".json": _json, ".parquet": _parquet
+}  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import secrets
@@ -58,7 +59,8 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     remove_leftovers(path)
     beside = name_beside(path)
     try:
-        yield beside
+        with _named(path):
+            yield beside
         bring_to_disk(beside)
         if replace:
             beside.replace(path)
@@ -140,6 +142,21 @@ def _is_at_work(process: int) -> bool:
 
 
 @contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Context manager: a full disk is an error that says what could not be written."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise OSError(
+            error.errno,
+            "expected room to write, got a full disk; free some space and run it again",
+            str(path),
+        ) from error
+
+
+@contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
     """Context manager: a new hidden folder beside `path` to write into; on success it is named `path`.
 
@@ -156,7 +173,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
     beside = name_beside(path)
     beside.mkdir()
     try:
-        yield beside
+        with _named(path):
+            yield beside
         if empty:
             path.rmdir()
         beside.rename(path)

@@ -138,7 +138,7 @@ def find_outliers(
         done += len(rows)
         if progress is not None:
             progress(done)
-    scores = _scaled(own) * _contrast(np.concatenate(others))
+    scores = scaled(own) * _contrast(np.concatenate(others))
     p_values = tail_p_values(scores)
     every = np.concatenate(members)
     names = np.repeat(np.array([*named, None], dtype=object)[:-1], [len(rows) for rows in members])
@@ -223,7 +223,7 @@ def _contrast(far: Array) -> Array:
     return np.sqrt(max(float(np.median(far)), LEAST) / np.maximum(far, LEAST))
 
 
-def _scaled(own: list[Array]) -> Array:
+def scaled(own: list[Array]) -> Array:
     """Distances of the movements of each label as multiples of what is typical there."""
     common = float(np.median(np.concatenate(own)))
     scales = [(np.median(one) * len(one) + _PRIOR * common) / (len(one) + _PRIOR) for one in own]

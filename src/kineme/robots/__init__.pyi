@@ -12,3 +12,7 @@ from kineme.robots.checks.check import Preflight as Preflight
 from kineme.robots.checks.check import Check as Check
 from kineme.robots.kinematics.inverse import InverseKinematics as InverseKinematics
 from kineme.robots.view.write_view import write_view as write_view
+
+# Live
+from kineme.robots.arm_controller import ArmController as ArmController
+from kineme.robots.arm_controller import ArmState as ArmState

@@ -24,8 +24,8 @@ from kineme.robots.execution.retime import fastest
 from kineme.robots.execution.timing import Timing, as_generated, slowed, timed
 from kineme.robots.kinematics.choose import check_reached, choose_place, choose_posture
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.task_path import TaskPath, task_path
-from kineme.robots.models.robot import Robot
+from kineme.robots.kinematics.task_path import PLANES, TaskPath, task_path
+from kineme.robots.models.robot import Robot, check_robot
 from kineme.robots.roles import SPACES, roles_of, space_of
 from kineme.validation import Array, as_numbers, check_choice, check_number
 
@@ -137,7 +137,9 @@ def move(  # noqa: PLR0913 - one parameter per option
     DataError
         The extra ``robot`` is not installed.
     """
+    check_robot(robot)
     check_choice("space", space, SPACES)
+    check_choice("plane", plane, list(PLANES))
     check_choice("timing", timing, _TIMINGS)
     check_choice("place", place, ("as given", "free"))
     check_number("rate", rate, above=0.0)

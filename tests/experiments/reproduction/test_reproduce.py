@@ -1,11 +1,14 @@
 """``kineme reproduce`` as a user runs it: files, determinism, errors."""
 
+import importlib.util
 import json
 import re
 import subprocess
 import sys
 
 import pytest
+
+ARM = all(map(importlib.util.find_spec, ("pinocchio", "pink")))  # the extra robot is installed
 
 
 def reproduce(*arguments):
@@ -40,7 +43,7 @@ def test_it_draws_eleven_figures_as_png_and_svg(runs):
 
 def test_the_report_is_one_self_contained_file(runs):
     html = (runs[0][1] / "report.html").read_text(encoding="utf-8")
-    assert html.count("<img") == 11
+    assert html.count("<img") == 11 + ARM
     assert html.count("<table>") >= 7
     assert not re.search(r'(src|href)="(?!data:)', html)
 
@@ -78,3 +81,16 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
 @pytest.mark.parametrize("arguments", [("--draws", 0), ("--seed", -1), ("--draws", "many")])
 def test_impossible_options_are_refused(arguments):
     assert reproduce(*arguments).returncode == 2
+
+
+@pytest.mark.skipif(not ARM, reason="the extra robot is not installed")
+def test_the_arm_writes_the_letter_and_recognizes_what_it_wrote(runs):
+    text, folder = runs[0][0].stdout, runs[0][1]
+    assert (folder / "figure-07-arm.png").read_bytes().startswith(b"\x89PNG")
+    for expected in ("Figure 7 b, c", "Table 2 on movements of the arm", "Table 4 on movements of the arm"):
+        assert expected in text
+    arm = json.loads((folder / "results.json").read_text(encoding="utf-8"))["arm"]
+    assert (arm["movements"], len(arm["paper"]), len(arm["lasa-26"])) == (178, 2, 2)
+    assert 0 < arm["error"] < 5e-5
+    assert 0 < arm["letter"]["tracking_rms"] <= arm["letter"]["tracking_max"] < 5e-5
+    assert 0 < arm["letter"]["velocity_share"] < 1

@@ -47,7 +47,7 @@ def test_an_svm_with_median_widths_never_sees_the_row_that_it_is_tested_on():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiments, "svm_accuracy", svm_accuracy)
-        experiments._run_svm(dict.fromkeys(experiments.REPRESENTATIONS, X), y, diagnosis=False)
+        experiments.run_svm(dict.fromkeys(experiments.REPRESENTATIONS, X), y, diagnosis=False)
     for kernel, grams in ((RBF(), seen[0]), (TruncatedEuclidean(), seen[1])):
         assert grams.shape == (9, 9, 9)
         for i in range(9):

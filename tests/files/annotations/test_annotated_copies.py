@@ -61,6 +61,23 @@ def test_another_clock_counts_from_the_beginning_of_the_bag(tmp_path):
     assert t == START + SECOND // 4
 
 
+def test_a_clock_that_some_movements_leave_is_another_one_for_all(tmp_path):
+    """A clock that is 0.9 s ahead: one movement would seem to end within a second of the bag, the other does not."""
+    source = bag(tmp_path, "mcap") / "run.mcap"
+    ahead = 1.7e9 + 0.9
+    annotations = [one(ahead, ahead + 0.1, "a", origin=ahead), one(ahead + 5.0, ahead + 5.25, "b", origin=ahead)]
+    write_annotations(tmp_path / "b.mcap", annotations, [source])
+    np.testing.assert_allclose([t - START for t, _ in said(tmp_path / "b.mcap", "mcap")], [1e8, 5.25e9], atol=1000)
+
+
+def test_a_movement_may_end_a_second_beside_the_messages(tmp_path):
+    """Headers are stamped before messages are recorded."""
+    source = bag(tmp_path, "mcap") / "run.mcap"
+    write_annotations(tmp_path / "b.mcap", [one(1.7e9 - 0.8, 1.7e9 - 0.5, "a", origin=1.7e9 - 0.9)], [source])
+    ((t, _),) = said(tmp_path / "b.mcap", "mcap")
+    assert abs(t - START + SECOND // 2) < 1000
+
+
 def test_a_bag_is_not_copied_over_itself_nor_as_another_kind(tmp_path):
     source = bag(tmp_path, "ros1")
     before = source.read_bytes()

@@ -82,6 +82,14 @@ def test_times_that_fit_only_from_the_first_sample_are_taken_so(tmp_path, record
     assert pieces.demonstrations.labels.tolist() == ["wave", "nod"]
 
 
+def test_times_within_the_recording_are_by_its_clock_where_both_would_fit(tmp_path):
+    rows = "\n".join(f"{0.01 * k},{np.sin(0.01 * k)}" for k in range(200, 701))
+    (tmp_path / "late.csv").write_text(f"t,x\n{rows}\n")
+    (tmp_path / "l.csv").write_text("start,end,label\n3,4,wave\n")
+    (piece,) = labeled_pieces(read_recordings(tmp_path / "late.csv"), read_labels(tmp_path / "l.csv"))
+    assert round(piece.times[0], 6) == 3.0
+
+
 def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings):
     (tmp_path / "l.csv").write_text("start,end,label\n1000.5,1001.75,wave\n1006,1007,nod\n1001,1001.01,nod\n")
     pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))

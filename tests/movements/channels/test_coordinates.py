@@ -116,7 +116,13 @@ def test_channels_that_are_no_pose_are_refused_by_name():
         as_poses(Demonstrations.of_movements(two))
 
 
-@pytest.mark.parametrize(("unit", "lever"), [("m", 0.2), (None, 0.2), ("cm", 20.0), ("mm", 200.0), ("furlong", 0.2)])
+@pytest.mark.parametrize(
+    ("unit", "lever"),
+    [
+        *(("m", 0.2), (None, 0.2), ("cm", 20.0), ("mm", 200.0), ("furlong", 0.2)),
+        *(("MM", 200.0), ("Millimeters", 200.0), ("meters", 0.2), ("dm", 2.0), ("µm", 2e5), ("inches", 0.2 / 0.0254)),
+    ],
+)
 def test_beside_positions_a_radian_counts_as_the_way_of_a_tool(unit, lever):
     q = exp(np.outer(np.linspace(0, 2, 30), [0, 0, 1.0]))
     channels = (Channel("x", "position", ("x",), unit), Q)

@@ -61,6 +61,13 @@ def test_a_gripper_is_discrete_as_long_as_it_has_few_values():
 def test_a_recording_of_switches_alone_is_what_moves():
     assert [one.kind for one in found("gripper")] == ["position"]
     assert [one.kind for one in found("gripper", gripper="discrete")] == ["discrete"]
+    both = found("gripper 1", "gripper 2", **{"gripper 1,gripper 2": "discrete"})
+    assert [one.kind for one in both] == ["discrete", "discrete"]
+
+
+def test_kinds_are_said_by_heads():
+    with pytest.raises(SpecificationError, match=r"kinds by heads of columns, such as .*, got \['x'\]"):
+        find_channels(["x"], U[:, None], np.array([0, T]), ["x"])
 
 
 @pytest.mark.parametrize("head", ["panda_joint1", "elbow [deg]", "wrist_yaw", "hip flexion (rad)", "theta"])

@@ -28,14 +28,24 @@ DATASETS = {"paper": PAPER_LETTERS, "lasa-26": LASA_26}
 @lru_cache(maxsize=2)
 def _features(dataset: str) -> tuple[dict[str, Array], Any, list[str | None]]:
     """Features of all usable recordings per representation, labels as numbers, and names of unusable recordings."""
+    demos, left_out = usable(dataset)
+    return *features_and_labels(demos), left_out
+
+
+def usable(dataset: str) -> tuple[Demonstrations, list[str | None]]:
+    """The recordings that have weights, and the names of those that have none."""
     demos = load_lasa(DATASETS[dataset])
     without = without_weights(demos)
     left_out = [name for name, missing in zip(demos.names or (), without, strict=False) if missing]
-    demos = demos[~without]
+    return demos[~without], left_out
+
+
+def features_and_labels(demos: Demonstrations) -> tuple[dict[str, Array], Any]:
+    """Features of movements per representation, and their labels as numbers."""
     labels = np.unique(require_labels(demos), return_inverse=True)[1]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DegenerateMovementWarning)  # their effect is measured here
-        return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels, left_out
+        return {key: representation.rows(demos) for key, representation in REPRESENTATIONS.items()}, labels
 
 
 def without_weights(demos: Demonstrations) -> NDArray[np.bool_]:
@@ -59,19 +69,25 @@ def run_draw(dataset: str, seed: int, index: int, svm: bool) -> dict[str, Any]:
     features, labels, left_out = _features(dataset)
     chosen = draw(labels, paper.PER_CLASS, seed, index)
     rows, y = {key: X[chosen] for key, X in features.items()}, labels[chosen]
-    result: dict[str, Any] = {
-        "nearest": {key: nearest_neighbor_accuracy(X, y) for key, X in rows.items()},
-        "correlation": {key: nearest_neighbor_accuracy(rows[key], y, "cosine") for key in ("original-w", "bio-w")},
-        "distance": {key: float(np.median(pdist(X))) for key, X in rows.items()},
-        "left_out": left_out,
-    }
+    result = run_nearest(rows, y) | {"left_out": left_out}
     if svm:
         with sklearn.config_context(skip_parameter_validation=True):
-            result |= _run_svm(rows, y, diagnosis=dataset == "paper")
+            result |= run_svm(rows, y, diagnosis=dataset == "paper")
+            result["svm"] |= _run_printed(rows, y, diagnosis=dataset == "paper")
     return result
 
 
-def _run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
+def run_nearest(rows: dict[str, Array], y: Any) -> dict[str, Any]:
+    """``nearest``, ``correlation`` and ``distance`` of `run_draw`, of the features and labels of one draw."""
+    return {
+        "nearest": {key: nearest_neighbor_accuracy(X, y) for key, X in rows.items()},
+        "correlation": {key: nearest_neighbor_accuracy(rows[key], y, "cosine") for key in ("original-w", "bio-w")},
+        "distance": {key: float(np.median(pdist(X))) for key, X in rows.items()},
+    }
+
+
+def run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
+    """``svm`` with median widths, ``penalty``, ``width`` and ``at_bound`` of `run_draw`."""
     accuracy: dict[str, float] = {}
     width: dict[str, float] = {}
     by_penalty: dict[str, float] = {}
@@ -87,10 +103,16 @@ def _run_svm(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, Any]:
             if diagnosis and key == "original-sa":
                 by_penalty |= {f"{key}/{name}/{C:g}": svm_accuracy(gram, y, C) for C in paper.PENALTIES[:-1]}
                 at_bound[f"{key}/{name}"] = share_at_bound(gram, y, paper.PENALTIES[0])
+    return {"svm": accuracy, "width": width, "penalty": by_penalty, "at_bound": at_bound}
+
+
+def _run_printed(rows: dict[str, Array], y: Any, diagnosis: bool) -> dict[str, float]:
+    """``svm`` of `run_draw` with the widths of the paper's Table 3."""
+    accuracy: dict[str, float] = {}
     for row in REPRESENTATIONS.values():
         if not (diagnosis or row.key in READINGS["closest in distances"]):
             continue
         X, printed = rows[row.key], paper.KERNELS[row.formulation, row.quantity]
         accuracy[f"{row.key}/rbf/paper"] = svm_accuracy(printed.rbf(X), y)
         accuracy[f"{row.key}/tre/paper"] = svm_accuracy(printed.truncated(X), y)
-    return {"svm": accuracy, "width": width, "penalty": by_penalty, "at_bound": at_bound}
+    return accuracy

@@ -37,6 +37,11 @@ def _examples(letter: str, seed: int, count: int) -> Demonstrations:
     return demos[np.random.default_rng(seed).permutation(np.flatnonzero(demos.labels == letter))[:count]]
 
 
+def one_c(seed: int) -> Demonstrations:
+    """The C of Figure 7, alone."""
+    return _examples("CShape", seed, 1)
+
+
 def _terms(primitives: Primitives) -> tuple[Array, Array]:
     """Weights (n, N, d) and shape-attractor (n, S, d)."""
     return primitives.weights, primitives.shape_attractor(paper.N_SAMPLES)
@@ -88,7 +93,7 @@ def _movement(seed: int) -> Figure:
     """A movement and its reproduction from w, in both formulations, and their distance."""
     figure = new_figure(6.6, 2.7)
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.3))
-    one = _examples("CShape", seed, 1)
+    one = one_c(seed)
     x = one[0].positions
     left.plot(*x.T, color=GRAY, linewidth=4, alpha=0.5, label="demonstrated")
     left.plot(*x[0], "o", color=GRAY, markersize=6)
@@ -146,7 +151,7 @@ DRAWINGS = {
     "figure-04": Drawing("Dimension y of a C and an N, original formulation.", _for(_c_and_n, "original")),
     "figure-05": Drawing("Dimension y of three Cs, bio-inspired.", _for(_three_c, "bio-inspired")),
     "figure-06": Drawing("Dimension y of a C and an N, bio-inspired.", _for(_c_and_n, "bio-inspired")),
-    "figure-07": Drawing("A movement, from circle to star, and its reproduction from w.", _movement),
+    "figure-07": Drawing("(a) A movement, from circle to star, and its reproduction from w.", _movement),
     "figure-08": Drawing("Similarity of w, original formulation.", _for(_similarities, "original", "weights")),
     "figure-09": Drawing("Similarity of the shape-attractor, original.", _for(_similarities, "original", "f(t)")),
     "figure-10": Drawing(

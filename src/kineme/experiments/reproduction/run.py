@@ -22,6 +22,7 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 
 _FORMAT = 1  # of results.json
 _LARGE_SVM_SHARE = 4  # on the large data set the SVM runs on one draw in four, since it takes most of the time
+_HEADINGS = ("The paper's nine letters", "All single shapes of LASA", "Movements of an arm")  # of tables
 _DPI = {True: 100, False: 200}  # quick or not
 
 
@@ -56,12 +57,16 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
     TemporaryFile(dir=out).close()  # a folder that cannot be written fails now, not after the work
     tasks = _tasks(draws, seed, quick)
     done = dict(progress(_in_processes(tasks), total=len(tasks)))
+    from kineme.experiments.reproduction.arm_tables import arm_tables
     from kineme.experiments.reproduction.tables import make_tables
 
     by_draw = {name: [done[name, k] for k in range(draws)] for name in ("paper", "lasa-26")}
-    by_data = make_tables(by_draw)
-    tables = [*by_data[0], *by_data[1]]
-    figures = {name: done["figure", name] for name in sorted(name for kind, name in done if kind == "figure")}
+    arm = done["arm", 0]
+    by_data = dict(zip(_HEADINGS, (*make_tables(by_draw), arm_tables(arm, by_draw)), strict=True))
+    tables = [table for some in by_data.values() for table in some]
+    figures = {name: done["figure", name] for name in _FIGURE_NAMES}
+    if "figure" in arm:
+        figures = dict(sorted({**figures, "figure-07-arm": arm.pop("figure")}.items()))
     facts = {"draws": draws, "seed": seed, "quick": quick, "versions": _versions()}
     files = [*_write_figures(out, figures), *_write_tables(out, by_data, figures, facts)]
     seconds = round(time.perf_counter() - started, 2)
@@ -70,6 +75,7 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
         **facts,
         "seconds": seconds,
         "draw_by_draw": by_draw,
+        "arm": arm,
         "tables": [t._asdict() for t in tables],
     }
     write_atomically(out / "results.json", (json.dumps(_rounded(numbers), indent=1) + "\n").encode())
@@ -77,13 +83,14 @@ def reproduce(out: Path, draws: int, seed: int, quick: bool, progress: Callable[
 
 
 def _tasks(draws: int, seed: int, quick: bool) -> dict[tuple[str, Any], Task]:
-    """All tasks, longest first: the large data set, then figures, then letters."""
+    """All tasks, longest first: the arm, the large data set, then figures, then letters."""
+    arm = {("arm", 0): (_arm, (draws, seed, _DPI[quick]))}
     large = {
         ("lasa-26", k): (_draw, ("lasa-26", seed, k, k % _LARGE_SVM_SHARE == 0 and not quick)) for k in range(draws)
     }
     figures = {("figure", name): (_figure, (name, seed, _DPI[quick])) for name in _FIGURE_NAMES}
     letters = {("paper", k): (_draw, ("paper", seed, k, True)) for k in range(draws)}
-    return large | figures | letters
+    return arm | large | figures | letters
 
 
 _FIGURE_NAMES = tuple(f"figure-{k:02d}" for k in range(1, 12))
@@ -93,6 +100,12 @@ def _draw(*arguments: Any) -> Any:
     from kineme.experiments.reproduction.experiments import run_draw
 
     return run_draw(*arguments)
+
+
+def _arm(*arguments: Any) -> Any:
+    from kineme.experiments.reproduction.arm import run_arm
+
+    return run_arm(*arguments)
 
 
 def _figure(name: str, seed: int, dpi: int) -> tuple[str, dict[str, bytes]]:
@@ -126,13 +139,13 @@ def _write_figures(out: Path, figures: dict[str, tuple[str, dict[str, bytes]]]) 
 
 
 def _write_tables(
-    out: Path, tables: tuple[list[Table], list[Table]], figures: dict[str, Any], facts: dict[str, Any]
+    out: Path, tables: dict[str, list[Table]], figures: dict[str, Any], facts: dict[str, Any]
 ) -> list[Path]:
     from kineme.experiments.reproduction.report import write_report
     from kineme.output.table import to_text
 
     html = write_report(tables, {name: (caption, made["svg"]) for name, (caption, made) in figures.items()}, facts)
-    text = "\n\n".join(map(to_text, [*tables[0], *tables[1]])) + "\n"
+    text = "\n\n".join(to_text(table) for some in tables.values() for table in some) + "\n"
     return [write_atomically(out / "report.html", html.encode()), write_atomically(out / "tables.txt", text.encode())]
 
 

@@ -20,13 +20,18 @@ def as_row(one: Annotation) -> dict[str, Any]:
     return {head: getattr(one, head) for head in HEADS}
 
 
-def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
-    """Write a row for each annotation; the symbol of unknown motion is empty, times are by the recording's clock."""
+def to_csv(annotations: Sequence[Annotation]) -> bytes:
+    """A row for each annotation; the symbol of unknown motion is empty, times are by the recording's clock."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(HEADS)
     table.writerows([_cell(value) for value in as_row(one).values()] for one in annotations)
-    return write_atomically(path, text.getvalue().encode("utf-8", "backslashreplace"))
+    return text.getvalue().encode("utf-8", "backslashreplace")
+
+
+def write_csv(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:
+    """Write `to_csv`."""
+    return write_atomically(path, to_csv(annotations))
 
 
 def write_json(path: Path, annotations: Sequence[Annotation], source: Path | None) -> Path:

@@ -1,4 +1,4 @@
-"""Duplicate movements: equal sample by sample, whatever time they start at."""
+"""Duplicate movements: all recorded columns equal sample by sample, whatever time they start at."""
 
 from __future__ import annotations
 
@@ -42,4 +42,4 @@ def _equal(demonstrations: Demonstrations, alike: list[int]) -> list[list[int]]:
 def _are_equal(demonstrations: Demonstrations, i: int, k: int) -> bool:
     one, other = demonstrations[i], demonstrations[k]
     since = np.abs((one.times - one.times[0]) - (other.times - other.times[0])).max()
-    return np.array_equal(one.positions, other.positions) and bool(since <= _STAMP * one.duration)
+    return np.array_equal(one.recorded, other.recorded) and bool(since <= _STAMP * one.duration)

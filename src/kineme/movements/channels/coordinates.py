@@ -15,7 +15,17 @@ from kineme.movements.rotations.rotation_vectors import log
 from kineme.validation import Array
 
 _LEVER = 0.2  # m
-_PER_METER = {"m": 1.0, "cm": 1e2, "mm": 1e3, "in": 1 / 0.0254, "ft": 1 / 0.3048}
+_UNITS_PER_METER = (
+    (1e-3, "km kilometer"),
+    (1.0, "m meter"),
+    (1e1, "dm decimeter"),
+    (1e2, "cm centimeter"),
+    (1e3, "mm millimeter"),
+    (1e6, "um µm micrometer micron"),
+    (1 / 0.0254, "in inch inche"),
+    (1 / 0.3048, "ft foot feet"),
+)
+_PER_METER = {name: number for number, names in _UNITS_PER_METER for name in names.split()}  # singular, lower case
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
 
@@ -116,7 +126,7 @@ def lever_of(channels: Channels) -> float:
     It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
     """
     units = [one.unit for one in channels if one.kind == "position"]
-    return _LEVER * _PER_METER.get(units[0] or "m", 1.0) if units else 1.0
+    return _LEVER * _PER_METER.get((units[0] or "m").lower().removesuffix("s"), 1.0) if units else 1.0
 
 
 def as_wxyz(q: Array, channel: Channel) -> Array:

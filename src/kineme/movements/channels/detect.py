@@ -113,7 +113,7 @@ def find_channels(
             kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets)
             channels.append(Channel(head, kind, (head,), unit))
     if all(one.kind == "discrete" for one in channels):  # then they are what moves
-        return tuple(one if one.columns[0] in given else one._replace(kind="position") for one in channels)
+        return tuple(one if k in kinds else one._replace(kind="position") for k, one in enumerate(channels))
     return with_periods(tuple(channels), in_order(columns, heads, tuple(channels)))
 
 
@@ -129,6 +129,8 @@ def unit_of(head: str) -> str | None:
 
 def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Quaternion]]:
     """Column -> kind, and the quaternions, as the caller says."""
+    if not isinstance(given, Mapping):
+        raise SpecificationError(f"expected kinds by heads of columns, such as {{'x': 'position'}}, got {given!r}")
     kinds: dict[int, str] = {}
     orientations: list[Quaternion] = []
     for key, kind in given.items():

@@ -82,24 +82,21 @@ class _Angle:
 
 
 class _Orientation:
-    """The quaternion before, as it was recorded and with the sign that it got, and the rotation up to it."""
+    """The quaternion before, as it was recorded, and the rotation up to it."""
 
     def __init__(self, channel: Channel, lever: float) -> None:
         self._channel, self._lever = channel, lever
-        self._before, self._signed = np.empty((0, 4)), np.empty((0, 4))
+        self._before = np.empty((0, 4))
         self._turned = np.zeros((1, 3))
 
     def take(self, columns: Array) -> Array:
         if not len(columns):
             return np.empty((0, 3))
-        n_before = len(self._before)
-        block = np.concatenate((self._before, columns))
-        signed = continuous_signs(block, np.array([0, len(block)]))
-        if (self._before * self._signed).sum() < 0:
-            signed = -signed
-        steps = rotation_steps(as_wxyz(np.concatenate((self._signed, signed[n_before:])), self._channel))
+        block = np.concatenate((self._before, columns))  # steps are the same for either sign of its first
+        steps = rotation_steps(as_wxyz(continuous_signs(block, np.array([0, len(block)])), self._channel))
         turned = np.cumsum(np.concatenate((self._turned, steps)), axis=0)
-        self._before, self._signed, self._turned = columns[-1:].copy(), signed[-1:].copy(), turned[-1:].copy()
+        n_before = len(self._before)
+        self._before, self._turned = columns[-1:].copy(), turned[-1:].copy()
         return np.asarray(self._lever * turned[n_before:])
 
 

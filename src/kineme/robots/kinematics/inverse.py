@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.robot import Robot
-from kineme.validation import Array, check_choice
+from kineme.robots.models.robot import Robot, check_robot
+from kineme.validation import Array, check_choice, check_number
 
 #: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
 ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 0.0, 0.0)}
@@ -48,6 +48,7 @@ class InverseKinematics:
     """
 
     def __init__(self, robot: Robot, orientation: str = "full", time_step: float | None = None) -> None:
+        check_robot(robot)
         check_choice("orientation", orientation, list(ORIENTATIONS))
         try:
             import pinocchio
@@ -56,6 +57,8 @@ class InverseKinematics:
             from pink.tasks import FrameTask, PostureTask
         except ImportError as error:
             raise DataError("expected the package pin-pink for arms; pip install 'kineme[robot]'") from error
+        if time_step is not None:
+            check_number("time_step", time_step, above=0.0)
         self.robot = robot
         self._pose, self._solve, self._configuration_of = pinocchio.SE3, solve_ik, Configuration
         self._data = robot.model.createData()
@@ -65,6 +68,7 @@ class InverseKinematics:
         self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
         self._posture = PostureTask(cost=_POSTURE)
         self._posture.set_target(robot.rest)
+        self._fastest: Array | None = None if time_step is None else robot.velocity
         self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]
         if time_step is not None:
             limited = robot.model.copy()
@@ -154,5 +158,7 @@ class InverseKinematics:
             safety_break=False,
             damping=_DAMPING,
         )
+        if self._fastest is not None:  # the solver keeps limits to 1e-6 only
+            velocity = np.clip(velocity, -self._fastest, self._fastest)
         self._configuration.integrate_inplace(velocity, dt)
         return float(np.abs(velocity).max()) * dt

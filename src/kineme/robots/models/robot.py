@@ -70,6 +70,18 @@ class Robot:
         return f"Robot({self.name!r}: {self.n_joints} joints, tip {self.tip!r})"
 
 
+def check_robot(robot: object) -> None:
+    """Refuse what is not an arm.
+
+    Raises
+    ------
+    SpecificationError
+        Something else than a `Robot`, as its name.
+    """
+    if not isinstance(robot, Robot):
+        raise SpecificationError(f"expected a robot, as of kineme.robots.load('panda'), got {robot!r:.80}")
+
+
 def load(
     robot: str | Path,
     tip: str | None = None,

@@ -13,7 +13,7 @@ from kineme.robots.models.robot import Robot
 from kineme.robots.models.urdf import read_root
 
 Element = ElementTree.Element
-_LARGEST = 12_000_000  # bytes of all meshes of one page
+_LARGEST = 16_000_000  # bytes of all meshes of one page
 _MESHES = {".stl": "stl", ".dae": "collada"}
 _SHAPES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 _GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
@@ -42,7 +42,7 @@ class Shapes(NamedTuple):
 def shapes_of(robot: Robot) -> Shapes:
     """The visual shapes of an arm; where a link has none, its collision shapes.
 
-    A link whose meshes are not there, of another format than STL and COLLADA, or larger than 12 MB with those before
+    A link whose meshes are not there, of another format than STL and COLLADA, or larger than 16 MB with those before
     them, is drawn as cylinders to the joints that it bears; so is every link of a file without any shape.
     """
     root = read_root(robot.source)

@@ -97,7 +97,8 @@ def _summary(made: RobotMovement) -> str:
 def _notes(made: RobotMovement, stand_ins: tuple[str, ...]) -> str:
     notes = list(made.robot.assumed)
     if stand_ins:
-        notes.append(f"drawn as cylinders, as their meshes are not here: {', '.join(map(printable, stand_ins))}")
+        why = "their meshes are not there, no STL or COLLADA files, or too large to be in this page"
+        notes.append(f"drawn as cylinders up to the next joint: {', '.join(map(printable, stand_ins))}; {why}")
     if len(made.trajectory) > MOST_SAMPLES:
         notes.append(f"{MOST_SAMPLES:,} of {len(made.trajectory):,} samples are in this page")
     return "".join(f"<li>{in_markup(note)}</li>" for note in notes)

@@ -87,7 +87,9 @@
       return makeScene();
     } catch (error) {
       const problem = byId("problem");
-      problem.textContent = `The arm cannot be drawn here: ${error.message}. The joints and the checks are shown.`;
+      const why = error.message.replace(/\.$/, "");
+      problem.textContent = `The arm cannot be drawn here: ${why}. The joints and the checks are shown.`;
+      document.querySelector(".legend").hidden = true;
       problem.hidden = false;
       reset.disabled = true;
       return null;
@@ -120,6 +122,9 @@
     const approach = tube(T, executed.slice(0, first + 1), 1.7 * thin, data.colors.approach, 3);
     const movement = tube(T, executed.slice(first), 1.7 * thin, data.colors.executed, 3);
     world.add(approach, movement, mark(T, new T.SphereGeometry(4.5 * thin), data.start, data.colors.executed));
+    const behind = tube(T, executed.slice(first), 0.7 * thin, data.colors.executed, 4, 0.3); // where the arm hides it
+    behind.material.depthTest = false;
+    world.add(behind);
     world.add(mark(T, new T.OctahedronGeometry(6.5 * thin), data.goal, data.colors.goal));
 
     const controls = new T.OrbitControls(camera, canvas);
@@ -135,7 +140,10 @@
     function home() {
       controls.target.copy(middle);
       const back = camera.aspect < 1 ? 1 / camera.aspect : 1;
-      camera.position.copy(middle).addScaledVector(new T.Vector3(1.25, -1.45, 0.85).normalize(), 1.55 * reach * back);
+      const ahead = data.executed.reduce(([x, y], point) => [x + point[0], y + point[1]], [0, 0]);
+      const around = Math.atan2(ahead[1], ahead[0]) - 0.86; // beside the arm, the movement in front of it
+      const from = new T.Vector3(Math.cos(around), Math.sin(around), 0.45).normalize();
+      camera.position.copy(middle).addScaledVector(from, 1.55 * reach * back);
       controls.update();
       draw();
     }

@@ -1,0 +1,165 @@
+"""A movement under live control on the joints of an arm: the controller of a primitive, and inverse kinematics."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.rotations.quaternions import normalized
+from kineme.primitives.control.controller import Controller
+from kineme.primitives.control.state import State
+from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.postures import postures
+from kineme.robots.models.robot import Robot, check_robot
+from kineme.validation import Array, as_numbers
+
+_REACHED = 1e-3  # farther from the start than this, no posture reaches it [m]
+
+
+class ArmState(NamedTuple):
+    """An arm after one step of live control.
+
+    Attributes
+    ----------
+    joints, velocities : ndarray of shape (n,)
+        What to send now [rad, m], per second.
+    distance : float
+        Of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
+    movement : State
+        Of the movement; see `kineme.control.State`.
+    """
+
+    joints: Array
+    velocities: Array
+    distance: float
+    movement: State
+
+
+class ArmController:
+    """Moves an arm step by step as the controller of a primitive says, within its limits of position and velocity.
+
+    In each step the controller moves on, and one step of `InverseKinematics` follows it. With ``feedback="phase"`` the
+    controller is told where the tip is, so that the movement waits for an arm that its limits hold back. Accelerations,
+    torques and self-collision are not looked at.
+
+    Parameters
+    ----------
+    robot : Robot
+    controller : Controller
+        Of a primitive of the tip: three positions in the frame of the robot [m], or poses (7 columns).
+    start : array_like of shape (n,), optional
+        Where the joints stand; by default in the posture, of those that reach the start of the movement, that is
+        nearest to the rest posture.
+    orientation : array_like of shape (4,), optional
+        Unit quaternion w, x, y, z of the tip, for movements without orientations; by default that at rest.
+    follow : {"full", "axis", "free"}, default "full"
+        How much of the orientation is followed; see `InverseKinematics`.
+
+    Attributes
+    ----------
+    state : ArmState
+        After the last step; at first the start.
+
+    Raises
+    ------
+    TrajectoryError
+        A movement of other columns, or a start out of reach.
+    SpecificationError
+        Joints that stand outside their limits, or as many as the arm does not have.
+    DataError
+        The extra ``robot`` is not installed.
+    """
+
+    state: ArmState
+
+    def __init__(
+        self,
+        robot: Robot,
+        controller: Controller,
+        *,
+        start: ArrayLike | None = None,
+        orientation: ArrayLike | None = None,
+        follow: str = "full",
+    ) -> None:
+        check_robot(robot)
+        d = len(controller.state.position)
+        if d not in (3, 7):
+            raise TrajectoryError(
+                f"expected a controller of three positions, or of poses of seven columns, got {d} columns"
+            )
+        self.robot, self.controller = robot, controller
+        self._ik = InverseKinematics(robot, follow, controller.dt)
+        self._rotation = (
+            self._ik.tip_rotation if orientation is None else _matrix(as_numbers(orientation, "orientation"))
+        )
+        self._start = self._reaching() if start is None else as_numbers(start, "start")
+        if self._start.shape != (robot.n_joints,):
+            raise SpecificationError(f"expected start as {robot.n_joints} joints, got shape {self._start.shape}")
+        self._waits = controller.options.feedback == "phase"
+        self.reset()
+
+    def reset(self) -> ArmState:
+        """Back to the start, movement and joints; returns the state there."""
+        self._ik.reset(self._start)
+        movement = self.controller.reset()
+        distance = float(np.linalg.norm(self._ik.tip_position - movement.position[:3]))
+        self.state = ArmState(self._ik.q, np.zeros(self.robot.n_joints), distance, movement)
+        return self.state
+
+    def step(self, **told: Any) -> ArmState:
+        """Move on by the controller's dt.
+
+        Parameters
+        ----------
+        **told
+            As to `kineme.control.Controller.step`: goal, goal_velocity, obstacles, tempo, ...; but for dt. Where the
+            controller has ``feedback="phase"``, position is by default that of the tip.
+
+        Raises
+        ------
+        SpecificationError
+            A dt.
+        """
+        if "dt" in told:
+            raise SpecificationError("expected no dt: an arm moves in steps of its controller's dt")
+        if self._waits and "position" not in told:
+            told["position"] = self._tip()
+        movement = self.controller.step(**told)
+        last, (position, rotation) = self.state.joints, self._pose(movement)
+        joints = self._ik.step(position, rotation)
+        velocities = (joints - last) / self.controller.dt
+        self.state = ArmState(joints, velocities, self._ik.error, movement)
+        return self.state
+
+    def _pose(self, movement: State) -> tuple[Array, Array]:
+        """Position (3,) and rotation (3, 3) of the tip that the movement asks for."""
+        columns = movement.position
+        return columns[:3], self._rotation if len(columns) == 3 else _matrix(columns[3:])
+
+    def _tip(self) -> Array:
+        """Where the tip is, in the columns of the movement."""
+        position = self._ik.tip_position
+        if len(self.state.movement.position) == 3:
+            return position
+        turned = Rotation.from_matrix(self._ik.tip_rotation).as_quat(scalar_first=True)
+        return np.concatenate((position, turned))
+
+    def _reaching(self) -> Array:
+        position, rotation = self._pose(self.controller.state)
+        found = postures(self.robot, position, rotation, self._ik.costs)
+        if found.errors[0] > _REACHED:
+            where = ", ".join(f"{x:.3f}" for x in position)
+            raise TrajectoryError(
+                f"{self.robot.name} does not reach the start of the movement, ({where}) m: its tip stays "
+                f"{found.errors[0]:.3f} m away; choose another start or free the orientation"
+            )
+        away = np.abs(found.joints - self.robot.rest).max(axis=1)
+        return np.asarray(found.joints[int(np.argmin(away))])
+
+
+def _matrix(quaternion: Array) -> Array:
+    return np.asarray(Rotation.from_quat(normalized(quaternion), scalar_first=True).as_matrix())

@@ -1,0 +1,31 @@
+"""Movements for arms, and arms in MuJoCo: another program's kinematics and dynamics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import kineme
+from kineme.robots.kinematics.inverse import InverseKinematics
+
+_SETTINGS = 'fusestatic="false" balanceinertia="true" boundmass="1e-3" boundinertia="1e-6"'
+
+
+def stroke(robot, seconds=3.0, size=1.0, n=150):
+    """An S in front of the tip at rest, with the velocity of least jerk."""
+    u = np.linspace(0, 1, n)
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    scale = size * (0.25 if robot.name == "so101" else 1.0)
+    shape = np.column_stack((0 * s - 0.05, 0.42 * (s - 0.5), 0.1 * np.sin(2 * np.pi * s)))
+    return kineme.Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + scale * shape)
+
+
+def simulated(mujoco, robot):
+    """The arm in MuJoCo, from the same URDF."""
+    compiler = f"<mujoco><compiler {_SETTINGS}/></mujoco></robot>"
+    return mujoco.MjModel.from_xml_string(robot.source.read_text().replace("</robot>", compiler))
+
+
+def tip_in(mujoco, arm, data, robot):
+    """Where MuJoCo has the tip, and how it is turned."""
+    body = mujoco.mj_name2id(arm, mujoco.mjtObj.mjOBJ_BODY, robot.tip)
+    return data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy()
