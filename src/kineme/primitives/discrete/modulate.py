@@ -27,8 +27,9 @@ from numpy.typing import ArrayLike
 from kineme.errors import ExtrapolationWarning
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
 from kineme.primitives.discrete.position_limits import within_limits
-from kineme.primitives.discrete.rollout import Change, Rollout, broadcast_length, per_movement
+from kineme.primitives.discrete.rollout import Change, Rollout
 from kineme.primitives.discrete.specification import Specification
 from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.validation import Array

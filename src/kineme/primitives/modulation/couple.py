@@ -22,7 +22,8 @@ from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryEr
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.modulate import changes
 from kineme.primitives.discrete.operators import decoder_at, smoothness_factor
-from kineme.primitives.discrete.rollout import Rollout, per_movement
+from kineme.primitives.discrete.per_movement import per_movement
+from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.modulation.parts import moving, within
 from kineme.validation import Array, as_numbers
 
