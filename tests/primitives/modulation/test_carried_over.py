@@ -66,6 +66,14 @@ def test_blended_it_is_that_of_the_first_and_then_that_of_the_second():
     np.testing.assert_allclose([time for time, _ in found[1:]], [0.4, 1.0, 1.8], atol=2e-3)
 
 
+def test_a_step_before_the_switch_is_in_force_from_the_switch_on():
+    """In the overlap, the next movement has closed its gripper before it counts: it never was open."""
+    one, other = gripped([(0.25, 0.0, 1.0)], [2.0]), gripped([(0.05, 3.0, 4.0)], [2.0])
+    cut = steps_in_time(join([one, other], shift=True, overlap=0.5))
+    assert [value for _, value in cut] == [0.0, 1.0, 4.0]
+    np.testing.assert_allclose([time for time, _ in cut[1:]], [0.5, 1.75], atol=2e-3)
+
+
 def test_each_movement_of_a_batch_has_its_own_steps(tmp_path):
     many = gripped([(0.25, 0.0, 1.0), (0.5, 0.0, 1.0)], [2.0, 3.0])
     one = gripped([(0.5, 1.0, 0.0)], [4.0])
