@@ -18,6 +18,7 @@ SUBJECTS = (
     "adapting",
     "rhythm",
     "control",
+    "arms",
     "modulation",
     "recognize",
     "recognize_files",

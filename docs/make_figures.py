@@ -204,7 +204,21 @@ def via_points() -> Figure:
     return figure
 
 
+def arm() -> Figure:
+    """A handwritten shape as a Panda executes it."""
+    from kineme import robots
+    from kineme.robots.figure import draw_robot_movement
+
+    shape = kineme.load_lasa(["GShape"])[:1][0]
+    positions = 0.004 * (shape.positions - shape.positions.mean(axis=0))
+    tip = [0.5, 0.0, 0.45]
+    written = np.column_stack((np.full(len(positions), tip[0]), positions[:, 0] + tip[1], positions[:, 1] + tip[2]))
+    primitive = kineme.DMP().learn([kineme.Trajectory(times=0.25 * shape.times, positions=written)])
+    return draw_robot_movement(robots.move(primitive.rollout(rate=100), robots.load("panda"), timing="slowed"))
+
+
 FIGURES = {
+    "robots": arm,
     "via-points": via_points,
     "around-obstacles": around_obstacles,
     "adapting": adapting,

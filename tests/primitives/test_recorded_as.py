@@ -217,6 +217,33 @@ def test_what_is_made_of_primitives_knows_what_was_recorded():
     assert stepping.to_recording is None
 
 
+def test_a_join_keeps_the_gripper_of_each_part():
+    primitives = kineme.DMP().learn(recordings(PLAIN, 4))
+    for overlap in (0.0, 0.5):
+        both = kineme.join([primitives[:2], primitives[2:]], shift=True, overlap=overlap)
+        assert both.channels == PLAIN
+        for i, made in enumerate(both.rollout(n_samples=4001)):
+            begin = primitives.durations[i] - overlap
+            since = primitives.recorded_as.steps.shares.reshape(4, 2)[:, 1]
+            expected = [since[i] * primitives.durations[i], begin, begin + since[i + 2] * primitives.durations[i + 2]]
+            found = made.times[np.flatnonzero(np.diff(made.recorded[:, -1])) + 1] - made.times[0]
+            np.testing.assert_allclose(found, expected, atol=1.1 * made.duration / 4000)
+    turning = kineme.blend(primitives[0], primitives[1], (0.4, 0.6))
+    assert turning.channels == PLAIN
+    assert turning.to_recording is not None
+    other = kineme.DMP().learn([np.random.default_rng(0).normal(size=(50, 2)).cumsum(axis=0)])
+    assert kineme.join([primitives[0], other], shift=True).channels is None
+
+
+def test_a_batch_of_which_some_steps_are_unknown_has_none():
+    primitives = kineme.DMP().learn(recordings(PLAIN, 4))
+    average = kineme.styles.average(primitives).primitive
+    some = kineme.Primitives.concatenate([average, primitives])
+    assert some.channels == PLAIN
+    assert some.to_recording is None
+    assert len(some.rollout().positions) == 5
+
+
 def test_a_step_is_at_its_share_but_for_rounding():
     steps = DiscreteSteps(np.array([[0.0], [1.0]]), np.array([0.0, 0.3]), np.array([0, 2]))
     shares = np.array([0.0, 0.3 - 1e-6, 0.3 - 1e-12, 0.3, 2.0])

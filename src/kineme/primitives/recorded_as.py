@@ -103,12 +103,15 @@ def recorded_as(movements: Demonstrations, steps: Iterable[Step] = ()) -> Record
 
 
 def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
-    """That of several batches, one after the other; None if they were not recorded as the same."""
+    """That of several batches, one after the other; None if they were not recorded as the same.
+
+    Without steps where those of a batch are not known.
+    """
     known = [one for one in several if one is not None]
     if len(known) < len(several) or not all(same_columns(one.channels, known[0].channels) for one in known):
         return None
     steps = [one.steps for one in known if one.steps is not None]
-    return replace(known[0], steps=concatenated(steps)) if steps else known[0]
+    return replace(known[0], steps=concatenated(steps) if len(steps) == len(known) else None)
 
 
 def in_primitive(point: Array, about: RecordedAs) -> Array:

@@ -96,6 +96,7 @@ class ArmController:
         self._rotation = (
             self._ik.tip_rotation if orientation is None else _matrix(as_numbers(orientation, "orientation"))
         )
+        controller.reset()
         self._start = self._reaching() if start is None else as_numbers(start, "start")
         if self._start.shape != (robot.n_joints,):
             raise SpecificationError(f"expected start as {robot.n_joints} joints, got shape {self._start.shape}")

@@ -31,7 +31,7 @@ def draw_robot_movement(made: RobotMovement) -> Figure:
         axes.set_ylabel(drawable(_short(name)), fontsize=8)
     rows[-1].set_xlabel("time [s]")
     right.align_ylabels()
-    right.suptitle("joints [rad] and their limits; the approach is shaded", fontsize=9)
+    right.suptitle("joints [rad] over time, their limits at the right; the approach is shaded", fontsize=9)
     return figure
 
 
@@ -62,6 +62,8 @@ def _draw_joint(axes: Any, made: RobotMovement, j: int) -> None:
         if low - room <= limit <= high + room:
             axes.axhline(limit, color=ORANGE, linestyle="--", linewidth=1)
     axes.set_ylabel(drawable(_short(robot.joints[j])), fontsize=8)
+    limits = f"{robot.lower[j]:.2f} to {robot.upper[j]:.2f}"
+    axes.text(1.0, 1.0, limits, transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color=ORANGE)
 
 
 def _short(name: str, longest: int = 12) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.coordinates import as_wxyz
 from kineme.movements.segmentation.segment import as_recording
 from kineme.primitives.discrete.dmp import Primitives
@@ -25,11 +25,13 @@ from kineme.robots.execution.timing import Timing, as_generated, slowed, timed
 from kineme.robots.kinematics.choose import check_reached, choose_place, choose_posture
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import PLANES, TaskPath, task_path
-from kineme.robots.models.robot import Robot, check_robot
+from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.roles import SPACES, roles_of, space_of
-from kineme.validation import Array, as_numbers, check_choice, check_number
+from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
 _TIMINGS = ("generated", "slowed", "fastest")
+_SLOWEST_RATE, _FASTEST_RATE = 1.0, 10_000.0  # samples per second of what is sent
+_LONGEST = 1_000_000  # samples of one trajectory, at most
 _DENSE = 150  # poses at least for which the joints are solved, whatever the duration
 _ROUNDS = 4  # of slowing down: torques do not fall as fast as velocities do
 _A_LITTLE = 1 + 1e-6
@@ -114,7 +116,7 @@ def move(  # noqa: PLR0913 - one parameter per option
         That of the movement; the same, slowed down evenly as far as limits demand; or the least time that keeps the
         limits along the path.
     rate : float, default 100
-        Samples per second of what is sent.
+        Samples per second of what is sent, 1 to 10,000.
     start : array_like of shape (n,), optional
         Where the joints stand now; by default the rest posture. The approach begins there.
     steps : dict of str to array_like of shape (T,), optional
@@ -133,7 +135,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     TrajectoryError
         A pose out of reach, a movement of the wrong dimension, or several movements.
     SpecificationError
-        An unknown option; a start outside the limits.
+        An unknown option; a start outside the limits; more than a million samples.
     DataError
         The extra ``robot`` is not installed.
     """
@@ -142,7 +144,8 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_choice("plane", plane, list(PLANES))
     check_choice("timing", timing, _TIMINGS)
     check_choice("place", place, ("as given", "free"))
-    check_number("rate", rate, above=0.0)
+    check_number("rate", rate, least=_SLOWEST_RATE, most=_FASTEST_RATE)
+    check_switch("force", force)
     wanted = _wanted(movement, robot, space)
     at = robot.rest if start is None else _posture(start, robot)
     if wanted.space == "joints":
@@ -152,7 +155,7 @@ def move(  # noqa: PLR0913 - one parameter per option
         path, joints = _inverse(ik, _path(ik, wanted, orientation, plane), place, at)
         if not force:
             check_reached(robot, path, joints, ik.costs, TRACKED)
-    held = {name: _held(values, wanted.times, name) for name, values in {**wanted.steps, **(steps or {})}.items()}
+    held = {name: _held(values, wanted.times, name) for name, values in {**wanted.steps, **_given(steps)}.items()}
     asked = _Asked(robot, CubicSpline(wanted.times if path is None else path.times, joints), path, at, rate, held)
     made = _in_time(asked, timing)
     if not made.preflight.passed and not force:
@@ -186,6 +189,7 @@ def _posture(start: ArrayLike, robot: Robot) -> Array:
     q = as_numbers(start, "start")
     if q.shape != (robot.n_joints,):
         raise TrajectoryError(f"expected start as the positions of {robot.n_joints} joints, got shape {q.shape}")
+    check_start(robot, q)
     return q
 
 
@@ -214,6 +218,12 @@ def _inverse(ik: InverseKinematics, path: TaskPath, place: str, stands: Array) -
     return path, ik.follow(path.positions, path.rotations)
 
 
+def _given(steps: Any) -> Mapping[str, Array]:
+    if not isinstance(steps, Mapping | None):
+        raise SpecificationError(f"expected steps as a dict of channels and their values, got {steps!r:.80}")
+    return steps or {}
+
+
 def _held(values: Array, times: Array, name: str) -> tuple[Array, Array]:
     """Times (T,) from which each value of a discrete channel holds, and the values."""
     values = as_numbers(values, name)
@@ -233,8 +243,17 @@ class _Asked(NamedTuple):
     held: Mapping[str, tuple[Array, Array]]
 
 
+def _check_length(n_samples: float) -> None:
+    if not n_samples <= _LONGEST:
+        raise SpecificationError(
+            f"expected at most {_LONGEST:,} samples of one trajectory, got {n_samples:,.0f}; choose a lower rate or a "
+            "shorter movement"
+        )
+
+
 def _in_time(asked: _Asked, timing: str) -> RobotMovement:
     """The movement with that timing, slowed down until it passes if that is allowed and helps."""
+    _check_length(float(asked.curve.x[-1]) * asked.rate)
     if timing == "fastest":
         curve, chosen = fastest(asked.robot, asked.curve, asked.rate)
         return _checked(asked._replace(curve=curve), chosen)
@@ -243,6 +262,7 @@ def _in_time(asked: _Asked, timing: str) -> RobotMovement:
     for _ in range(_ROUNDS if timing == "slowed" else 0):
         if made.preflight.passed or not np.isfinite(made.preflight.slower):
             break
+        _check_length(made.trajectory.duration * made.preflight.slower * asked.rate)
         chosen = slowed(chosen, made.preflight.slower * _A_LITTLE, asked.rate)
         made = _checked(asked, chosen)
     return made

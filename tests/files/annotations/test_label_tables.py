@@ -36,6 +36,8 @@ TABLES = {
     "comma.csv": ("Start;Ende;Ende Zeit;end time;label\n0,5;;;1,75;wave\n2,0;;;4,0;nod\n", False),
     "order.tsv": ("label\tstart_time\tend_time\nwave\t0.5\t1.75\nnod\t2\t4\n", False),
     "audacity.txt": ("0.5\t1.75\twave\n\\\t100.0\t200.0\n2.000000\t4.000000\tnod\n", True),
+    "underscores.csv": ("start_ms,end_ms,label\n500,1750,wave\n2000,4000,nod\n", False),
+    "seconds.csv": ("start_s,end_s,end_effector,label\n0.5,1.75,1,wave\n2,4,1,nod\n", False),
     "objects.json": (json.dumps([dict(zip(("start", "end", "label"), one, strict=True)) for one in SPANS]), False),
     **{f"elan-{name}.txt": (text, True) for name, text in ELAN.items()},
 }
@@ -99,6 +101,23 @@ def test_stretches_outside_are_problems_that_name_the_line(tmp_path, recordings)
     (tmp_path / "l.csv").write_text("start,end,label\n2000,2001,wave\n")
     with pytest.raises(DataError, match="found none; the first that is none"):
         labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+
+
+def test_rows_of_recordings_that_are_not_there_are_a_problem(tmp_path, recordings):
+    rows = "long.csv,1000.5,1001.75,wave\nq.csv,1002,1004,nod\nr.csv,1002,1004,nod\n"
+    (tmp_path / "l.csv").write_text("recording,start,end,label\n" + rows)
+    pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+    assert len(pieces.demonstrations) == 1
+    (problem,) = pieces.problems
+    expected = "expected a recording q.csv among those that are read, found none, and 1 row more"
+    assert problem.what == f"line 3: {expected}"
+
+
+def test_a_stretch_that_is_labeled_twice_is_a_problem_that_names_both_lines(tmp_path, recordings):
+    (tmp_path / "l.csv").write_text("start,end,label\n1000.5,1001.75,wave\n1000.5,1001.75,nod\n")
+    pieces = labeled_pieces(recordings, read_labels(tmp_path / "l.csv"))
+    assert pieces.demonstrations.labels.tolist() == ["wave"]
+    assert [one.what for one in pieces.problems] == ["line 3: expected one label for a stretch, line 2 has it too"]
 
 
 def test_columns_say_which_recording_a_row_is_of(tmp_path, recordings):

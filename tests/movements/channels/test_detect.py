@@ -100,7 +100,9 @@ def test_a_kind_that_cannot_be_is_refused(given, words):
         found("x", **given)
 
 
-@pytest.mark.parametrize(("head", "unit"), [("x [mm]", "mm"), ("elbow (deg)", "deg"), ("yaw_rad", "rad"), ("x", None)])
+@pytest.mark.parametrize(
+    ("head", "unit"), [("x [mm]", "mm"), ("elbow (deg)", "deg"), ("yaw_rad", "rad"), ("x_mm", "mm"), ("x", None)]
+)
 def test_units_in_heads(head, unit):
     assert unit_of(head) == unit
 

@@ -135,12 +135,15 @@ def test_what_cannot_be_is_refused():
         r"parameters 1: expected finite": [0.1, np.nan, 0.3],
         r"at least 4 demonstrations for 2 parameters.*got 3": [[0.1, 1], [0.2, 0], [0.3, 5]],
         r"parameter 0 to differ between demonstrations, got 0.5": [0.5, 0.5, 0.5],
+        r"all demonstrations but one.*got demonstration 1 alone": [0.5, 0.6, 0.5],
     }
     for message, parameters in wrong.items():
         with pytest.raises(TrajectoryError, match=message):
             Contextual().fit(demos, parameters)
     with pytest.raises(TrajectoryError, match="none follows from the others"):
         Contextual().fit([lift(h) for h in (0.1, 0.2, 0.3, 0.4)], [[1, 2], [2, 4], [3, 6], [4, 8]])
+    with pytest.raises(TrajectoryError, match=r"expected kineme.Primitives, got RhythmicPrimitives"):
+        Contextual().fit(kineme.RhythmicDMP().learn([np.sin(np.linspace(0, 20, 200))]), [1.0])
     with pytest.raises(SpecificationError, match="expected regression to be one of"):
         Contextual(regression="cubic").fit(demos, heights)
     with pytest.raises(SpecificationError, match="expected noise to be a number above 0"):

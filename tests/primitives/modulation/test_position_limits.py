@@ -43,6 +43,16 @@ def test_the_change_is_the_smoothest_there_is(learned):
     np.testing.assert_allclose(learned[0].rollout(via=via).positions[0, :, 0], inside[:, 0], atol=1e-5)
 
 
+def test_a_stretch_of_more_points_than_can_be_met_stays(learned):
+    plain = learned[0].rollout().positions[0]
+    via = [((160 / 199, 189 / 199), plain[160:190])]
+    free = learned[0].rollout(via=via).positions[0]
+    inside = learned[0].rollout(via=via, position_limits=([-30.0, -17.0], [20.0, 40.0])).positions[0]
+    assert free[:, 1].min() < -19.0
+    assert inside[:, 1].min() > -17.0 - 1e-6
+    np.testing.assert_allclose(inside[160:190], free[160:190], atol=1e-4)
+
+
 def test_movements_inside_are_as_they_were(learned):
     wide = learned.rollout(position_limits=(-100.0, 100.0)).positions
     np.testing.assert_allclose(wide, learned.rollout(via=[]).positions, atol=1e-12)

@@ -267,6 +267,19 @@ class TestRefusals:
         ):
             learned.rollout(via=[(0.5, points)])
 
+    @pytest.mark.parametrize(
+        "asked",
+        [
+            {"via": [(1e-4, [-25.0, -5.0])]},
+            {"via": [(0.4, [-25.0, -5.0]), (0.4 + 1e-7, [-25.0, -4.0])]},
+            {"end_velocity": [1e3, 0.0]},
+        ],
+        ids=["near the start", "near each other", "velocity"],
+    )
+    def test_a_change_that_leads_far_away_is_said(self, learned, asked):
+        with pytest.warns(ExtrapolationWarning, match=r"1 of 1 movements are led far away .*: movement 0 by \d"):
+            learned[0].rollout(**asked)
+
     def test_a_controller_takes_points_of_one_movement(self, learned):
         with pytest.raises(SpecificationError, match="one primitive to control, got 3"):
             learned[0].controller(0.01, via=[(0.5, np.zeros((3, 2)))])

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme import DMP, Demonstrations, ExtrapolationWarning, SpecificationError, TrajectoryError
 from kineme.primitives.styles.parameters import path_matrix, to_numbers
 from kineme.styles import average
 
@@ -210,3 +210,21 @@ def test_what_cannot_be_is_refused(demonstrate, asked, error, message):
     mean = average(DMP(n_basis=15).learn(demonstrate(9)))
     with pytest.raises(error, match=message):
         mean.condition(**asked)
+
+
+def test_a_duration_that_is_no_movements_is_refused(dmp):
+    shown = [np.column_stack((u := np.linspace(0, 1, 50), (1 + 0.1 * k) * u**2)) for k in range(4)]
+    times = [(1.0 + 0.1 * k) * np.linspace(0, 1, 50) for k in range(4)]
+    mean = average(dmp.learn(Demonstrations.from_arrays(shown, times=times)))
+    with (
+        pytest.warns(ExtrapolationWarning, match="outside what was demonstrated"),
+        pytest.raises(SpecificationError, match=r"its duration would change by a factor of 10\^\d.*larger std"),
+    ):
+        mean.condition(t=0.9, position=[np.nan, 1e6])
+
+
+def test_one_demonstration_that_nothing_is_known_to_vary_with_stays(dmp, demonstrate):
+    mean = average(dmp.learn(demonstrate(9))[0])
+    point = mean.primitive.rollout(n_samples=3).positions[0, 1]
+    same = mean.condition(t=0.5, position=point + 0.1, std=0.1).primitive
+    np.testing.assert_allclose(same.rollout().positions, mean.primitive.rollout().positions, atol=1e-9)

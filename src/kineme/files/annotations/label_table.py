@@ -10,9 +10,10 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.files.annotations.audacity import UNKNOWN
 
-_START = re.compile(r"(start|begin|onset|from)\b|(start|begin)[ _]?time")
-_END = re.compile(r"(end|stop|offset|to)\b|(end|stop)[ _]?time")
-_MILLISECONDS = re.compile(r"(?<!\.)\b(ms|msec|milliseconds?)\b\W*$")
+_UNIT = r"(\b|_(s|sec|seconds?|ms|msec|milliseconds?)$)"
+_START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")
+_END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
+_MILLISECONDS = re.compile(r"(?<![.a-z])(ms|msec|milliseconds?)\b\W*$")
 _LABELS = frozenset(
     {"label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture"}
 )

@@ -16,6 +16,7 @@ from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements
+from kineme.output.text import counted
 from kineme.validation import MIN_SAMPLES, Array
 
 
@@ -24,8 +25,8 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
 
     A stretch begins and ends at the samples nearest to its times. Times by the recording's clock that all lie outside
     of it, and would fit counted from its first sample, are taken so. Columns named recording and place say which
-    recording a row is of; without them there must be one. A stretch outside of its recording, or of fewer than four
-    samples, is a problem.
+    recording a row is of; without them there must be one. A stretch outside of its recording, of fewer than four
+    samples, or labeled twice is a problem, and so are rows of recordings that are not there.
 
     Raises
     ------
@@ -40,16 +41,21 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
         )
     stretches: list[tuple[int, int]] = []
     sources: list[Source] = []
-    problems = list(recordings.problems)
+    problems = [*recordings.problems, *_of_none(table, recordings.sources)]
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
         own = [row for row in rows if _is_of(row, source)]
         times = demos.movements.stamps[first:last]
         since = table.since_start or _counts_from_start(own, times)
+        lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
         for row in own:
             start, stop = _samples(row, times, float(times[0]) if since else 0.0)
             if stop - start < MIN_SAMPLES:
                 problems.append(Problem(table.name, row.line, _too_short(row, source, times, since)))
+            elif (line := lines.setdefault((start, stop), row.line)) != row.line:
+                problems.append(
+                    Problem(table.name, row.line, f"expected one label for a stretch, line {line} has it too")
+                )
             else:
                 stretches.append((int(first) + start, int(first) + stop))
                 sources.append(source._replace(place=_place(source, times, start, stop), label=row.label))
@@ -61,6 +67,18 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     return replace(
         recordings, demonstrations=_cut(demos, stretches, sources), sources=tuple(sources), problems=tuple(problems)
     )
+
+
+def _of_none(table: LabelTable, sources: Sequence[Source]) -> list[Problem]:
+    """The rows of recordings that are not there, as one problem."""
+    lost = [row for row in table.rows if not any(_is_of(row, source) for source in sources)]
+    if not lost:
+        return []
+    wanted = f"{lost[0].recording} {lost[0].place}".strip()
+    more = f", and {counted(len(lost) - 1, 'row')} more" if len(lost) > 1 else ""
+    return [
+        Problem(table.name, lost[0].line, f"expected a recording {wanted} among those that are read, found none{more}")
+    ]
 
 
 def _is_of(row: LabelRow, source: Source) -> bool:

@@ -69,6 +69,7 @@ _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
 _LEVELS = 8  # different values of a discrete channel, at most
 _UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 _UNITS_IN_WORDS = {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "radian": "rad", "radians": "rad"}
+_UNITS_IN_WORDS |= {"mm": "mm", "cm": "cm"}
 
 
 def find_channels(

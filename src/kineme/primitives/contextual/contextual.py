@@ -11,9 +11,11 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.primitives.batch import Batch
 from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.parameters import (
+    check_primitives,
     from_numbers,
     map_rows,
     path_matrix,
@@ -24,6 +26,7 @@ from kineme.primitives.styles.parameters import (
 from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
 
 _SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
+_ALONE = 1e-9  # of the leverage: a demonstration that differs from all others alone
 _AS_GOOD, _EXACT = 1.05, 1e-6  # times the least error; times that of ignoring the parameters
 REGRESSIONS = ("auto", "linear", "gaussian-process")
 
@@ -108,7 +111,7 @@ class Contextual(BaseEstimator):
         ------
         TrajectoryError
             Movements that cannot be used, too few of them, or parameters of another number or shape, not finite, equal
-            in all demonstrations or depending on each other.
+            in all demonstrations or in all but one, or depending on each other.
         SpecificationError
             A parameter of the estimator out of its range.
         """
@@ -172,6 +175,8 @@ class Contextual(BaseEstimator):
 
     def _learned(self, movements: Primitives | MovementsLike) -> Primitives:
         if not isinstance(movements, Primitives):
+            if isinstance(movements, Batch):
+                check_primitives(movements)
             return (DMP() if self.dmp is None else self.dmp).learn(movements)
         if self.dmp is not None and movements.dmp != self.dmp:
             raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {movements.dmp}")
@@ -232,7 +237,18 @@ def _as_parameters(parameters: ArrayLike, n: int) -> Array:
         )
     if np.linalg.matrix_rank(deviations / lengths, tol=1e-9) < k:
         raise TrajectoryError(f"expected {k} parameters of which none follows from the others; leave out those that do")
+    _check_alone(deviations / lengths)
     return C.copy()
+
+
+def _check_alone(deviations: Array) -> None:
+    """Refuse a demonstration without which the others say nothing about a parameter: it cannot be left out."""
+    leverage = 1.0 / len(deviations) + np.sum(np.linalg.qr(deviations)[0] ** 2, axis=1)
+    if leverage.max() > 1.0 - _ALONE:
+        raise TrajectoryError(
+            f"expected parameters that differ independently in all demonstrations but one, too, so that it can be left "
+            f"out, got demonstration {np.argmax(leverage)} alone with its own; demonstrate another one like it"
+        )
 
 
 def _as_tasks(parameters: ArrayLike, k: int) -> Array:

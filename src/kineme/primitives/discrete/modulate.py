@@ -37,6 +37,8 @@ from kineme.validation import Array
 _WORTH = 10.0  # demonstrations; so much the smoothness of changes counts beside the spread of demonstrations
 _SLACK = 1e-6  # of a row's own deviation: of the points of a stretch, which may be more than can be met
 _LOOSE = 1e-3  # of the extent: a stretch that is met less closely is said
+_WIDE = 3.0  # times the extent and what is missing: a change that leads farther away is said
+_LOOKS = 3  # samples of a change for each basis function
 
 
 def modulated(
@@ -71,14 +73,15 @@ def modulated(
         change = _smooth_change(movement, asked, observed, errors)
     else:
         change = _shown_change(movement, asked, observed, errors, factor)
-    if asked.stretch.any():
-        _warn_loose(movement, asked, errors - change.coefficients @ (change.directions @ observed.weights.T))
+    missing = errors - change.coefficients @ (change.directions @ observed.weights.T) if asked.stretch.any() else None
+    if missing is None or not _warn_loose(movement, asked, missing):
+        _warn_wide(movement, change, _distances(asked, errors))
     fixed = movement.fixed_velocity or (velocity is not None and bool(velocity.any()))
     movement = replace(movement, change=change, fixed_velocity=fixed)
     return (
         movement
         if position_limits is None
-        else within_limits(movement, position_limits, asked.points, observed.weights)
+        else within_limits(movement, position_limits, asked.points, observed.weights, _slack(asked))
     )
 
 
@@ -204,17 +207,37 @@ def _warn_far(movement: Rollout, asked: ViaPoints, errors: Array) -> None:
         )
 
 
-def _warn_loose(movement: Rollout, asked: ViaPoints, missing: Array) -> None:
-    """Say how far a movement stays from a stretch that it cannot follow."""
-    if not asked.stretch.any():
-        return
+def _warn_loose(movement: Rollout, asked: ViaPoints, missing: Array) -> bool:
+    """Say how far a movement stays from a stretch that it cannot follow; whether there is one."""
     distances = _distances(asked, missing).max(axis=1)
     share = distances / _extents(movement)
-    if (share > _LOOSE).any():
+    loose = bool((share > _LOOSE).any())
+    if loose:
         i = int(np.argmax(share))
         warnings.warn(
             f"movement {i} stays {distances[i]:.3g} from its via stretch, {100 * share[i]:.2g} % of its extent: the "
             f"stretch bends more than {movement.primitives.dmp.n_basis} basis functions can; use more, or fewer points",
+            ExtrapolationWarning,
+            stacklevel=4,
+        )
+    return loose
+
+
+def _warn_wide(movement: Rollout, change: Change, distances: Array) -> None:
+    """Say how far a change leads a movement away from its path, if that is much farther than what was missing."""
+    dmp, extents = movement.primitives.dmp, _extents(movement)
+    much = _WIDE * np.maximum(extents, distances.max(axis=1, initial=0.0))
+    looks = change.directions @ decoder(dmp, _LOOKS * dmp.n_basis).Phi[0].T
+    farthest = (np.abs(change.coefficients) @ np.abs(looks).max(axis=1)).max(axis=1)  # at most
+    near = np.flatnonzero(farthest > much)
+    farthest[near] = np.abs(change.coefficients[near] @ looks).max(axis=(1, 2))
+    wide = farthest > much
+    if wide.any():
+        i = int(np.argmax(np.where(wide, farthest / extents, 0.0)))
+        warnings.warn(
+            f"{wide.sum()} of {len(wide)} movements are led far away by their via points or end velocity: movement {i} "
+            f"by {farthest[i]:.3g}, which is {extents[i]:.3g} large; different places at almost the same time, or "
+            "close to the start or the end, need high velocities: move their times apart, or ask for a lower velocity",
             ExtrapolationWarning,
             stacklevel=4,
         )

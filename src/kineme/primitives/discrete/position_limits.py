@@ -26,10 +26,13 @@ _MISSED = 1e-6  # of the largest position: more than this is outside
 _INFEASIBLE = 1e-8  # residual of the nonnegative problem, 0 where no change is enough
 
 
-def within_limits(movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array) -> Rollout:
+def within_limits(
+    movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points: Array, held: Array, slack: Array
+) -> Rollout:
     """The movement within limits (low, high), each a number or (d,), with ``held @ W`` (K,) as it is.
 
-    `points` (1 or n, k, d) are those at which it is held.
+    `points` (1 or n, k, d) are those at which it is held, `slack` (K,) how
+    loosely, as a share of what each deviates under the covariance: more points of a stretch than can be met are held.
 
     Raises
     ------
@@ -38,10 +41,10 @@ def within_limits(movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points
     """
     low, high = _limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
-    slack = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
+    rounding = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
     held_at = {"start": movement.starts[:, None], "goal": movement.arrivals[:, None], "via points": points}
     for name, places in held_at.items():
-        outside = (places < low - slack[:, None]) | (places > high + slack[:, None])
+        outside = (places < low - rounding[:, None]) | (places > high + rounding[:, None])
         if outside.any():
             i, j, k = (int(index) for index in np.argwhere(outside)[0])
             raise SpecificationError(
@@ -49,10 +52,11 @@ def within_limits(movement: Rollout, limits: tuple[ArrayLike, ArrayLike], points
                 f"{i}, where they are {low[k]:g} and {high[k]:g}"
             )
     path = replace(movement, n_samples=dmp.n_points, end=1.0).positions  # (n, T, d)
-    leaves = ((path < low - slack[:, None]) | (path > high + slack[:, None])).any(axis=1)
+    leaves = ((path < low - rounding[:, None]) | (path > high + rounding[:, None])).any(axis=1)
     if not leaves.any():
         return movement
-    factor = condition(smoothness_factor(dmp), held).factor
+    smooth = smoothness_factor(dmp)
+    factor = condition(smooth, held, slack * np.linalg.norm(held @ smooth.T, axis=1)).factor
     effect = decoder(dmp, dmp.n_points).Phi[0] @ factor.T
     dense = np.zeros((*movement.starts.shape, dmp.n_basis))
     for i, k in np.argwhere(leaves):

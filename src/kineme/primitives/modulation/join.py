@@ -57,7 +57,7 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
         With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
         that part which has most; the movements of a batch share one specification, so all have as many as the one that
         needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
-        same; discrete channels step when they did in the parts, in an overlap from its middle on as the next part.
+        same; discrete channels step when they did in the parts, those of each part until the next one begins.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
         path += share[:, :, None] * _at(part, (times - begin[:, None]) / part.durations[:, None])
     when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
     made = _learned(dmp, path, times, laid[0], laid[-1])
-    return carried_over(made, movements, when, (begins[1:] + 0.5 * overlap) / total)
+    return carried_over(made, movements, when, begins[1:] / total)
 
 
 def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tuple[float, float]) -> Primitives:

@@ -13,7 +13,7 @@ from kineme.primitives.discrete.rollout import Rollout
 
 def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
     """All parts as primitives of the same number of movements."""
-    if isinstance(parts, (Primitives, Rollout)) or not len(parts):
+    if isinstance(parts, (Primitives, Rollout)) or not isinstance(parts, Sequence) or not len(parts):
         raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
     for i, one in enumerate(parts):
         if not isinstance(one, (Primitives, Rollout)):

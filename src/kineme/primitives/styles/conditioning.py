@@ -31,6 +31,7 @@ _STEPS = 50
 _RARE = 0.0027  # share of demonstrations beyond three standard deviations, in one dimension
 _NOTHING = 1e-7  # of the extent: deviations below it are rounding, of what was met exactly before
 _MET = 1e-6  # of the extent
+_TEMPO = float(np.log(1e6))  # larger changes of the duration are no movement
 _KINDS = ("position", "velocity")
 
 
@@ -56,12 +57,18 @@ class _Rows(NamedTuple):
 def updated(
     primitive: Primitives, factor: Array, tempo_factor: Array, kinds: tuple[Observations | None, Observations | None]
 ) -> Updated:
-    """Condition the mean and the factors of an average on positions and velocities."""
+    """Condition the mean and the factors of an average on positions and velocities.
+
+    Raises
+    ------
+    SpecificationError
+        What cannot be met, or only with a duration that is no movement's.
+    """
     d, n_numbers = factor.shape[1:]
     rows = _rows(primitive.dmp, d, kinds)
     theta = to_numbers(primitive).ravel()
     extent = float(primitive.extents.max())
-    both = np.column_stack((factor.reshape(len(factor), -1), tempo_factor))
+    both = np.column_stack((factor.reshape(len(factor), d * n_numbers), tempo_factor))
     tau, ln_tau = float(primitive.durations[0]), 0.0  # ln tau from that of the mean
     change, remaining = np.zeros(len(theta) + 1), both
     for step in range(_STEPS):
@@ -79,6 +86,12 @@ def updated(
         ln_tau = float(change[-1])
         if settled or not speed.any():
             break
+    if not abs(change[-1]) <= _TEMPO:
+        raise SpecificationError(
+            "expected positions and velocities that a movement like the demonstrations could have, got such that its "
+            f"duration would change by a factor of 10^{change[-1] / np.log(10.0):.3g}; demonstrate such a movement, or "
+            "give a larger std"
+        )
     return Updated(
         (theta + change[:-1]).reshape(1, d, n_numbers),
         primitive.durations * np.exp(change[-1]),

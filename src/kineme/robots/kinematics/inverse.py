@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.robot import Robot, check_robot
+from kineme.errors import DataError
+from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.validation import Array, check_choice, check_number
 
 #: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
@@ -53,6 +53,7 @@ class InverseKinematics:
         try:
             import pinocchio
             from pink import Configuration, solve_ik
+            from pink.exceptions import NoSolutionFound
             from pink.limits import ConfigurationLimit, VelocityLimit
             from pink.tasks import FrameTask, PostureTask
         except ImportError as error:
@@ -61,6 +62,7 @@ class InverseKinematics:
             check_number("time_step", time_step, above=0.0)
         self.robot = robot
         self._pose, self._solve, self._configuration_of = pinocchio.SE3, solve_ik, Configuration
+        self._unsolved: type[Exception] = NoSolutionFound
         self._data = robot.model.createData()
         self._time_step = 1.0 if time_step is None else time_step
         partial = 1.0 if robot.n_joints >= 6 else _PARTIAL
@@ -85,13 +87,7 @@ class InverseKinematics:
             Joints outside their limits.
         """
         robot = self.robot
-        outside = (q < robot.lower - 1e-9) | (q > robot.upper + 1e-9)
-        if outside.any():
-            i = int(np.argmax(outside))
-            raise SpecificationError(
-                f"expected {robot.joints[i]} to start within [{robot.lower[i]:.4g}, {robot.upper[i]:.4g}], "
-                f"got {q[i]:.4g}"
-            )
+        check_start(robot, q)
         q = np.clip(q, robot.lower, robot.upper)
         self._configuration = self._configuration_of(robot.model, self._data, q)
 
@@ -149,15 +145,18 @@ class InverseKinematics:
 
     def _advance(self) -> float:
         dt = self._time_step
-        velocity = self._solve(
-            self._configuration,
-            (self._tip, self._posture),
-            dt,
-            solver="daqp",
-            limits=self._limits,
-            safety_break=False,
-            damping=_DAMPING,
-        )
+        try:
+            velocity = self._solve(
+                self._configuration,
+                (self._tip, self._posture),
+                dt,
+                solver="daqp",
+                limits=self._limits,
+                safety_break=False,
+                damping=_DAMPING,
+            )
+        except self._unsolved:  # as of a pose beyond all numbers: the joints stay
+            return 0.0
         if self._fastest is not None:  # the solver keeps limits to 1e-6 only
             velocity = np.clip(velocity, -self._fastest, self._fastest)
         self._configuration.integrate_inplace(velocity, dt)

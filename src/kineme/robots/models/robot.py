@@ -18,6 +18,7 @@ from kineme.validation import Array, as_numbers, check_number
 
 _FOLDER = Path(__file__).parent
 _ACCELERATION = 5.0  # of joints whose file says none [rad/s^2 or m/s^2]
+_ROUNDING = 1e-6  # so far outside a limit a joint still counts as at it [rad, m]
 _VELOCITY = 1.0  # the same for velocities
 
 
@@ -82,6 +83,22 @@ def check_robot(robot: object) -> None:
         raise SpecificationError(f"expected a robot, as of kineme.robots.load('panda'), got {robot!r:.80}")
 
 
+def check_start(robot: Robot, q: Array) -> None:
+    """Refuse joint positions (n,) outside the limits, where a movement is to start.
+
+    Raises
+    ------
+    SpecificationError
+        The first such joint, with its limits.
+    """
+    inside = (q >= robot.lower - _ROUNDING) & (q <= robot.upper + _ROUNDING)
+    if not inside.all():
+        i = int(np.argmin(inside))
+        raise SpecificationError(
+            f"expected {robot.joints[i]} to start within [{robot.lower[i]:.4g}, {robot.upper[i]:.4g}], got {q[i]:.4g}"
+        )
+
+
 def load(
     robot: str | Path,
     tip: str | None = None,
@@ -112,11 +129,13 @@ def load(
         An unknown name; a rest posture of another number of joints or outside the limits.
     """
     pinocchio = _pinocchio()
-    path, default_tip, default_rest, name = _find(robot)
+    path, default_tip, default_rest, name = _find(robot, tip)
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    assumed = [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
+    known = MODELS.get(name) if path.parent == _FOLDER else None
+    assumed = [known.assumed] if known is not None and known.assumed else []
+    assumed += [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
     assumed += [f"{link} has no shape: its mesh is not there" for link in chain.without_shape]
     bounds = {
         "velocity": (velocity, max_velocity, _VELOCITY, "1/s"),
@@ -159,7 +178,11 @@ def _pinocchio() -> Any:
     return pinocchio
 
 
-def _find(robot: str | Path) -> tuple[Path, str | None, ArrayLike | None, str]:
+def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLike | None, str]:
+    if not isinstance(tip, str | None):
+        raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
+    if not isinstance(robot, str | os.PathLike):
+        raise SpecificationError(f"expected the name of a robot or the path of a .urdf file, got {robot!r:.80}")
     text = os.fspath(robot)
     if text in MODELS:
         return _FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
