@@ -145,6 +145,14 @@ def test_csv_for_other_programs_is_that_of_the_file(recording, library, tmp_path
     assert run("annotate", recording, "-l", library, "--csv", "--json").returncode == 2
 
 
+def test_recordings_of_which_none_can_be_searched_are_an_error(recording, library, tmp_path):
+    (tmp_path / "wide.csv").write_text("t,a,b,c\n" + "\n".join(f"{k / 50},{k},{k * k},1" for k in range(40)))
+    done = run("annotate", tmp_path / "wide.csv", "-l", library, "-o", tmp_path / "labels.csv")
+    assert done.returncode == 1
+    assert "expected recordings of 2 dimensions" in done.stderr
+    assert not (tmp_path / "labels.csv").exists()
+
+
 def test_a_table_of_labels_cuts_a_long_recording_into_symbols(recording, truth, tmp_path):
     table = pandas.DataFrame(truth, columns=["start", "end", "label"])
     table.to_csv(tmp_path / "labels.csv", index=False)

@@ -179,3 +179,19 @@ def test_people_from_a_column_of_a_table(tmp_path):
     done = run("learn", tmp_path / "a.csv", "--person-column", "who", "--person", "eve", "-l", library)
     assert "expected --person, or people from --person-column or --label-pattern, not both" in done.stderr
     assert "person who" in run("inspect", tmp_path / "a.csv", "--person-column", "who").stdout
+
+
+def test_what_has_no_symbol_says_what_next(recordings, tmp_path):
+    done = run("learn", recordings, "--no-labels", "-l", tmp_path / "library")
+    assert "14 movements have no symbol: say it with --label NAME, or find groups with kineme anchor" in done.stdout
+    assert answer("learn", recordings, "--label", "a", "-l", tmp_path / "library")["without_symbol"] == 0
+
+
+def test_a_label_that_is_not_taken_is_said(recordings, tmp_path):
+    name = sorted(recordings.glob("*/*"))[0]
+    answer("learn", name, "--label", "wave", "-l", tmp_path / "library")
+    done = run("learn", name, "--label", "other", "-l", tmp_path / "library")
+    assert "1 movement known as wave already: the label other is not taken; kineme library" in done.stdout
+    again = answer("learn", name, "--label", "other", "-l", tmp_path / "library")
+    assert again["kept"] == [{"symbol": "wave", "label": "other", "movements": 1}]
+    assert "no symbol" not in done.stdout

@@ -7,7 +7,7 @@ import pytest
 import kineme
 from kineme.errors import SpecificationError
 from kineme.files.inspection.inspect import inspect
-from kineme.orientation import exp, product
+from kineme.orientation import PoseDMP, exp, product
 
 HEADS = "frame_index,Sub Frame,t,pose.position.x," + ",".join(f"pose.orientation.{part}" for part in "xyzw")
 N = 60
@@ -177,3 +177,22 @@ def test_columns_of_a_quaternion_that_stand_apart_are_read_alike_from_files_and_
     for one in (kineme.read_recordings(tmp_path / "apart.csv").demonstrations, kineme.Demonstrations.of(frame)):
         assert one.dimensions == ("q.rx", "q.ry", "q.rz", "x", "y")
         np.testing.assert_allclose(one.recorded, np.column_stack([q, u**2, 1 - u]), atol=1e-12)
+
+
+def test_a_quaternion_that_is_none_costs_its_sample_alone_where_that_is_asked_for(tmp_path):
+    write(tmp_path / "0.csv", spoiled=7)
+    write(tmp_path / "1.csv")
+    recordings = kineme.read_recordings(tmp_path, skip="sample")
+    assert np.diff(recordings.demonstrations.offsets).tolist() == [N - 1, N]
+    (problem,) = recordings.problems
+    assert problem.file == "0.csv"
+    assert "expected unit quaternions" in problem.reason
+    assert problem.reason.endswith("this sample left out")
+
+
+def test_the_rollout_of_poses_has_the_channels_of_the_recording_and_one_of_rotation_vectors_has_none(tmp_path):
+    write(tmp_path / "0.csv")
+    demos = kineme.read_recordings(tmp_path / "0.csv").demonstrations
+    poses = kineme.Demonstrations.of(PoseDMP().learn(demos).rollout())
+    assert [(one.name, one.kind) for one in poses.channels] == [(one.name, one.kind) for one in demos.channels]
+    assert kineme.Demonstrations.of(kineme.DMP().learn(demos).rollout()).channels is None

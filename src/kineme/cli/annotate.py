@@ -13,7 +13,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, force_option, json_option, library_option
 from kineme.cli.output import check_new, say, write
-from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
 
 
@@ -64,20 +64,21 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.library.recognition.annotate import annotate as find
 
     as_json, as_csv, force, error_rate = (options.pop(one) for one in ("as_json", "as_csv", "force", "error_rate"))
-    parsed = read(recordings, options)
-    movements = [(source.path, source.place) for source in parsed.sources]
-    sources = [one for path in recordings for one in expanded(path)]
     if as_csv and (as_json or output is not None):
         raise click.UsageError("expected --csv alone, or --json, or --output")
     if output is None and form is not None:
         raise click.UsageError("expected --output with --format")
-    if output is not None:
-        for target in targets_of(output, sources, movements, form):
-            check_new(target, force, *sources, *paths_of(recordings, parsed))
-            _check_folder(target, force)
-    with ActionLibrary(folder, read_only=True) as library, _progress(parsed) as progress:
-        found = find(library.store, parsed, error_rate, progress)
-        notes = differences(library.channels, parsed.demonstrations.channels)
+    sources = [one for path in recordings for one in expanded(path)]
+    with ActionLibrary(folder, read_only=True) as library:
+        parsed = read(recordings, options, library)
+        movements = [(source.path, source.place) for source in parsed.sources]
+        if output is not None:
+            for target in targets_of(output, sources, movements, form):
+                check_new(target, force, *sources, *paths_of(recordings, parsed))
+                _check_folder(target, force)
+        with _progress(parsed) as progress:
+            found = find(library.store, parsed, error_rate, progress)
+        notes = chosen_topics(parsed) + differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {
         "annotations": [as_row(one) for one in found.annotations],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -71,6 +72,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "added": report.added,
             "known": report.known,
             "joined": _joined(library, before) if report.known else 0,
+            **_named(library, report.ids, labels),
             "symbols": list(report.symbols),
             "movements": len(library),
             "people": sorted({one for one in people or () if one is not None}),
@@ -122,6 +124,22 @@ def _joined(library: Any, before: int) -> int:
     return len(np.setdiff1d(library.at(before).unlabeled(), library.unlabeled()))
 
 
+def _named(library: Any, ids: Any, labels: list[Any]) -> dict[str, Any]:
+    """How many movements have no symbol, and the labels that were not taken since a movement has another symbol."""
+    from kineme.library.storage.read import names_of
+
+    names = names_of(library.store, ids)
+    kept = Counter(
+        (symbol, label)
+        for symbol, label in zip(names, labels, strict=True)
+        if symbol is not None and label is not None and symbol != label
+    )
+    return {
+        "without_symbol": sum(one is None for one in names),
+        "kept": [{"symbol": one[0], "label": one[1], "movements": n} for one, n in kept.items()],
+    }
+
+
 @contextmanager
 def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
     """A progress bar on a terminal; it takes the number of movements done and the number of all."""
@@ -139,6 +157,16 @@ def _text(data: dict[str, Any]) -> str:
     problems, people = data["problems"], data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""
     lines = [f"learned {counted(data['added'], 'movement')}{known}{new}{by}; {held}"]
+    for kept in data["kept"]:
+        lines.append(
+            f"{counted(kept['movements'], 'movement')} known as {printable(kept['symbol'])} already: the label "
+            f"{printable(kept['label'])} is not taken; kineme library rename, merge and split change symbols"
+        )
+    if n := data["without_symbol"]:
+        verb = "has" if n == 1 else "have"
+        lines.append(
+            f"{counted(n, 'movement')} {verb} no symbol: say it with --label NAME, or find groups with kineme anchor"
+        )
     lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
     if len(problems) > _SHOWN:
         lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")

@@ -134,8 +134,11 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
     return click.argument("recordings", nargs=-1, required=True, type=Recording())(command)
 
 
-def read(paths: Path | Sequence[Path], options: dict[str, Any]) -> Any:
-    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`."""
+def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
+    """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
+
+    Where a bag has several topics and none is asked for, it is read as the movements of `library` were.
+    """
     from kineme.files.limits import read_limited
     from kineme.files.name_rule import NameRule
     from kineme.files.recordings import read_paths
@@ -144,11 +147,26 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any]) -> Any:
     known = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
     how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
+    if library is not None and not (known.get("topic") or known.get("frame")):
+        from kineme.library.recognition.known_sources import known_sources
+
+        known["known"] = known_sources(library.store)
     known["kinds"] = dict(known.get("kinds") or ()) or None
     several = [paths] if isinstance(paths, Path) else list(paths)
     files = [one for one in several if str(one) != "-"]
     given = None if len(files) == len(several) else (STANDARD_INPUT, read_limited(sys.stdin.buffer))
     return read_paths(files, Layout(**known), rule, **how, progress=_watched, standard_input=given)
+
+
+def chosen_topics(parsed: Any) -> list[str]:
+    """A sentence for each topic or frame that was read since the movements of the library were read from such."""
+    from kineme.movements.tables.layout import AS_KNOWN
+
+    return [
+        f"Read {one.layout.removesuffix(AS_KNOWN)}, as the movements of the library; say --topic or --frame for others"
+        for one in dict(parsed.detected)
+        if one.layout.endswith(AS_KNOWN)
+    ]
 
 
 def _watched(files: Any) -> Any:

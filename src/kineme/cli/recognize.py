@@ -11,7 +11,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, json_option, library_option, whole
 from kineme.cli.output import say
-from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
 from kineme.output.text import printable
 
 _SMALLEST = 0.001  # p-value that is shown; JSON has all digits
@@ -44,10 +44,10 @@ def recognize(
     """
     from kineme.library.library import ActionLibrary
 
-    parsed = read(recordings, options)
     with ActionLibrary(folder, read_only=True) as library:
+        parsed = read(recordings, options, library)
         answers = _recognized(library, parsed.demonstrations, error_rate)
-        notes = differences(library.channels, parsed.demonstrations.channels)
+        notes = chosen_topics(parsed) + differences(library.channels, parsed.demonstrations.channels)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [_as_data(source, one, stored, top) for source, one in zip(parsed.sources, answers, strict=True)],

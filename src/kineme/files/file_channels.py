@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kineme.errors import TrajectoryError
-from kineme.files.check_block import movement_of, take_movements
+from kineme.files.check_block import check_block, movement_of, take_movements
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels, is_plain
@@ -20,13 +20,16 @@ from kineme.movements.tables.parsed import Block
 _HINT = "check the order of the columns, or divide the quaternions by their norms"
 
 
-def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRead], Channels | None, list[Problem]]:
+def with_channels(
+    files: Sequence[FileRead], given: Given, skip: str = "movement"
+) -> tuple[list[FileRead], Channels | None, list[Problem]]:
     """The channels of files with equally many columns, the files that have them, and problems.
 
     Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
     continuously is a position in all of them. Files of other heads are merged
     by the order of their columns while all are positions or angles, without the wraps of angles, and then nothing is
-    known of the channels; else they are problems.
+    known of the channels; else they are problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
+    ``"sample"`` that sample alone.
 
     Raises
     ------
@@ -43,7 +46,7 @@ def with_channels(files: Sequence[FileRead], given: Given) -> tuple[list[FileRea
         for one in files
         if one.detected and one.detected.columns != heads
     ]
-    checked = [_check_orientations(_in_order(one, channels), channels) for one in same]
+    checked = [_check_orientations(_in_order(one, channels), channels, skip) for one in same]
     return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]
 
 
@@ -88,19 +91,25 @@ def _in_order(one: FileRead, channels: Channels) -> FileRead:
     return one._replace(block=replace(block, positions=in_order(block.positions, heads, channels)))
 
 
-def _check_orientations(one: FileRead, channels: Channels) -> tuple[FileRead, list[Problem]]:
-    """A file without the movements in which a quaternion is not of norm 1."""
-    block, problems = _block(one), []
+def _check_orientations(one: FileRead, channels: Channels, skip: str) -> tuple[FileRead, list[Problem]]:
+    """A file without the movements, or the samples alone, in which a quaternion is not of norm 1."""
+    block, problems, faults = _block(one), [], dict[int, str]()
     good = np.ones(len(block.labels), dtype=bool)
     for channel, odd, norms in off_norm(block.positions, channels):
-        owners, firsts = np.unique(np.searchsorted(block.offsets, odd, side="right") - 1, return_index=True)
-        for i, k in zip(owners.tolist(), odd[firsts].tolist(), strict=True):
-            reason = (
-                f"{movement_of(block, i)}expected unit quaternions in {', '.join(channel.columns)}, got norm "
-                f"{norms[k]:.6g} at sample {k - block.offsets[i]}; {_HINT}"
-            )
-            problems.append(Problem(one.path, block.line_of(block.row(k)), reason, TrajectoryError))
+        owners = np.searchsorted(block.offsets, odd, side="right") - 1
+        reasons = [
+            f"expected unit quaternions in {', '.join(channel.columns)}, got norm {norms[k]:.6g} at sample "
+            f"{k - block.offsets[i]}; {_HINT}"
+            for i, k in zip(owners.tolist(), odd.tolist(), strict=True)
+        ]
+        faults |= dict(zip((block.row(k) for k in odd.tolist()), reasons, strict=True))
+        for i, first in zip(*map(np.ndarray.tolist, np.unique(owners, return_index=True)), strict=True):
+            line = block.line_of(block.row(int(odd[first])))
+            problems.append(Problem(one.path, line, movement_of(block, i) + reasons[first], TrajectoryError))
         good[owners] = False
+    if faults and skip == "sample":
+        block, problems = check_block(replace(block, faults=faults), one.path, skip)
+        return one._replace(block=block), problems
     return one._replace(block=take_movements(block, good)), problems
 
 

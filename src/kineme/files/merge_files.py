@@ -123,7 +123,11 @@ class Recordings(MovementSequence):
 
 
 def merge_files(
-    files: Sequence[FileRead], where: str, problems: Sequence[Problem] = (), kinds: Given | None = None
+    files: Sequence[FileRead],
+    where: str,
+    problems: Sequence[Problem] = (),
+    kinds: Given | None = None,
+    skip: str = "movement",
 ) -> Recordings:
     """One `Recordings` of all files that hold movements.
 
@@ -136,6 +140,8 @@ def merge_files(
         Those known before.
     kinds : mapping, optional
         Kinds of channels that are given, see `kineme.movements.channels.detect.find_channels`.
+    skip : {"movement", "sample"}
+        What a quaternion that is not of norm 1 costs.
 
     Raises
     ------
@@ -159,7 +165,7 @@ def merge_files(
     ]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
     understood = {one.path: one.detected for one in full}
-    full, channels, odd_channels = with_channels(in_one_order(full), kinds or {})
+    full, channels, odd_channels = with_channels(in_one_order(full), kinds or {}, skip)
     listed += odd_channels
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")

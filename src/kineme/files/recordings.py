@@ -132,7 +132,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         one = read_file(path, relative, layout, follow_links)
         one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
         read.append(rule.apply(one, path))
-    recordings = merge_files(read, in_words(where), problems, layout.kinds)
+    recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip)
     if layout.person is not None and recordings.people is None:
         raise DataError(
             f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "

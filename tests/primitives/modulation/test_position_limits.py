@@ -53,6 +53,15 @@ def test_a_stretch_of_more_points_than_can_be_met_stays(learned):
     np.testing.assert_allclose(inside[160:190], free[160:190], atol=1e-4)
 
 
+def test_a_free_dimension_of_a_via_point_is_not_held(learned):
+    plain = learned[0].rollout(n_samples=101).positions[0]
+    k = int(np.argmin(plain[:, 0]))
+    via = [(k / 100, [np.nan, plain[k, 1] + 2.0])]
+    path = learned[0].rollout(via=via, position_limits=([-17.0, -40.0], [30.0, 40.0]), n_samples=101).positions[0]
+    assert path[:, 0].min() > -17.0 - 1e-2
+    np.testing.assert_allclose(path[k, 1], plain[k, 1] + 2.0, atol=1e-9)
+
+
 def test_movements_inside_are_as_they_were(learned):
     wide = learned.rollout(position_limits=(-100.0, 100.0)).positions
     np.testing.assert_allclose(wide, learned.rollout(via=[]).positions, atol=1e-12)

@@ -10,7 +10,8 @@ from kineme.errors import DataError
 from kineme.files.ros.bags import Bag, Topic
 from kineme.files.ros.frames import Edge, connected_graph, transform_topics
 from kineme.files.ros.message_types import TRANSFORMS, TYPES
-from kineme.movements.tables.layout import Layout
+from kineme.files.ros.topic_columns import fitting_topics
+from kineme.movements.tables.layout import Known, Layout
 from kineme.output.text import counted
 from kineme.validation import MIN_SAMPLES
 
@@ -19,11 +20,15 @@ FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
 
 
 class Choice(NamedTuple):
-    """Topics in the order that was asked for, and pairs of frames, which come first, with the topics they are from."""
+    """Topics in the order that was asked for, and pairs of frames, which come first, with the topics they are from.
+
+    `as_known`: nobody asked for them; they are what the movements to compare with were read from.
+    """
 
     topics: tuple[Topic, ...]
     frames: tuple[Edge, ...] = ()
     transforms: tuple[Topic, ...] = ()
+    as_known: bool = False
 
 
 def choose(bag: Bag, layout: Layout) -> Choice:
@@ -46,6 +51,8 @@ def choose(bag: Bag, layout: Layout) -> Choice:
     candidates = [one for one in bag.topics if can_be_read(one)]
     if len(candidates) == 1 and not transforms:
         return Choice((candidates[0],))
+    if layout.known is not None and (known := _as_known(bag, layout.known, candidates)):
+        return known._replace(as_known=True)
     if transforms and not candidates:
         return Choice((), (_only_frames(bag, transforms),), transforms)
     if candidates:
@@ -55,6 +62,21 @@ def choose(bag: Bag, layout: Layout) -> Choice:
             f"topic=, in the shell --topic {candidates[0].name}{frame}"
         )
     raise DataError(f"expected a topic of movements, got {listed_topics(bag.topics)}")
+
+
+def _as_known(bag: Bag, known: Known, candidates: Sequence[Topic]) -> Choice | None:
+    """What the movements to compare with were read from, or the only topic with such columns; None if that is open."""
+    choices = []
+    for topics, frames in known.choices:
+        try:
+            choice = choose(bag, Layout(topic=topics, frame=frames))
+        except DataError:
+            continue
+        if choice.transforms or not choice.frames:
+            choices.append(choice)
+    if not choices:
+        choices = [Choice((one,)) for one in fitting_topics(bag, candidates, known)]
+    return choices[0] if len(choices) == 1 else None
 
 
 def can_be_read(topic: Topic) -> bool:

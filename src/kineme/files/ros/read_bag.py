@@ -18,7 +18,7 @@ from kineme.files.ros.message_types import TYPES
 from kineme.files.ros.paths import Paths, read_paths
 from kineme.files.ros.streams import Stream, read_streams
 from kineme.movements.tables.columns import Roles, column_numbers
-from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.layout import AS_KNOWN, Layout
 from kineme.movements.tables.parsed import Parsed, no_lines
 from kineme.movements.tables.table import Table, table_movements
 
@@ -63,11 +63,12 @@ def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
     columns = [*(each / SECOND for each in stamps), *one.values.T]
     what = [f"frames {parent}:{child}" for parent, child in choice.frames]
     what += [f"topic {topic.name} of {topic.type}" for topic in choice.topics]
+    said_what = ", ".join(what) + (AS_KNOWN if choice.as_known else "")
     heads = (*_CLOCKS, *one.heads)
     roles = _roles(heads, 0 if of_headers else 1, layout)
     table = Table(heads, columns, len(one.values), no_lines, dates_in="s")
     said = "stamps of headers" if of_headers else f"time of recording: {reason}" if reason else "as asked for"
-    return _parsed(table, roles, layout, (bag.kind, ", ".join(what), said), [*left_out, *lost])
+    return _parsed(table, roles, layout, (bag.kind, said_what, said), [*left_out, *lost])
 
 
 def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:

@@ -65,8 +65,11 @@ def annotate(
     ------
     SpecificationError
         No movement belongs to a symbol, or an error rate out of range.
+    TrajectoryError
+        The recordings have other columns than those of the library.
     """
     known = spotting_classes(store)
+    known.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
     annotations, problems, done = [], [], 0.0
     for one, source in zip(recordings.demonstrations, recordings.sources, strict=True):
         before = done

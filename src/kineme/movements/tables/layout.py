@@ -14,6 +14,28 @@ Column = str | int  # head, or number counted from 0
 
 SKIP = ("movement", "sample")
 
+#: What the layout of a file ends with if nobody asked for its topic or frame, see `Layout.known`.
+AS_KNOWN = ", as the movements to compare with"
+
+
+@dataclass(frozen=True)
+class Known:
+    """What movements that were read before were read from, for recordings that are compared with them.
+
+    Attributes
+    ----------
+    choices : tuple of (tuple of str, tuple of str)
+        Topics and frames of bags, each choice as it was asked for.
+    columns : tuple of str
+        Their columns; empty if these are not known.
+    n_orientations : int
+        How many quaternions are among the columns.
+    """
+
+    choices: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
+    columns: tuple[str, ...] = ()
+    n_orientations: int = 0
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -44,6 +66,9 @@ class Layout:
     person : str or int, optional
         Column that names who showed a movement; another movement begins where it changes.
 
+    known : Known, optional
+        What the movements to compare with were read from: the default of topic and frame where a bag has several.
+
     Raises
     ------
     SpecificationError
@@ -60,6 +85,7 @@ class Layout:
     topic: str | Sequence[str] | None = None
     frame: str | Sequence[str] | None = None
     person: Column | None = None
+    known: Known | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)

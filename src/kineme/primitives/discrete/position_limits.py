@@ -55,12 +55,16 @@ def within_limits(
     leaves = ((path < low - rounding[:, None]) | (path > high + rounding[:, None])).any(axis=1)
     if not leaves.any():
         return movement
-    smooth = smoothness_factor(dmp)
-    factor = condition(smooth, held, slack * np.linalg.norm(held @ smooth.T, axis=1)).factor
-    effect = decoder(dmp, dmp.n_points).Phi[0] @ factor.T
+    smooth, Phi = smoothness_factor(dmp), decoder(dmp, dmp.n_points).Phi[0]
+    deviation = slack * np.linalg.norm(held @ smooth.T, axis=1)
+    factors: dict[bytes, Array] = {}  # of the rows that are held: few, however many movements
     dense = np.zeros((*movement.starts.shape, dmp.n_basis))
     for i, k in np.argwhere(leaves):
-        dense[i, k] = _inside(effect, path[i, :, k], (low[k], high[k]), (int(i), int(k))) @ factor
+        known = np.append(~np.isnan(points[min(i, len(points) - 1), :, k]), np.ones(len(held) - points.shape[1], bool))
+        if known.tobytes() not in factors:
+            factors[known.tobytes()] = condition(smooth, held[known], deviation[known]).factor
+        factor = factors[known.tobytes()]
+        dense[i, k] = _inside(Phi @ factor.T, path[i, :, k], (low[k], high[k]), (int(i), int(k))) @ factor
     if movement.change is not None:
         dense += movement.change.coefficients @ movement.change.directions
     return replace(movement, change=Change(dense, np.eye(dmp.n_basis)))
