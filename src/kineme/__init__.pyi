@@ -32,6 +32,7 @@ from kineme.primitives.rhythmic.rhythmic_dmp import RhythmicPrimitives as Rhythm
 from kineme import orientation as orientation
 from kineme import styles as styles
 from kineme.primitives.discrete.choose import BasisSelection as BasisSelection
+from kineme.primitives.modulation.couple import couple as couple
 from kineme.primitives.modulation.join import join as join
 from kineme.primitives.modulation.join import blend as blend
 from kineme.primitives.contextual.contextual import Contextual as Contextual

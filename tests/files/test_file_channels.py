@@ -7,7 +7,7 @@ import pytest
 import kineme
 from kineme.errors import SpecificationError
 from kineme.files.inspection.inspect import inspect
-from kineme.orientation import exp, product
+from kineme.orientation import PoseDMP, exp, product
 
 HEADS = "frame_index,Sub Frame,t,pose.position.x," + ",".join(f"pose.orientation.{part}" for part in "xyzw")
 N = 60
@@ -188,3 +188,11 @@ def test_a_quaternion_that_is_none_costs_its_sample_alone_where_that_is_asked_fo
     assert problem.file == "0.csv"
     assert "expected unit quaternions" in problem.reason
     assert problem.reason.endswith("this sample left out")
+
+
+def test_the_rollout_of_poses_has_the_channels_of_the_recording_and_one_of_rotation_vectors_has_none(tmp_path):
+    write(tmp_path / "0.csv")
+    demos = kineme.read_recordings(tmp_path / "0.csv").demonstrations
+    poses = kineme.Demonstrations.of(PoseDMP().learn(demos).rollout())
+    assert [(one.name, one.kind) for one in poses.channels] == [(one.name, one.kind) for one in demos.channels]
+    assert kineme.Demonstrations.of(kineme.DMP().learn(demos).rollout()).channels is None

@@ -32,6 +32,7 @@ from kineme import (
     RhythmicFeatures,
     Smooth,
     TrimRest,
+    couple,
     preprocess,
     styles,
 )
@@ -162,6 +163,24 @@ def rollout_of(demos: Demonstrations) -> list[dict[str, Any]]:
     ends, tau = primitives.goals - primitives.starts, primitives.durations
     options = {"start": primitives.starts + 0.1 * ends, "goal": primitives.goals + 0.3 * ends, "duration": 2 * tau}
     return moved(demos, primitives.rollout(**options, velocity=0.5 * ends / tau[:, None]))
+
+
+def to_moving_goals(demos: Demonstrations) -> list[dict[str, Any]]:
+    """To goals that move, each by its own velocity, through a point."""
+    primitives = DMP("bio-inspired", n_basis=20).learn(demos)
+    ends, tau = primitives.goals - primitives.starts, primitives.durations
+    points, velocities = primitives.starts + 0.4 * ends, 0.3 * (ends[:, ::-1] / tau[:, None])
+    return moved(demos, primitives.rollout(via=[(0.4, points)], goal_velocity=velocities))
+
+
+def coupled(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Each with a movement to another goal, which is as large."""
+    left = DMP("decoupled", n_basis=20).learn(demos)
+    ends = left.goals - left.starts
+    right = left.rollout(goal=left.goals + 0.2 * ends)
+    one, other = couple(left, right, during=(0.3, 0.6), offset=0.3 * ends)
+    rows = zip(moved(demos, one.rollout()), moved(demos, other.rollout()), strict=True)
+    return [a | {f"other {name}": value for name, value in b.items()} for a, b in rows]
 
 
 def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
@@ -540,6 +559,8 @@ TABLE = [
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
     Batched("Primitives.rollout via", modulated, 1e-8),
+    Batched("couple", coupled, 1e-8),
+    Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),
     step_row(Resample(60), 1e-10),

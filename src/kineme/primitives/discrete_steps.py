@@ -71,25 +71,3 @@ def concatenated(several: Sequence[DiscreteSteps]) -> DiscreteSteps:
         np.concatenate([one.shares for one in several]),
         np.concatenate(([0], np.cumsum(lengths))),
     )
-
-
-def one_after_another(several: Sequence[DiscreteSteps], begins: Array, lengths: Array) -> DiscreteSteps:
-    """The steps of parts that follow each other; each part says what is until the next one begins.
-
-    Parameters
-    ----------
-    several : sequence of DiscreteSteps
-        Of n movements each.
-    begins, lengths : ndarray of shape (parts, n)
-        When each part begins and how long it is, as shares of the whole.
-    """
-    ends = np.vstack((begins[1:], np.full((1, begins.shape[1]), np.inf)))
-    parts = []
-    for i in range(begins.shape[1]):
-        for one, begin, length, end in zip(several, begins[:, i], lengths[:, i], ends[:, i], strict=True):
-            rows = slice(one.offsets[i], one.offsets[i + 1])
-            shares = begin + length * one.shares[rows]
-            parts.append((one.values[rows][shares < end], shares[shares < end]))
-    values, shares = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    counts = np.array([len(part[1]) for part in parts]).reshape(-1, len(several)).sum(axis=1)
-    return DiscreteSteps(values, shares, np.concatenate(([0], np.cumsum(counts))))

@@ -20,7 +20,7 @@ from kineme.movements.preparation.trim import TrimRest
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
-from kineme.primitives.discrete_steps import DiscreteSteps, concatenated, one_after_another, steps_of
+from kineme.primitives.discrete_steps import DiscreteSteps, concatenated, steps_of
 from kineme.validation import Array
 
 
@@ -112,19 +112,6 @@ def merged(several: Sequence[RecordedAs | None]) -> RecordedAs | None:
         return None
     steps = [one.steps for one in known if one.steps is not None]
     return replace(known[0], steps=concatenated(steps) if len(steps) == len(known) else None)
-
-
-def joined(several: Sequence[RecordedAs | None], begins: Array, lengths: Array) -> RecordedAs | None:
-    """That of parts of which one follows the other; `begins` and `lengths` (parts, n) are shares of the whole.
-
-    None if the parts were not recorded as the same; without steps where those of a part are not known.
-    """
-    about = merged(several)
-    if about is None:
-        return None
-    steps = [one.steps for one in several if one is not None and one.steps is not None]
-    known = len(steps) == len(several)
-    return replace(about, steps=one_after_another(steps, begins, lengths) if known else None)
 
 
 def in_primitive(point: Array, about: RecordedAs) -> Array:

@@ -227,6 +227,7 @@ class Primitives(Learned):
         velocity: ArrayLike | None = None,
         via: ViaLike | None = None,
         end_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
         position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
@@ -251,6 +252,9 @@ class Primitives(Learned):
             functions can.
         end_velocity : array_like of shape (d,) or (n, d), optional
             Velocity at the goal, at the end of the duration, per second; the goal is then met exactly.
+        goal_velocity : array_like of shape (d,) or (n, d), optional
+            Velocity of the goal, per second: it is at `goal` at the start, ``goal + duration * goal_velocity`` at the
+            end, and followed without a lag, as by ``controller.step(goal=, goal_velocity=)``.
         position_limits : (low, high), optional
             Where to stay, each a number or (d,), infinite where there is no limit; at the specification's `n_points`
             samples. A small quadratic program for each dimension of each movement that would leave them.
@@ -294,7 +298,9 @@ class Primitives(Learned):
         from kineme.primitives.discrete.rollout import rollout
         from kineme.primitives.discrete.samples import sampled
 
-        movement = modulated(rollout(self, start, goal, duration, velocity), via, end_velocity, position_limits)
+        movement = modulated(
+            rollout(self, start, goal, duration, velocity, goal_velocity), via, end_velocity, position_limits
+        )
         return sampled(movement, rate, n_samples, settle)
 
     @classmethod
@@ -302,6 +308,11 @@ class Primitives(Learned):
         """The movements of a rollout as primitives of their own, with its starts, goals, durations and via points.
 
         They move so without being told; they are saved, recognized, controlled and moved to other goals like any other.
+
+        Raises
+        ------
+        SpecificationError
+            A rollout with a goal that moves, which a primitive has not.
         """
         from kineme.primitives.discrete.own_primitives import own_primitives
 

@@ -27,8 +27,9 @@ from numpy.typing import ArrayLike
 from kineme.errors import ExtrapolationWarning
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.operators import decoder, decoder_at, smoothness_factor
+from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
 from kineme.primitives.discrete.position_limits import within_limits
-from kineme.primitives.discrete.rollout import Change, Rollout, broadcast_length, per_movement
+from kineme.primitives.discrete.rollout import Change, Rollout
 from kineme.primitives.discrete.specification import Specification
 from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.validation import Array
@@ -90,6 +91,7 @@ class _Observed(NamedTuple):
     weights: Array  # (K, N)
     goal: Array  # (K,)
     velocity: Array  # (K,)
+    moving_goal: Array  # (K,)
 
 
 @lru_cache(maxsize=32)
@@ -111,8 +113,9 @@ def _errors(movement: Rollout, asked: ViaPoints, velocity: Array | None, observe
     errors = errors * movement.ratio[:, :, None]
     errors -= (movement.goals - movement.starts)[:, :, None] * observed.goal
     errors -= (movement.velocities_at_start * durations)[:, :, None] * observed.velocity
+    errors -= movement.goal_steps[:, :, None] * observed.moving_goal
     errors[:, :, :k] += asked.points.transpose(0, 2, 1) - movement.starts[:, :, None]
-    errors[:, :, k] += movement.goals - movement.starts
+    errors[:, :, k] += movement.arrivals - movement.starts
     errors[:, :, k + 1] = 0.0 if velocity is None else errors[:, :, k + 1] + velocity * durations
     return errors
 
@@ -178,7 +181,7 @@ def _mixed_factor(dmp: Specification, factor: Array) -> Array:
 
 def _extents(movement: Rollout) -> Array:
     """How large each movement is (n,): the diagonal of its bounding box."""
-    sides = np.maximum(movement.primitives.extents, np.abs(movement.goals - movement.starts))
+    sides = np.maximum(movement.primitives.extents, np.abs(movement.arrivals - movement.starts))
     return np.asarray(np.sqrt(np.einsum("nd,nd->n", sides, sides)))
 
 

@@ -42,7 +42,7 @@ def within_limits(
     low, high = _limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
     rounding = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
-    held_at = {"start": movement.starts[:, None], "goal": movement.goals[:, None], "via points": points}
+    held_at = {"start": movement.starts[:, None], "goal": movement.arrivals[:, None], "via points": points}
     for name, places in held_at.items():
         outside = (places < low - rounding[:, None]) | (places > high + rounding[:, None])
         if outside.any():

@@ -9,18 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import DegenerateMovementError, SpecificationError, TrajectoryError
+from kineme.errors import DegenerateMovementError, SpecificationError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.operators import decoder
+from kineme.primitives.discrete.per_movement import broadcast_length, check_durations, per_movement
 from kineme.runtime.parallel import for_tiles
 from kineme.validation import (
-    LARGEST,
-    LARGEST_STAMP,
-    SHORTEST_STEP,
     Array,
-    as_numbers,
     describe,
 )
 
@@ -57,6 +54,7 @@ class Rollout(BaseRollout):
     n_samples: int
     end: float = 1.0  # of the last sample, in durations
     change: Change | None = None  # of the weights in force: via points, end velocity
+    goal_velocities: Array | None = None  # (n, d), per second, of goals that move
     fixed_velocity: bool = False  # whether a velocity was asked for that does not scale with the tempo
 
     def __len__(self) -> int:
@@ -64,6 +62,18 @@ class Rollout(BaseRollout):
 
     def __repr__(self) -> str:
         return f"Rollout({len(self)} movements of {self.n_samples} samples from {self.primitives!r})"
+
+    @property
+    def arrivals(self) -> Array:
+        """Where the goals are at the end of the duration (n, d)."""
+        return self.goals if self.goal_velocities is None else self.goals + self.goal_steps
+
+    @property
+    def goal_steps(self) -> Array:
+        """How far the goals move in one duration (n, d)."""
+        if self.goal_velocities is None:
+            return np.zeros_like(self.goals)
+        return self.goal_velocities * self.durations[:, None]
 
     @property
     def times(self) -> Array:
@@ -100,15 +110,16 @@ class Rollout(BaseRollout):
         Raises
         ------
         SpecificationError
-            No limit, or one that is not above 0; a rollout that was given an initial or end velocity other than 0, for
-            its path depends on the duration.
+            No limit, or one that is not above 0; a rollout that was given a velocity other than 0, initial, at the end
+            or of the goal, for its path depends on the duration.
         """
         from kineme.primitives.discrete.least_duration import least_durations
 
         if self.fixed_velocity:
             raise SpecificationError(
-                "expected a movement whose velocities scale with its tempo, got one with velocity= or end_velocity= "
-                "above 0: its path depends on the duration; try durations, and look at velocities and accelerations"
+                "expected a movement whose velocities scale with its tempo, got one with velocity=, end_velocity= or "
+                "goal_velocity= other than 0: its path depends on the duration; try durations, and look at velocities "
+                "and accelerations"
             )
         return least_durations(self.durations, (self.velocities, self.accelerations), (velocity, acceleration))
 
@@ -122,9 +133,10 @@ class Rollout(BaseRollout):
 
     def _take(self, chosen: NDArray[np.intp]) -> Rollout:
         rows = ("ratio", "starts", "goals", "velocities_at_start", "durations")
-        change = self.change
+        change, moving = self.change, self.goal_velocities
         return replace(
             self,
+            goal_velocities=None if moving is None else moving[chosen],
             change=None if change is None else change._replace(coefficients=change.coefficients[chosen]),
             primitives=self.primitives if len(self.primitives) == 1 else self.primitives[chosen],
             **{name: getattr(self, name)[chosen] for name in rows},
@@ -134,8 +146,11 @@ class Rollout(BaseRollout):
         response = decoder(self.primitives.dmp, self.n_samples, self.end)
         constant = np.full(self.n_samples, 1.0 if order == 0 else 0.0)
         rows = [response.Phi[order].T, response.goal[order], response.velocity[order], constant]
+        goal_steps = self.goal_steps[:, :, None] if self.goal_velocities is not None else np.zeros((len(self), 1, 0))
+        rows += [response.moving_goal[order]] * goal_steps.shape[2]
         change = self.change or Change(np.zeros((len(self), 1, 0)), np.zeros((0, len(response.Phi[order].T))))
         matrix, n_basis = np.vstack([*rows, change.directions @ rows[0]]), self.primitives.dmp.n_basis
+        n_others = len(matrix) - len(change.directions)
         per_tau = (1.0 / self.durations**order)[:, None, None]
         shared = len(self.primitives) == 1
         weights, d = self.primitives.scaled_weights, self.starts.shape[1]
@@ -150,7 +165,8 @@ class Rollout(BaseRollout):
             numbers[:, :, n_basis] = self.goals[chosen] - self.starts[chosen]
             numbers[:, :, n_basis + 1] = self.velocities_at_start[chosen] * self.durations[chosen, None]
             numbers[:, :, n_basis + 2] = self.starts[chosen]
-            numbers[:, :, n_basis + 3 :] = change.coefficients[chosen]
+            numbers[:, :, n_basis + 3 : n_others] = goal_steps[chosen]
+            numbers[:, :, n_others:] = change.coefficients[chosen]
             # Two-dimensional on purpose: a stack of matrices would become as many small products.
             rows = numbers.reshape(-1, len(matrix))
             np.matmul(rows, matrix, out=result[chosen].reshape(len(rows), -1))
@@ -167,6 +183,7 @@ def rollout(
     goal: ArrayLike | None,
     duration: ArrayLike | None,
     velocity: ArrayLike | None,
+    goal_velocity: ArrayLike | None = None,
 ) -> Rollout:
     """Check the options and broadcast them over the primitives; see `Primitives.rollout`."""
     d = primitives.n_dims
@@ -174,6 +191,7 @@ def rollout(
         "start": per_movement(start, "start", d),
         "goal": per_movement(goal, "goal", d),
         "velocity": per_movement(velocity, "velocity", d),
+        "goal_velocity": per_movement(goal_velocity, "goal_velocity", d),
         "duration": per_movement(duration, "duration", None),
     }
     n = broadcast_length(len(primitives), options)
@@ -189,70 +207,20 @@ def rollout(
     # The demonstrated velocity scales with the tempo; a given velocity does not.
     tempo = primitives.durations / durations
     velocities = fill("velocity", primitives.velocities) * (tempo[:, None] if options["velocity"] is None else 1.0)
+    moving = None if options["goal_velocity"] is None else fill("goal_velocity", np.zeros((1, d)))
+    arrivals = goals if moving is None else goals + moving * durations[:, None]
+    given = [option for option in (options["velocity"], moving) if option is not None]
     return Rollout(
         primitives,
-        _ratio(primitives, goals - starts),
+        _ratio(primitives, arrivals - starts),
         starts,
         goals,
         velocities,
         durations,
         primitives.dmp.n_points,
-        fixed_velocity=options["velocity"] is not None and bool(options["velocity"].any()),
+        goal_velocities=moving,
+        fixed_velocity=any(bool(option.any()) for option in given),
     )
-
-
-def check_durations(name: str, durations: Array) -> None:
-    """Refuse durations of 0 seconds or less, and those whose squares leave the range of numbers."""
-    usable = (durations >= SHORTEST_STEP) & (durations <= LARGEST_STAMP)
-    if usable.all():
-        return
-    i = int(np.argmin(usable))
-    between = "" if durations[i] <= 0 else f" and from {SHORTEST_STEP:g} to {LARGEST_STAMP:g}"
-    raise SpecificationError(f"expected {name} above 0 seconds{between}, got {durations[i]:g} for movement {i}")
-
-
-def per_movement(option: ArrayLike | None, name: str, n_dims: int | None) -> Array | None:
-    """An option as (1, d) or (n, d), durations as (1,) or (n,); a number suits a movement of one dimension."""
-    if option is None:
-        return None
-    try:
-        value = as_numbers(option, name)
-    except TrajectoryError as error:
-        raise TrajectoryError(f"expected numbers for {name}, got {option!r}") from error
-    if n_dims == 1 and value.ndim == 0:
-        value = value[None]
-    if n_dims is None:
-        value = value[None] if value.ndim == 0 else value
-        fits = value.ndim == 1
-    else:
-        value = value[None] if value.ndim == 1 else value
-        fits = value.ndim == 2 and value.shape[1] == n_dims
-    if not fits:
-        shape = "a number or (n,)" if n_dims is None else f"({n_dims},) or (n, {n_dims})"
-        raise TrajectoryError(f"expected {name} of shape {shape}, got shape {np.shape(option)}")
-    if (bad := ~np.isfinite(value)).any():
-        raise TrajectoryError(f"expected finite numbers for {name}, got {_first(value, bad)}")
-    if (bad := np.abs(value) > LARGEST).any():
-        raise TrajectoryError(
-            f"expected numbers up to {LARGEST:g} for {name}, got {_first(value, bad)}; choose another unit"
-        )
-    return value
-
-
-def _first(value: Array, bad: NDArray[np.bool_]) -> str:
-    """The first invalid value, with the index of its movement if there are several."""
-    k = int(bad.reshape(len(value), -1).any(axis=1).argmax())
-    return f"{value[k].tolist()}{f' for movement {k}' if len(value) > 1 else ''}"
-
-
-def broadcast_length(n: int, options: dict[str, Array | None], what: str = "primitives") -> int:
-    """Number of movements from n of `what` and the lengths of all options, which must be 1 or equal."""
-    lengths = {what: n} | {name: len(value) for name, value in options.items() if value is not None}
-    n = max(lengths.values())
-    if any(length not in (1, n) for length in lengths.values()):
-        listed = ", ".join(f"{length} {name}" for name, length in lengths.items())
-        raise TrajectoryError(f"expected one or equally many of {what}, starts, goals and so on, got {listed}")
-    return n
 
 
 def _ratio(primitives: Learned, amplitudes: Array) -> Array:

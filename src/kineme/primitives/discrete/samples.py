@@ -48,7 +48,10 @@ def settled_end(movement: Rollout, tolerance: float) -> float:
     """Time, in durations from 1 on, at which every movement stays within `tolerance` of its goal."""
     check_number("settle", tolerance, above=0.0)
     far = replace(movement, n_samples=_SETTLING_SAMPLES, end=_LONGEST)
-    outside = (np.abs(far.positions - movement.goals[:, None]) > tolerance).any(axis=(0, 2))
+    goals = (
+        movement.goals[:, None] + np.linspace(0.0, _LONGEST, _SETTLING_SAMPLES)[:, None] * movement.goal_steps[:, None]
+    )
+    outside = (np.abs(far.positions - goals) > tolerance).any(axis=(0, 2))
     last = int(np.flatnonzero(outside)[-1]) if outside.any() else 0
     if last == _SETTLING_SAMPLES - 1:
         raise SpecificationError(

@@ -18,14 +18,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.fits import trajectory_columns
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
-from kineme.primitives.recorded_as import joined, merged
+from kineme.primitives.modulation.carried_over import carried_over
+from kineme.primitives.modulation.parts import moving, within
 from kineme.validation import Array, check_number
 
 _SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
@@ -54,8 +55,9 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     -------
     Primitives
         With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
-        that part which has most. Of parts that were recorded with the same channels it keeps them, and the steps of
-        discrete ones, a gripper's: those of each part, until the next one begins.
+        that part which has most; the movements of a batch share one specification, so all have as many as the one that
+        needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
+        same; discrete channels step when they did in the parts, those of each part until the next one begins.
 
     Raises
     ------
@@ -64,7 +66,7 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     SpecificationError
         An overlap that is negative or longer than half a part; more than 2,000 basis functions.
     """
-    movements = _moving(parts)
+    movements = moving(parts)
     durations = np.stack([one.durations for one in movements])  # (parts, n)
     check_number("overlap", overlap, least=0.0)
     if len(movements) > 1 and overlap > 0.5 * durations.min():
@@ -87,8 +89,9 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     path = np.zeros((*times.shape, movements[0].n_dims))
     for part, begin, share in zip(laid, begins, shares, strict=True):
         path += share[:, :, None] * _at(part, (times - begin[:, None]) / part.durations[:, None])
+    when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
     made = _learned(dmp, path, times, laid[0], laid[-1])
-    return replace(made, recorded_as=joined([one.recorded_as for one in movements], begins / total, durations / total))
+    return carried_over(made, movements, when, begins[1:] / total)
 
 
 def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tuple[float, float]) -> Primitives:
@@ -108,7 +111,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     Returns
     -------
     Primitives
-        As of `join`, with the larger number of basis functions; without the steps of discrete channels.
+        As of `join`, with the larger number of basis functions. Discrete channels are those of the second movement
+        from the middle of the stretch on.
 
     Raises
     ------
@@ -117,15 +121,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     SpecificationError
         A stretch that is not within the movement.
     """
-    movements = _moving([first, second])
-    try:
-        begin, end = (float(one) for one in stretch)
-    except (TypeError, ValueError) as error:
-        raise SpecificationError(f"expected stretch=(begin, end), shares of the duration, got {stretch!r}") from error
-    if not 0.0 <= begin < end <= 1.0:
-        raise SpecificationError(
-            f"expected stretch to be 0 <= begin < end <= 1, shares of the duration, got {stretch!r}"
-        )
+    movements = moving([first, second])
+    begin, end = within(stretch, "stretch")
     dmp = _specification(movements, max(one.dmp.n_basis for one in movements))
     laid = [one.rollout(n_samples=dmp.n_points) for one in movements]
     u = np.linspace(0.0, 1.0, dmp.n_points)
@@ -134,26 +131,9 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     pace = np.outer(movements[0].durations, 1.0 - share) + np.outer(movements[1].durations, share)  # dt / du
     steps = 0.5 * (pace[:, 1:] + pace[:, :-1]) / (dmp.n_points - 1)
     times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
-    about = merged([one.recorded_as for one in movements])
-    made = _learned(dmp, path, times, laid[0], laid[1])
-    return replace(made, recorded_as=None if about is None else replace(about, steps=None))
-
-
-def _moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
-    """All parts as primitives of the same number of movements."""
-    if isinstance(parts, (Primitives, Rollout)) or not isinstance(parts, Sequence) or not len(parts):
-        raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
-    for i, one in enumerate(parts):
-        if not isinstance(one, (Primitives, Rollout)):
-            raise TrajectoryError(f"expected Primitives or Rollout as part {i}, got {type(one).__name__}")
-    moving = [one if isinstance(one, Primitives) else Primitives.from_rollout(one) for one in parts]
-    n = max(len(one) for one in moving)
-    for i, one in enumerate(moving):
-        if one.n_dims != moving[0].n_dims:
-            raise TrajectoryError(f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {one.n_dims}")
-        if len(one) not in (1, n):
-            raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(one)}")
-    return [one if len(one) == n else one[np.zeros(n, dtype=np.intp)] for one in moving]
+    shares = times / times[:, -1:]
+    switch = _at_phase(shares, 0.5 * (begin + end))
+    return carried_over(_learned(dmp, path, times, laid[0], laid[1]), movements, [shares, shares], switch[None])
 
 
 def _specification(movements: list[Primitives], n_basis: float) -> DMP:
@@ -186,6 +166,11 @@ def _at(movement: Rollout, u: Array) -> Array:
     before = np.minimum(place.astype(np.intp), movement.n_samples - 2)[:, :, None]
     x, share = movement.positions, place[:, :, None] - before
     return np.asarray((1.0 - share) * np.take_along_axis(x, before, 1) + share * np.take_along_axis(x, before + 1, 1))
+
+
+def _at_phase(shares: Array, u: float) -> Array:
+    """The columns (n,) of numbers at even phases (n, T) at phase u."""
+    return np.array([np.interp(u, np.linspace(0.0, 1.0, shares.shape[1]), one) for one in shares])
 
 
 def _learned(dmp: DMP, path: Array, times: Array, first: Rollout, last: Rollout) -> Primitives:

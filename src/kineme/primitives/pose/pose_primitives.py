@@ -16,8 +16,8 @@ from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options, check_one
 from kineme.primitives.discrete.dmp import DMP, Primitives
+from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
 from kineme.primitives.discrete.plan import plan_of
-from kineme.primitives.discrete.rollout import broadcast_length, per_movement
 from kineme.primitives.persistence import Arrays, check_array
 from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
-from kineme.primitives.discrete.rollout import broadcast_length, check_durations, per_movement
+from kineme.primitives.discrete.per_movement import broadcast_length, check_durations, per_movement
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.learned import RhythmicLearned
 from kineme.primitives.rhythmic.operators import limit_cycle

@@ -75,6 +75,7 @@ class AveragePrimitive:
         velocity: ArrayLike | None = None,
         via: ViaLike | None = None,
         end_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
         position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
@@ -87,7 +88,7 @@ class AveragePrimitive:
 
         Parameters and errors are those of `Primitives.rollout`.
         """
-        movement = rollout(self.primitive, start, goal, duration, velocity)
+        movement = rollout(self.primitive, start, goal, duration, velocity, goal_velocity)
         movement = modulated(movement, via, end_velocity, position_limits, self.factor[:, :, :-3])
         return sampled(movement, rate, n_samples, settle)
 
