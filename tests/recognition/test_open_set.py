@@ -183,3 +183,33 @@ def test_copies_are_known_where_all_demonstrations_have_copies(d):
     recognizer = Recognizer().fit(twice)
     assert (recognizer.predict_known(demos) == demos.labels).all()
     assert all(recognizer.recognize(one).label is not None for one in demos)
+
+
+def repeated(noise, n, rest=0, cut=0, seed=0):
+    """Three movements that a machine repeats n times, and stands before and after them for `rest` samples of 10 ms."""
+    rng, u = np.random.default_rng(seed), np.linspace(0, 1, 150)
+    s, movements, labels = 10 * u**3 - 15 * u**4 + 6 * u**5, [], []
+    for c in range(3):
+        for _ in range(n):
+            path = np.column_stack(
+                (0.3 * np.sin((c + 1) * np.pi * s), 0.2 * np.cos((c + 2) * 2 * s), 0.3 * s ** (c + 1))
+            )
+            whole = np.concatenate((np.repeat(path[:1], rest, axis=0), path, np.repeat(path[-1:], rest, axis=0)))
+            shown = whole[cut : len(whole) - cut]
+            movements.append(shown + noise * (rng.standard_normal(3) + 0.3 * rng.standard_normal(shown.shape)))
+            labels.append("abc"[c])
+    return kineme.Demonstrations.from_arrays(movements, labels)
+
+
+@pytest.mark.parametrize("noise", [0.0002, 0.001, 0.003])
+@pytest.mark.parametrize("n", [3, 4])
+def test_what_a_machine_repeats_is_known_with_other_first_and_last_samples(noise, n):
+    """50 ms of rest at both ends, or 30 ms cut off, differ by more than such repetitions do."""
+    recognizer = kineme.Recognizer().fit(repeated(noise, n, seed=3))
+    for more in ({}, {"rest": 5}, {"cut": 3}):
+        asked = repeated(noise, 4, seed=7, **more)
+        answers = recognizer.recognize(asked)
+        assert [one.label for one in answers] == asked.labels.tolist()
+    u = np.linspace(0, 1, 150)
+    foreign = np.column_stack((u**3, 0.2 * np.sin(9 * u), 0.3 * np.cos(7 * u)))
+    assert recognizer.recognize([foreign])[0].label is None

@@ -7,7 +7,7 @@ Source: V. Vovk, A. Gammerman, G. Shafer, "Algorithmic Learning in a Random Worl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from kineme.recognition.left_out import (
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array, check_number
 
+_REPEATED = 0.1  # of the median distance to other classes: the least scale
 _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenly spaced
 
 #: Rule by which a movement is called known or unknown -> what it promises.
@@ -83,6 +84,10 @@ class Calibration:
     since the mean of two or three is little known. With one demonstration of every class no distance within a class is
     known; s_c is then set so that the law reaches 0.05 at three quarters of the median distance from a demonstration to
     the nearest other class, or at the whole of it if the demonstrations are of several groups.
+
+    It is at least a tenth of the median of these distances. A machine that repeats a movement exactly varies less than
+    the first and the last samples of two recordings do, and its own next movement would be unknown. Movements of people
+    vary by more: by 0.22 of that median at the least, in LASA and in gestures in space.
 
     With groups, such as people, the rates hold for movements of other groups; without, for more movements like the
     demonstrations. ``python -m bench --only open_set`` measures both.
@@ -146,6 +151,22 @@ class Calibration:
         """
         return np.array([counted is not None for counted in self._counting(error_rate)[0]])
 
+    def with_least_scales(self, least: Array) -> Calibration:
+        """With scales of at least (C,); where that is more, a demonstration is as novel as such a scale makes it: 1."""
+        raised = (least > self.scales).tolist()
+        if not any(raised):
+            return self
+
+        def novel(novelties: tuple[Array, ...]) -> tuple[Array, ...]:
+            return tuple(np.maximum(one, 1.0) if more else one for one, more in zip(novelties, raised, strict=True))
+
+        return replace(
+            self,
+            scales=np.maximum(self.scales, least),
+            own_novelties=novel(self.own_novelties),
+            pooled_novelties=novel(self.pooled_novelties),
+        )
+
     def select(self, classes: NDArray[np.intp]) -> Calibration:
         """The calibration of some of the classes, in rising order."""
         if len(classes) == len(self.scales):
@@ -205,27 +226,30 @@ def calibrate(
         chosen = own_class.start + evenly_spaced(count, _CALIBRATED)
         away = distances(similarity.log_average(references.described.take(chosen), references.described))
         away[np.arange(len(chosen)), chosen] = np.inf
-        apart = away.copy()
-        apart[:, own_class] = np.inf
-        impostors.append(apart.min(axis=1))
+        of_others = away.copy()
+        of_others[:, own_class] = np.inf
+        impostors.append(of_others.min(axis=1))
         if groups is not None:
             away[groups[chosen][:, None] == groups] = np.inf
         shown_by = None if groups is None else groups[own_class]
         blocks.append(ClassDistances(away[:, own_class].copy(), chosen - own_class.start, shown_by))
         away[:, own_class] = np.inf
         others.append(np.minimum.reduceat(away, references.first, axis=1))
-    typical = typical_scale(np.concatenate(impostors), REACH if groups is None else REACH_OF_OTHERS)
+    to_others = np.concatenate(impostors)
+    typical = typical_scale(to_others, REACH if groups is None else REACH_OF_OTHERS)
     known = {int(size): score_classes(blocks, int(size), typical) for size in np.unique(counts)}
     scales = np.array([known[int(size)].scales[c] for c, size in enumerate(counts)])
     novelties = {size: _novelties(scored, others, scales) for size, scored in known.items()}
     pooled = {size: scored.pooled() for size, scored in known.items()}
-    return Calibration(
+    made = Calibration(
         scales,
         tuple(finite(block.nearest(int(n))[0] / s) for block, n, s in zip(blocks, counts, scales, strict=True)),
         tuple(pooled[int(size)] for size in counts),
         tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
         tuple(novelties[int(size)][0] for size in counts),
     )
+    apart = to_others[np.isfinite(to_others)]
+    return made.with_least_scales(np.full(len(counts), _REPEATED * np.median(apart) if len(apart) else 0.0))
 
 
 def _novelties(scored: Scored, others: list[Array], scales: Array) -> tuple[Array, NDArray[np.intp]]:

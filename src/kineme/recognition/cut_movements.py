@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kineme.comparison.references import References
@@ -32,25 +30,9 @@ def calibration_of_cut(known: Templates) -> Calibration:
     """
     made: Calibration | None = vars(known.calibration).get("_of_cut")
     if made is None:
-        made = _raised(known.calibration, _cut_distances(known))
+        made = known.calibration.with_least_scales(_cut_distances(known))
         vars(known.calibration)["_of_cut"] = made
     return made
-
-
-def _raised(whole: Calibration, least: Array) -> Calibration:
-    """With scales of at least (C,); where that is more, a movement of the class is as novel as the cuts make it: 1."""
-    more = (least > whole.scales).tolist()
-
-    def cut(novelties: tuple[Array, ...]) -> tuple[Array, ...]:
-        return tuple(np.maximum(one, 1.0) if raised else one for one, raised in zip(novelties, more, strict=True))
-
-    scales = np.maximum(whole.scales, least)
-    return replace(
-        whole,
-        scales=scales,
-        own_novelties=cut(whole.own_novelties),
-        pooled_novelties=cut(whole.pooled_novelties),
-    )
 
 
 def _cut_distances(known: Templates) -> Array:

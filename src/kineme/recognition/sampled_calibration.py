@@ -40,11 +40,12 @@ def calibrate_sample(
 ) -> Calibration:
     """The `Calibration` of movements that are stored elsewhere; `groups` are the numbers (m,) of the members' groups.
 
-    As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
-    compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a class
-    calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores of all
-    classes count; classes of more than 16 are compared as if they were equally large; and the nearest movement is the
-    nearest of the eight with the largest bounds. Distances are to the whole class, not to the sample.
+    As `conformal.calibrate`, with five differences: scales have no lower limit where a class is shown twice or
+    more; novelties are the scores of members, as other classes are not compared with, so that somewhat fewer than
+    the error rate are called unknown; up to a hundred movements of a class calibrate it, but only about 4000 in all
+    and of a thousand classes, so that above 200 classes the scores of all classes count; classes of more than 16
+    are compared as if they were equally large; and the nearest movement is the nearest of the eight with the
+    largest bounds. Distances are to the whole class, not to the sample.
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
