@@ -87,7 +87,7 @@ class Calibration:
 
     It is at least a tenth of the median of these distances. A machine that repeats a movement exactly varies less than
     the first and the last samples of two recordings do, and its own next movement would be unknown. Movements of people
-    vary by more: by 0.22 of that median at the least, in LASA and in gestures in space.
+    vary by more: by 0.19 of that median at the least, in LASA, handwritten letters and gestures in space.
 
     With groups, such as people, the rates hold for movements of other groups; without, for more movements like the
     demonstrations. ``python -m bench --only open_set`` measures both.
