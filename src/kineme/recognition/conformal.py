@@ -158,7 +158,8 @@ class Calibration:
             return self
 
         def novel(novelties: tuple[Array, ...]) -> tuple[Array, ...]:
-            return tuple(np.maximum(one, 1.0) if more else one for one, more in zip(novelties, raised, strict=True))
+            made = {id(one): np.maximum(one, 1.0) for one in novelties}  # classes share what is pooled
+            return tuple(made[id(one)] if more else one for one, more in zip(novelties, raised, strict=True))
 
         return replace(
             self,
@@ -248,8 +249,13 @@ def calibrate(
         tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
         tuple(novelties[int(size)][0] for size in counts),
     )
+    return made.with_least_scales(np.full(len(counts), least_scale(to_others)))
+
+
+def least_scale(to_others: Array) -> float:
+    """A tenth of the median distance of demonstrations to the nearest other class; 0 where there is no other."""
     apart = to_others[np.isfinite(to_others)]
-    return made.with_least_scales(np.full(len(counts), _REPEATED * np.median(apart) if len(apart) else 0.0))
+    return _REPEATED * float(np.median(apart)) if len(apart) else 0.0
 
 
 def _novelties(scored: Scored, others: list[Array], scales: Array) -> tuple[Array, NDArray[np.intp]]:

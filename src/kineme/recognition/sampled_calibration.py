@@ -10,7 +10,7 @@ from kineme.comparison.bounds import log_bounds
 from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
-from kineme.recognition.conformal import Calibration
+from kineme.recognition.conformal import Calibration, least_scale
 from kineme.recognition.left_out import (
     REACH,
     REACH_OF_OTHERS,
@@ -31,6 +31,7 @@ _FEWEST = 4
 _SIZES = np.array([1, 2, 3, 4, 6, 8, 12, 16])  # classes of up to 16 are compared with others cut to as many, or less
 _NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times in ten, else one 5 to 8 % farther
 _TOGETHER = 4  # movements in one product
+_OTHERS = 64  # of the largest bounds, among which the nearest movement of another class is
 _MORE = 16  # the same among all, where shapes differ
 _AT_ONCE = 64  # classes whose movements are read together
 
@@ -40,12 +41,12 @@ def calibrate_sample(
 ) -> Calibration:
     """The `Calibration` of movements that are stored elsewhere; `groups` are the numbers (m,) of the members' groups.
 
-    As `conformal.calibrate`, with five differences: scales have no lower limit where a class is shown twice or
-    more; novelties are the scores of members, as other classes are not compared with, so that somewhat fewer than
-    the error rate are called unknown; up to a hundred movements of a class calibrate it, but only about 4000 in all
-    and of a thousand classes, so that above 200 classes the scores of all classes count; classes of more than 16
-    are compared as if they were equally large; and the nearest movement is the nearest of the eight with the
-    largest bounds. Distances are to the whole class, not to the sample.
+    As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
+    compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a
+    class calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores
+    of all classes count; classes of more than 16 are compared as if they were equally large; and the nearest
+    movement is the nearest of the eight with the largest bounds. Distances are to the whole class, not to the
+    sample.
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
@@ -55,9 +56,9 @@ def calibrate_sample(
     groups = several(groups)
     for c, window, whole in _measured(similarity, stored, groups, sampled, most):
         windows[c], wholes[c] = window, whole
-    typical = 0.0
+    to_others, typical = _impostors(similarity, stored), 0.0
     if not any(np.isfinite(one.distances).any() for one in windows):
-        typical = typical_scale(_impostors(similarity, stored), REACH if groups is None else REACH_OF_OTHERS)
+        typical = typical_scale(to_others, REACH if groups is None else REACH_OF_OTHERS)
     levels = np.where(stored.counts > _SIZES[-1], 0, _SIZES[np.searchsorted(_SIZES, stored.counts, side="right") - 1])
     known = {int(s): score_classes(windows if s else wholes, int(s) or most + 1, typical) for s in np.unique(levels)}
     scales = np.array([known[int(level)].scales[c] for c, level in enumerate(levels)])
@@ -67,13 +68,14 @@ def calibrate_sample(
             own[c] = finite(wholes[c].nearest(wholes[c].distances.shape[1])[0] / scales[c])
     pooled = {level: scored.pooled() for level, scored in known.items()}
     novelties = {level: scored.pooled_novelties() for level, scored in known.items()}
-    return Calibration(
+    made = Calibration(
         scales,
         tuple(own),
         tuple(pooled[int(level)] for level in levels),
         tuple(own),
         tuple(novelties[int(level)] for level in levels),
     )
+    return made.with_least_scales(np.full(n_classes, least_scale(to_others)))
 
 
 def _measured(
@@ -159,7 +161,7 @@ def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Arra
     bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
     shown = np.repeat(np.arange(len(stored.first)), stored.counts)
     bounds[shown[asked, None] == shown] = -np.inf
-    n_near = max(1, min(_MORE, len(stored.members) - 1))
+    n_near = max(1, min(_OTHERS, len(stored.members) - 1))
     near = np.argpartition(-bounds, n_near - 1, axis=1)[:, :n_near]
     found = np.empty(len(asked))
     for i, members in enumerate(near):

@@ -99,11 +99,12 @@ def _key(store: Store, members: Members, content: bytes = b"") -> str:
 
 def _serialized(calibration: Calibration, key: str) -> bytes:
     both = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
-    pooled = {id(one): (one, novelty) for one, novelty in both}  # classes of one size share arrays
+    pooled = {(id(one), id(novelty)): (one, novelty) for one, novelty in both}  # classes of one size share arrays
     numbers = {name: k for k, name in enumerate(pooled)}
     arrays: dict[str, Any] = {f"pooled {k}": one for k, (one, _) in enumerate(pooled.values())}
     arrays |= {f"novelties {k}": one for k, (_, one) in enumerate(pooled.values())}
-    arrays["which"] = np.array([numbers[id(one)] for one in calibration.pooled])
+    shared = zip(calibration.pooled, calibration.pooled_novelties, strict=True)
+    arrays["which"] = np.array([numbers[id(one), id(novelty)] for one, novelty in shared])
     for name, several in (("", calibration.own), ("novel ", calibration.own_novelties)):
         arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(one) for one in several])}
     file = io.BytesIO()
