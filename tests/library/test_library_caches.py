@@ -16,7 +16,7 @@ from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.members import members_of
 from kineme.library.recognition.recognize import LibraryRecognizer
-from kineme.recognition.conformal import calibrate
+from kineme.recognition.conformal import Calibration, calibrate
 
 CODES, CALIBRATION = features_cache.FILE, calibration_cache.FILE
 LABELS = [["wave"] * 3 + ["nod"] * 4 + ["bow"] * 5, [f"kind {k}" for k in range(12)]]
@@ -43,6 +43,18 @@ def served(tmp_path_factory):
         library.learn(draw_movements(12, n_samples=12, labels=LABELS[0]))
         expected = _expected(library)
     return folder, expected, {name: (folder / name).read_bytes() for name in (CODES, CALIBRATION)}
+
+
+def test_classes_that_share_scores_keep_their_own_novelties():
+    """A class whose scale is raised has other novelties than one of the same size whose scale is not."""
+    scores, novelties, own = np.array([0.2, 0.5]), np.array([0.3, 1.6]), (np.array([0.1]), np.array([0.4]))
+    known = Calibration(np.array([0.1, 2.0]), own, (scores, scores), own, (novelties, novelties))
+    made = known.with_least_scales(np.array([1.0, 1.0]))
+    again = calibration_cache._deserialized(calibration_cache._serialized(made, "key"), "key", 2)
+    np.testing.assert_array_equal(again.scales, [1.0, 2.0])
+    np.testing.assert_array_equal(again.pooled_novelties, [[1.0, 1.6], [0.3, 1.6]])
+    np.testing.assert_array_equal(np.concatenate(again.own_novelties), [1.0, 0.4])
+    np.testing.assert_array_equal(again.pooled, [scores, scores])
 
 
 @pytest.mark.parametrize("labels", LABELS)

@@ -23,11 +23,8 @@ def write_joints(path: Path, trajectory: JointTrajectory) -> Path:
 
 def encode_joints(trajectory: JointTrajectory, ending: str = ".csv") -> bytes:
     """The bytes of such a file."""
-    return encode_movement(*_swapped(as_columns(trajectory), ending))
-
-
-def _swapped(columns: tuple[Columns, ColumnNames], ending: str) -> tuple[Columns, str, ColumnNames]:
-    return columns[0], ending, columns[1]
+    columns, names = as_columns(trajectory)
+    return encode_movement(columns, ending, names)
 
 
 def as_columns(trajectory: JointTrajectory) -> tuple[Columns, ColumnNames]:
