@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
+from kineme.movements.rotations.matrices import quaternion_of
 from kineme.robots.kinematics.choose import choose_place, choose_posture
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import TaskPath, task_path
@@ -22,7 +22,7 @@ def path_of_the_tip(
 ) -> TaskPath:
     """The poses that are asked for; where an orientation or a third coordinate is missing, that of the tip at rest."""
     turned = request.orientations if orientation is None else orientation
-    at_rest = Rotation.from_matrix(ik.tip_rotation).as_quat(scalar_first=True)
+    at_rest = quaternion_of(ik.tip_rotation)
     return task_path(request.times, request.positions, at_rest if turned is None else turned, plane, ik.tip_position)
 
 

@@ -10,8 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from kineme.errors import TrajectoryError
 from kineme.robots.checks.preflight import TRACKED
-from kineme.robots.kinematics.choose import check_reached
 from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.reach import check_reached
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.robots.planning.joint_path import PLACES, joints_along, path_of_the_tip

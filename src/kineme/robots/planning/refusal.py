@@ -6,6 +6,7 @@ import numpy as np
 
 from kineme.errors import TrajectoryError
 from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.kinematics.reach import point_in_words
 from kineme.robots.planning.robot_movement import RobotMovement
 
 _NAMED = 4  # checks that the message names, the worst first
@@ -56,4 +57,4 @@ def _wanted_at(made: RobotMovement, check: Check) -> str:
     if check.what != "tracking" or made.path is None:
         return ""
     position = made.path.positions[int(np.argmin(np.abs(made.path.times - check.time)))]
-    return f", from ({', '.join(f'{x:.3f}' for x in position)}) m"
+    return f", from {point_in_words(position)} m"
