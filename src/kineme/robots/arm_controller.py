@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.movements.rotations.quaternions import normalized
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
@@ -94,7 +94,9 @@ class ArmController:
         self.robot, self.controller = robot, controller
         self._ik = InverseKinematics(robot, follow, controller.dt)
         self._rotation = (
-            self._ik.tip_rotation if orientation is None else _matrix(as_numbers(orientation, "orientation"))
+            self._ik.tip_rotation
+            if orientation is None
+            else _matrix(normalized(as_numbers(orientation, "orientation")))
         )
         controller.reset()
         self._start = self._reaching() if start is None else as_numbers(start, "start")
@@ -143,11 +145,7 @@ class ArmController:
 
     def _tip(self) -> Array:
         """Where the tip is, in the columns of the movement."""
-        position = self._ik.tip_position
-        if len(self.state.movement.position) == 3:
-            return position
-        turned = Rotation.from_matrix(self._ik.tip_rotation).as_quat(scalar_first=True)
-        return np.concatenate((position, turned))
+        return self._ik.tip_pose[: len(self.state.movement.position)]
 
     def _reaching(self) -> Array:
         position, rotation = self._pose(self.controller.state)
@@ -163,4 +161,4 @@ class ArmController:
 
 
 def _matrix(quaternion: Array) -> Array:
-    return np.asarray(Rotation.from_quat(normalized(quaternion), scalar_first=True).as_matrix())
+    return np.array(matrix_one(quaternion.tolist()))
