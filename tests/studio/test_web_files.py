@@ -44,7 +44,9 @@ def test_a_module_is_short_and_says_what_it_is_for(path):
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=_name)
 def test_a_module_makes_no_markup_of_text_and_runs_no_text(path):
-    assert not re.findall(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function", path.read_text())
+    assert not re.findall(
+        r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function", path.read_text()
+    )
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=_name)
@@ -57,7 +59,10 @@ def test_what_a_module_imports_is_there(path):
         for name in (one.strip() for one in names.split(",")):
             if name.startswith("* as "):
                 continue
-            assert re.search(rf"export (?:async )?(?:function|class|const|let) {name}\b", there.read_text()), (source, name)
+            assert re.search(rf"export (?:async )?(?:function|class|const|let) {name}\b", there.read_text()), (
+                source,
+                name,
+            )
             assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{name} is imported and not used"
 
 
