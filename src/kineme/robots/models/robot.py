@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
 from kineme.robots.models.rest import rest_posture
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.table import MODELS, Model
 from kineme.robots.models.urdf import Chain, read_chain
 from kineme.validation import Array, as_numbers, check_number
 
@@ -136,26 +136,9 @@ def load(
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    known = MODELS.get(name) if path.parent == _FOLDER else None
-    assumed = [known.assumed] if known is not None and known.assumed else []
-    if chain.without_stops:
-        assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
-    if chain.without_shape:
-        assumed.append(f"{_have(chain.without_shape)} no shape: its mesh is not there")
-    bounds = {
-        "velocity": (velocity, max_velocity, _VELOCITY, "1/s"),
-        "acceleration": (acceleration, max_acceleration, _ACCELERATION, "1/s^2"),
-    }
-    for what, (values, largest, default, unit) in bounds.items():
-        if largest is not None:
-            check_number(f"max_{what}", largest, above=0.0)
-        unknown = np.isnan(values)
-        if unknown.any() and largest is None:
-            named = ", ".join(np.array(chain.joints)[unknown])
-            assumed.append(f"the file says no {what} limit for {named}: {default:g} {unit} is taken")
-        values[unknown] = default if largest is None else largest
-        if largest is not None:
-            np.minimum(values, largest, out=values)
+    assumed = _assumed(chain, MODELS.get(name) if path.parent == _FOLDER else None)
+    assumed += _limit("velocity", velocity, max_velocity, _VELOCITY, "1/s", chain)
+    assumed += _limit("acceleration", acceleration, max_acceleration, _ACCELERATION, "1/s^2", chain)
     posture = default_rest if rest is None and tip in (None, default_tip) else rest
     if posture is None:
         at_rest, bent = rest_posture(model, chain.tip, lower, upper)
@@ -178,6 +161,29 @@ def load(
         model,
         geometry,
     )
+
+
+def _assumed(chain: Chain, known: Model | None) -> list[str]:
+    """What is said about a model that comes with kineme, and about joints and links of which a file says too little."""
+    assumed = [known.assumed] if known is not None and known.assumed else []
+    if chain.without_stops:
+        assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
+    if chain.without_shape:
+        assumed.append(f"{_have(chain.without_shape)} no shape: its mesh is not there")
+    return assumed
+
+
+def _limit(what: str, values: Array, largest: float | None, default: float, unit: str, chain: Chain) -> list[str]:
+    """Put the default where the file says no limit, and nothing above `largest`, in place; what was assumed."""
+    unknown = np.isnan(values)
+    if largest is None:
+        named = ", ".join(np.array(chain.joints)[unknown])
+        values[unknown] = default
+        return [f"the file says no {what} limit for {named}: {default:g} {unit} is taken"] if unknown.any() else []
+    check_number(f"max_{what}", largest, above=0.0)
+    values[unknown] = largest
+    np.minimum(values, largest, out=values)
+    return []
 
 
 def _have(names: tuple[str, ...]) -> str:
