@@ -149,8 +149,7 @@ def straight_arm(folder, kinds=("revolute",) * 6, names=("hand",)):
 def test_an_arm_that_is_singular_in_the_middle_of_its_limits_rests_bent_and_says_so(tmp_path):
     path = straight_arm(tmp_path)
     robot = load(path)
-    still = np.zeros((1, 6))
-    found = along(robot, JointTrajectory(robot.joints, np.zeros(1), robot.rest[None], still, still, {}))
+    found = standing(robot, robot.rest)
     assert found.smallest_singular_values[0] > 0.05
     assert found.tip_positions[0, 2] > 0
     assert np.count_nonzero(robot.rest) <= 3
