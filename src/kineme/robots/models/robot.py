@@ -67,6 +67,11 @@ class Robot:
         """Number of joints n."""
         return len(self.joints)
 
+    @property
+    def slides(self) -> tuple[bool, ...]:
+        """Of each joint whether it is prismatic, its positions in meters."""
+        return tuple(joint.shortname().startswith("JointModelP") for joint in list(self.model.joints)[1:])
+
     def __repr__(self) -> str:
         return f"Robot({self.name!r}: {self.n_joints} joints, tip {self.tip!r})"
 
