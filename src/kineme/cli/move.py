@@ -151,12 +151,10 @@ def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
 
 
 def _summary(made: Any) -> str:
-    trajectory = made.trajectory
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > 1e-3 else ""
-    return (
-        f"{made.robot.name}: {trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}; "
-        f"{len(trajectory)} samples of {len(trajectory.joints)} joints"
-    )
+    from kineme.robots.planning.robot_movement import duration_in_words
+
+    n_samples, n_joints = made.trajectory.positions.shape
+    return f"{made.robot.name}: {duration_in_words(made)}; {n_samples} samples of {n_joints} joints"
 
 
 def _as_data(made: Any) -> dict[str, Any]:
