@@ -54,4 +54,4 @@ class Preflight:
 
 def unit_of(robot: Robot, joint: int, order: int = 0) -> str:
     """Unit of the position of a joint, of its velocity (order 1) or its acceleration (order 2)."""
-    return ("m" if robot.slides[joint] else "rad") + ("", "/s", "/s^2")[order]
+    return robot.units[joint] + ("", "/s", "/s^2")[order]

@@ -110,7 +110,7 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
             _at(trajectory, t),
             float(total[t]),
             limit,
-            "N" if robot.slides[j] else "Nm",
+            "N" if robot.units[j] == "m" else "Nm",
             passed,
             1.0 if passed else _slower_for(holding, moving, limit),
         )

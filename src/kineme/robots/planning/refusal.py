@@ -53,7 +53,7 @@ def _remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
     finer = untimed._replace(rate=min(_MORE * untimed.rate, FASTEST_RATE))
     sampled = any(check.what in _OF_SAMPLING or check.what.endswith(SAMPLING) for check in failed)
     if not sampled and not np.isfinite(made.preflight.slower):
-        return "No speed helps: choose another place, orientation or posture"
+        return "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
