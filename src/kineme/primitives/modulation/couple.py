@@ -61,8 +61,8 @@ def couple(
     Raises
     ------
     TrajectoryError
-        Something else than primitives and rollouts, different dimensions or numbers of movements, an offset of the
-        wrong shape.
+        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions; an offset of the wrong shape.
     SpecificationError
         A stretch that is not within the movement; too few basis functions to keep goals and velocities.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.rotations.quaternions import conjugate, normalized, product
 from kineme.movements.rotations.rotation_vectors import exp, log, nearest
 from kineme.movements.trajectories.movements import Names
@@ -81,6 +82,11 @@ class PosePrimitives(Batch):
                 loaded.references[:, at : at + 4]
             )  # refuses what is no rotation; the numbers stay as they were saved
         return loaded
+
+    @property
+    def moving_channels(self) -> Channels | None:
+        """Those `channels` that are learned, in the order of the columns: the orientations last."""
+        return None if self.recorded_as is None else (*self.recorded_as.plain, *self.recorded_as.orientations)
 
     @property
     def to_recording(self) -> RecordedAs | None:

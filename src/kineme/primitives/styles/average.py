@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.alike import check_alike
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.modulate import modulated
@@ -257,6 +258,7 @@ class AveragePrimitive:
             raise SpecificationError(f"expected primitives of the same specification, {own.dmp}, got {primitives.dmp}")
         if primitives.n_dims != own.n_dims:
             raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
+        check_alike([own.moving_channels, primitives.moving_channels], "movement")
         return primitives
 
 
