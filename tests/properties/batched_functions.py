@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,6 +26,7 @@ from kineme import (
     ActionLibrary,
     Demonstrations,
     DMPFeatures,
+    ExtrapolationWarning,
     Primitives,
     Recognizer,
     Resample,
@@ -193,6 +195,17 @@ def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
     own = Primitives.from_rollout(path).rollout()
     least = own.least_duration(velocity=1.0) / extents(demos)
     return [one | {"least": np.array(least[i])} for i, one in enumerate(moved(demos, own))]
+
+
+def along_stretches(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Along a stretch that bends more than the basis functions can, each its own."""
+    primitives = DMP("bio-inspired", n_basis=20).learn(demos)
+    ends, u = primitives.goals - primitives.starts, np.linspace(0.4, 0.6, 12)
+    zigzag = 0.05 * (-1.0) ** np.arange(12)
+    points = primitives.starts[:, None] + (u + zigzag)[:, None] * ends[:, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExtrapolationWarning)
+        return moved(demos, primitives.rollout(via=[((0.4, 0.6), points)]))
 
 
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:
@@ -559,6 +572,7 @@ TABLE = [
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
     Batched("Primitives.rollout via", modulated, 1e-8),
+    Batched("Primitives.rollout via stretch", along_stretches, 1e-8),
     Batched("couple", coupled, 1e-8),
     Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),

@@ -1,4 +1,4 @@
-"""What was recorded as different things does not become one movement: refused in words, wherever parts come together."""
+"""Recordings of different things do not become one movement: refused in words, wherever parts come together."""
 
 from __future__ import annotations
 

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme.primitives.discrete.changes import changes
 from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.discrete.modulate import changes
 from kineme.primitives.discrete.operators import decoder_at, smoothness_factor
 from kineme.primitives.discrete.per_movement import per_movement
 from kineme.primitives.discrete.rollout import Rollout
