@@ -99,8 +99,8 @@ def move(**options: Any) -> None:
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
-    from kineme.robots.robot_movement import InfeasibleError
-    from kineme.robots.robot_movement import move as move_robot
+    from kineme.robots.planning.move import move as move_robot
+    from kineme.robots.planning.refusal import InfeasibleError
 
     generated, space = _generated(robot, options)
     timing = "fastest" if options["fastest"] else "slowed" if options["slow_down"] else "generated"
@@ -130,8 +130,8 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
 
 def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
     """The movement, of the tip [m] or of the joints, and which of the two."""
-    from kineme.robots.placed import placed
-    from kineme.robots.roles import space_of
+    from kineme.robots.planning.placed import placed
+    from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)
     space = "joints" if options["joints"] else space_of(learned.primitive.channels, learned.example, robot)

@@ -3,9 +3,9 @@ from kineme.robots.models.robot import load as load
 from kineme.robots.models.robot import Robot as Robot
 
 # From a movement to an arm
-from kineme.robots.robot_movement import move as move
-from kineme.robots.robot_movement import RobotMovement as RobotMovement
-from kineme.robots.robot_movement import InfeasibleError as InfeasibleError
+from kineme.robots.planning.move import move as move
+from kineme.robots.planning.robot_movement import RobotMovement as RobotMovement
+from kineme.robots.planning.refusal import InfeasibleError as InfeasibleError
 from kineme.robots.execution.joint_trajectory import JointTrajectory as JointTrajectory
 from kineme.robots.checks.preflight import preflight as preflight
 from kineme.robots.checks.check import Preflight as Preflight

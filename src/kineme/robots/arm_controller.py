@@ -6,18 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.quaternions import normalized
+from kineme.movements.rotations.matrices import matrices_of, quaternion_of
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.reach import point_in_words, reaching_postures
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
-
-_REACHED = 1e-3  # farther from the start than this, no posture reaches it [m]
 
 
 class ArmState(NamedTuple):
@@ -67,7 +64,7 @@ class ArmController:
     Raises
     ------
     TrajectoryError
-        A movement of other columns, or a start out of reach.
+        A movement of other columns, an orientation that is no unit quaternion, or a start out of reach.
     SpecificationError
         Joints that stand outside their limits, or as many as the arm does not have.
     DataError
@@ -93,11 +90,9 @@ class ArmController:
             )
         self.robot, self.controller = robot, controller
         self._ik = InverseKinematics(robot, follow, controller.dt)
-        self._rotation = (
-            self._ik.tip_rotation if orientation is None else _matrix(as_numbers(orientation, "orientation"))
-        )
+        self._rotation = self._ik.tip_rotation if orientation is None else _rotation(orientation)
         controller.reset()
-        self._start = self._reaching() if start is None else as_numbers(start, "start")
+        self._start = self._nearest_start() if start is None else as_numbers(start, "start")
         if self._start.shape != (robot.n_joints,):
             raise SpecificationError(f"expected start as {robot.n_joints} joints, got shape {self._start.shape}")
         self._waits = controller.options.feedback == "phase"
@@ -139,28 +134,25 @@ class ArmController:
     def _pose(self, movement: State) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of the tip that the movement asks for."""
         columns = movement.position
-        return columns[:3], self._rotation if len(columns) == 3 else _matrix(columns[3:])
+        return columns[:3], self._rotation if len(columns) == 3 else matrices_of(columns[3:])
 
     def _tip(self) -> Array:
         """Where the tip is, in the columns of the movement."""
         position = self._ik.tip_position
         if len(self.state.movement.position) == 3:
             return position
-        turned = Rotation.from_matrix(self._ik.tip_rotation).as_quat(scalar_first=True)
-        return np.concatenate((position, turned))
+        return np.concatenate((position, quaternion_of(self._ik.tip_rotation)))
 
-    def _reaching(self) -> Array:
+    def _nearest_start(self) -> Array:
         position, rotation = self._pose(self.controller.state)
-        found = postures(self.robot, position, rotation, self._ik.costs)
-        if found.errors[0] > _REACHED:
-            where = ", ".join(f"{x:.3f}" for x in position)
-            raise TrajectoryError(
-                f"{self.robot.name} does not reach the start of the movement, ({where}) m: its tip stays "
-                f"{found.errors[0]:.3f} m away; choose another start or free the orientation"
-            )
-        away = np.abs(found.joints - self.robot.rest).max(axis=1)
-        return np.asarray(found.joints[int(np.argmin(away))])
+        what = f"the start of the movement, {point_in_words(position)} m"
+        found = reaching_postures(self.robot, position, rotation, self._ik.costs, what)
+        away = np.abs(found - self.robot.rest).max(axis=1)
+        return np.asarray(found[int(np.argmin(away))])
 
 
-def _matrix(quaternion: Array) -> Array:
-    return np.asarray(Rotation.from_quat(normalized(quaternion), scalar_first=True).as_matrix())
+def _rotation(orientation: ArrayLike) -> Array:
+    q = as_numbers(orientation, "orientation")
+    if q.shape != (4,):
+        raise TrajectoryError(f"expected orientation as one quaternion (w, x, y, z), got shape {q.shape}")
+    return matrices_of(q)

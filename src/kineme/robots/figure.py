@@ -11,7 +11,7 @@ from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
 from kineme.primitives.rollout_figure import set_equal_scales
 from kineme.robots.checks.along import along
-from kineme.robots.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import RobotMovement
 
 _ROW = 0.8  # height of one joint [inch]
 

@@ -8,6 +8,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from kineme import KinemeError, orientation
 from kineme.errors import TrajectoryError
+from kineme.movements.rotations.matrices import matrices_of, quaternion_of
+from kineme.movements.rotations.quaternions import rotated
 from kineme.movements.rotations.rotation_vectors import nearest
 from kineme.orientation import angle_between, conjugate, continuous, exp, log, normalized, product, slerp
 from rotation_samples import as_rotation, random_quaternions, seeds
@@ -25,6 +27,15 @@ def test_products_compose_as_scipys(seed):
     expected = as_rotation(a.reshape(-1, 4)) * as_rotation(np.broadcast_to(b, a.shape).reshape(-1, 4))
     assert same_rotation(product(a, b).reshape(-1, 4), expected.as_quat(scalar_first=True))
     np.testing.assert_allclose(product(a, conjugate(a)), np.broadcast_to([1, 0, 0, 0], a.shape), atol=1e-15)
+
+
+@given(seed=seeds)
+def test_rotated_vectors_and_matrices_are_scipys(seed):
+    q, x = random_quaternions(seed, 3, 5), np.random.default_rng(seed).normal(size=(5, 3))
+    expected = as_rotation(q.reshape(-1, 4)).as_matrix().reshape(3, 5, 3, 3)
+    np.testing.assert_allclose(matrices_of(q), expected, atol=1e-12)
+    np.testing.assert_allclose(rotated(q, x), (expected @ x[..., None])[..., 0], atol=1e-12)
+    np.testing.assert_allclose(np.abs(quaternion_of(expected[0, 0]) @ q[0, 0]), 1.0, atol=1e-12)
 
 
 @given(seeds)

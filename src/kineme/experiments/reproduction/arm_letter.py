@@ -16,7 +16,8 @@ from kineme.output.table import Table
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import PLANES
 from kineme.robots.models.robot import load
-from kineme.robots.robot_movement import RobotMovement, move
+from kineme.robots.planning.move import move
+from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.validation import Array
 
 CAPTION = "(b, c) The WAM writes the learned letter: the path of its tip, seen from above, and its joints."

@@ -13,8 +13,9 @@ from kineme.files.ros.bags import Bag, Topic
 from kineme.files.ros.frames import Edge, Step, chain, connected_graph, edge_of, transforms_in
 from kineme.files.ros.merge_streams import SECOND, clock_of, in_order, stamps_of, values_at
 from kineme.files.ros.message_types import POSE, nanoseconds_of, transform_row
-from kineme.files.ros.rotations import are_rotations, conjugate, continuous, product, turned, unit
+from kineme.files.ros.rotations import are_rotations, from_ros, to_ros
 from kineme.files.ros.streams import Samples, Stamps, Stream, check_kept, stream_of
+from kineme.movements.rotations.quaternions import conjugate, continuous, product, rotated
 from kineme.output.text import counted
 from kineme.validation import MIN_SAMPLES, Array
 
@@ -109,10 +110,10 @@ def _composed(name: str, way: Sequence[Step], edges: dict[Edge, Stream], left_ou
     at = _common_stamps(name, moving, of_headers, left_out)
     start = int(at[0])
     seconds = (at - start) / SECOND
-    p, q = np.zeros((len(at), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(at), 1))
+    p, q = np.zeros((len(at), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1))
     for step in way:
         p, q = _then(p, q, _at(seconds, start, edges[step.edge], of_headers), step.forward)
-    return Stream(name, POSE, np.hstack((p, continuous(unit(q)))), at, at if of_headers else None, reason)
+    return Stream(name, POSE, np.hstack((p, to_ros(continuous(q)))), at, at if of_headers else None, reason)
 
 
 def _is_fixed(stream: Stream) -> bool:
@@ -146,8 +147,8 @@ def _at(seconds: Array, start: int, stream: Stream, of_headers: bool) -> Array:
 
 def _then(p: Array, q: Array, transform: Array, forward: bool) -> tuple[Array, Array]:
     """The pose (p, q) followed by transforms (n, 7), or by their inverses."""
-    x, r = transform[:, :3], unit(transform[:, 3:])
+    x, r = transform[:, :3], from_ros(transform[:, 3:])
     if not forward:
         r = conjugate(r)
-        x = -turned(r, x)
-    return p + turned(q, x), product(q, r)
+        x = -rotated(r, x)
+    return p + rotated(q, x), product(q, r)

@@ -1,1 +1,1 @@
-"""Unit quaternions and rotation vectors."""
+"""Unit quaternions, rotation vectors and rotation matrices."""

@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z) as arrays of any leading shape: product, conjugate, norm check, sign fix.
+"""Unit quaternions (w, x, y, z) as arrays of any leading shape: product, conjugate, rotation of vectors, norms, signs.
 
 A quaternion q turns a vector given in the tool frame into the world frame, so ``product(c, q)`` turns the world and
 ``product(q, c)`` turns the tool. q and -q are the same orientation. ROS and SciPy write (x, y, z, w) by default:
@@ -50,6 +50,14 @@ def product(a: ArrayLike, b: ArrayLike) -> Array:
 def conjugate(q: ArrayLike) -> Array:
     """``(w, -x, -y, -z)``, for unit quaternions the inverse; shape (..., 4)."""
     return as_quaternions(q) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotated(q: ArrayLike, x: ArrayLike) -> Array:
+    """Vectors x (..., 3) rotated by unit quaternions q (..., 4): ``q x conj(q)``."""
+    q, x = as_quaternions(q), np.asarray(x)
+    w, v = q[..., :1], q[..., 1:]
+    across = 2.0 * np.cross(v, x)
+    return np.asarray(x + w * across + np.cross(v, across))
 
 
 def normalized(q: ArrayLike) -> Array:

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
-_POSTURE = 1e-4  # cost of leaving the rest posture [1/rad]
+#: Cost of leaving the rest posture [1/rad], besides 1 per meter: decides where the pose leaves the joints free.
+POSTURE_COST = 1e-4
 _DAMPING = 1e-3  # of a step, per squared distance from the pose: far away the step is one of gradient descent
 _LARGEST = 0.7  # change of a joint in one step [rad, m]
 
@@ -25,11 +26,13 @@ class Reached(NamedTuple):
     errors: Array  # (m,) [m]
 
 
-def descend(robot: Robot, joints: Array, positions: Array, rotations: Array, costs: Array, n_steps: int) -> Reached:
+def descend(
+    robot: Robot, joints: Array, positions: Array, rotations: Array, turn_costs: Array, n_steps: int
+) -> Reached:
     """Steps of damped least squares (Levenberg and Marquardt) towards poses of the tip.
 
-    A step minimizes ``|p - p*|^2 + |c (R - R*)|^2 + (1e-4 |q - rest|)^2`` to first order; a joint at a stop stays there
-    while it is pushed outwards.
+    A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order, as those of
+    `InverseKinematics` do; a joint at a stop stays there while it is pushed outwards.
 
     Parameters
     ----------
@@ -38,22 +41,22 @@ def descend(robot: Robot, joints: Array, positions: Array, rotations: Array, cos
         Where to start.
     positions, rotations : ndarray of shape (m, 3) and (m, 3, 3), or one for all
         The poses.
-    costs : ndarray of shape (3,)
-        Of turning about x, y, z of the tip [1/rad], besides 1 per meter.
+    turn_costs : ndarray of shape (3,)
+        c, of turning about x, y, z of the tip [1/rad], besides 1 per meter.
     n_steps : int
     """
     q = np.array(joints, dtype=float)
-    weights = np.concatenate((np.ones(3), costs))
+    weights = np.concatenate((np.ones(3), turn_costs))
     for _ in range(n_steps):
         at, turned, jacobians = kinematics(robot, q)
         back = turned.transpose(0, 2, 1)
         away = np.einsum("mij,mj->mi", back, positions - at)
         turn = Rotation.from_matrix(back @ rotations).as_rotvec()
         error = np.concatenate((away, turn), axis=1) * weights
-        slope = np.einsum("mij,mi->mj", jacobians * weights[:, None], error) + _POSTURE**2 * (robot.rest - q)
+        slope = np.einsum("mij,mi->mj", jacobians * weights[:, None], error) + POSTURE_COST**2 * (robot.rest - q)
         stopped = ((q <= robot.lower) & (slope < 0)) | ((q >= robot.upper) & (slope > 0))
         free = np.where(stopped[:, None], 0.0, jacobians * weights[:, None])
-        damping = _POSTURE**2 + _DAMPING * np.einsum("mi,mi->m", error, error)
+        damping = POSTURE_COST**2 + _DAMPING * np.einsum("mi,mi->m", error, error)
         curvature = free.transpose(0, 2, 1) @ free + damping[:, None, None] * np.eye(robot.n_joints)
         change = np.linalg.solve(curvature, np.where(stopped, 0.0, slope)[:, :, None])[:, :, 0]
         change *= np.minimum(1.0, _LARGEST / np.maximum(np.abs(change).max(axis=1, keepdims=True), 1e-12))

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
+from kineme.robots.kinematics.descent import POSTURE_COST
 from kineme.robots.models.robot import Robot, check_robot, check_start
 from kineme.validation import Array, check_choice, check_number
 
 #: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
 ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 0.0, 0.0)}
 
-_PARTIAL = 0.005  # of these costs where the arm has fewer joints than a pose has coordinates
-_POSTURE = 1e-4  # cost of leaving the rest posture [1/rad]: decides where the pose leaves the joints free
+_PARTIAL = 0.005  # times these costs, for arms with fewer joints than a pose has coordinates: the position comes first
 _GAIN = 0.95  # of the way to a limit that one step may go
 _DAMPING = 1e-12
 
@@ -22,9 +22,9 @@ _DAMPING = 1e-12
 class InverseKinematics:
     """The joints of one arm, step by step; the quadratic programs are those of pink, solved by DAQP.
 
-    One step minimizes ``|p - p*|^2 + |c (R - R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the joints
-    q, subject to the limits of position, and of velocity if a time step is given. p and R are position and orientation
-    of the tip, starred the wanted ones, c the cost of turning.
+    One step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the
+    joints q, subject to the limits of position, and of velocity if a time step is given. p and R are position and
+    orientation of the tip, starred the wanted ones, log the rotation vector of a rotation, c the costs of turning.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class InverseKinematics:
     ----------
     robot : Robot
     costs : ndarray of shape (3,)
-        Of turning about x, y, z of the tip [1/rad], besides 1 per meter.
+        c, of turning about x, y, z of the tip [1/rad], besides 1 per meter.
 
     Raises
     ------
@@ -68,7 +68,7 @@ class InverseKinematics:
         partial = 1.0 if robot.n_joints >= 6 else _PARTIAL
         self.costs = partial * np.array(ORIENTATIONS[orientation])
         self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
-        self._posture = PostureTask(cost=_POSTURE)
+        self._posture = PostureTask(cost=POSTURE_COST)
         self._posture.set_target(robot.rest)
         self._fastest: Array | None = None if time_step is None else robot.velocity
         self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]

@@ -17,12 +17,13 @@ _STARTS = 16
 _TOLERANCE = 1e-4  # from the pose [m]
 
 
-def postures(robot: Robot, position: Array, rotation: Array, costs: Array) -> Reached:
-    """Joint positions that bring the tip to one pose, from the rest posture and from spread random ones.
+def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array) -> Reached:
+    """Joint positions that bring the tip to one pose, from the rest posture and from 15 others spread over the limits.
 
-    The nearest comes first. If none reaches it, that which comes nearest is alone.
+    Two that differ by less than 0.3 rad in every joint count as one. The most exact comes first; if none comes within
+    0.1 mm, it is alone.
     """
-    found = descend(robot, _starts(robot), position, rotation, costs, _STEPS)
+    found = descend(robot, _starts(robot), position, rotation, turn_costs, _STEPS)
     order = np.argsort(found.errors, kind="stable")
     kept = [int(order[0])]
     for i in order[1:]:

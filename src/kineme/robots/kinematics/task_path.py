@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.quaternions import normalized
+from kineme.movements.rotations.matrices import matrices_of
 from kineme.validation import Array, as_numbers
 
 #: Planes in which a two-dimensional movement is executed: its axes in the frame of the robot.
@@ -49,7 +49,7 @@ def task_path(
     Raises
     ------
     TrajectoryError
-        Positions of another number of dimensions.
+        Positions of another number of dimensions; an orientation of another shape, or not of norm 1.
     SpecificationError
         An unknown plane.
     """
@@ -63,5 +63,14 @@ def task_path(
         raise SpecificationError(f"expected plane as one of {', '.join(PLANES)}, got {plane!r}")
     points = np.tile(np.zeros(3) if through is None else as_numbers(through, "through"), (len(times), 1))
     points[:, list(PLANES[plane]) if d == 2 else [0, 1, 2]] = positions
-    quaternions = np.broadcast_to(normalized(np.atleast_2d(as_numbers(orientation, "orientation"))), (len(times), 4))
-    return TaskPath(times, points, Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
+    return TaskPath(times, points, np.broadcast_to(_rotations(orientation, len(times)), (len(times), 3, 3)))
+
+
+def _rotations(orientation: ArrayLike, n_samples: int) -> Array:
+    """Rotation matrices, (3, 3) or (T, 3, 3)."""
+    q = as_numbers(orientation, "orientation")
+    if q.shape not in {(4,), (n_samples, 4)}:
+        raise TrajectoryError(
+            f"expected orientation as one quaternion (w, x, y, z) or {n_samples} of them, got shape {q.shape}"
+        )
+    return matrices_of(q)

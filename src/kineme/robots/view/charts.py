@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.output.text import in_markup
-from kineme.robots.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE
 from kineme.robots.checks.along import along
-from kineme.robots.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.view.shapes import Shapes
 from kineme.sampling import evenly_spaced
 from kineme.validation import Array

@@ -10,7 +10,7 @@ from pathlib import Path
 from kineme.output.atomic import write_atomically
 from kineme.output.text import counted, in_markup, printable
 from kineme.robots.checks.report import preflight_table
-from kineme.robots.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.view.charts import charts
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data, scene_data
 from kineme.robots.view.shapes import shapes_of

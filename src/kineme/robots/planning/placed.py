@@ -13,7 +13,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
 from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.roles import Roles, roles_of
+from kineme.robots.planning.roles import Roles, roles_of
 from kineme.validation import Array, as_numbers
 
 

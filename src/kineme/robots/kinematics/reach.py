@@ -1,0 +1,69 @@
+"""Whether an arm reaches the poses of a movement: where not, and by how far."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.robots.kinematics.descent import kinematics
+from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.task_path import TaskPath
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array
+
+_REACHED = 1e-3  # farther from its pose than this, a posture does not reach it [m]
+_MOST_CHECKED = 20  # poses whose distance is sought, of those that are missed
+_REMEDY = "choose another place, free the orientation, or make the movement smaller"
+
+
+def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, what: str) -> Array:
+    """Postures (m, n) whose tips reach a pose; `what` says which pose it is.
+
+    Raises
+    ------
+    TrajectoryError
+        There is none: where, and by how far.
+    """
+    found = postures(robot, position, rotation, turn_costs)
+    if found.errors[0] > _REACHED:
+        raise TrajectoryError(_unreachable(robot, what, float(found.errors[0])))
+    return found.joints
+
+
+def check_reached(robot: Robot, path: TaskPath, joints: Array, turn_costs: Array, tolerance: float) -> None:
+    """Refuse joints (T, n) whose tip stays farther from the poses of the path than `tolerance` [m].
+
+    Raises
+    ------
+    TrajectoryError
+        The pose that is farthest out of reach: at which time, where and by how far; or, if every pose is within reach,
+        from when to when the tip does not keep up.
+    """
+    errors = np.linalg.norm(kinematics(robot, joints)[0] - path.positions, axis=1)
+    missed = np.flatnonzero(~(errors <= tolerance))
+    if len(missed) == 0:
+        return
+    checked = missed[np.unique(np.linspace(0, len(missed) - 1, _MOST_CHECKED).astype(int))]
+    nearest = [postures(robot, path.positions[t], path.rotations[t], turn_costs).errors[0] for t in checked]
+    worst = int(np.argmax(nearest))
+    if nearest[worst] > tolerance:
+        raise TrajectoryError(_unreachable(robot, pose_in_words(path, int(checked[worst])), float(nearest[worst])))
+    raise TrajectoryError(
+        f"{robot.name} reaches every pose of this movement, but not one after the other: from "
+        f"{path.times[missed[0]]:.2f} to {path.times[missed[-1]]:.2f} s its tip stays up to {errors.max():.3f} m away, "
+        f"where joints come to a stop or would have to jump; {_REMEDY}"
+    )
+
+
+def pose_in_words(path: TaskPath, t: int) -> str:
+    """Position and time of sample t of a path."""
+    return f"{point_in_words(path.positions[t])} m at {path.times[t]:.2f} s"
+
+
+def point_in_words(position: Array) -> str:
+    """A position [m], to the millimeter."""
+    return f"({', '.join(f'{x:.3f}' for x in position)})"
+
+
+def _unreachable(robot: Robot, what: str, distance: float) -> str:
+    return f"{robot.name} does not reach {what}: its tip stays {distance:.3f} m away; {_REMEDY}"

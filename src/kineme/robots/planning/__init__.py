@@ -1,0 +1,1 @@
+"""From a movement to a checked trajectory of the joints of an arm."""

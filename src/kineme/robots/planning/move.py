@@ -1,0 +1,118 @@
+"""Move an arm: what is asked for, the joints along it, its timing and its checks, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from kineme.errors import TrajectoryError
+from kineme.robots.checks.preflight import TRACKED
+from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.reach import check_reached
+from kineme.robots.kinematics.task_path import PLANES
+from kineme.robots.models.robot import Robot, check_robot, check_start
+from kineme.robots.planning.joint_path import PLACES, joints_along, path_of_the_tip
+from kineme.robots.planning.refusal import refuse_failed
+from kineme.robots.planning.request import request_of
+from kineme.robots.planning.robot_movement import RobotMovement
+from kineme.robots.planning.roles import SPACES
+from kineme.robots.planning.timed_movement import TIMINGS, Untimed, with_timing
+from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
+
+_SLOWEST_RATE, _FASTEST_RATE = 1.0, 10_000.0  # samples per second of what is sent
+
+
+def move(  # noqa: PLR0913 - one parameter per option
+    movement: Any,
+    robot: Robot,
+    *,
+    space: str = "auto",
+    orientation: ArrayLike | None = None,
+    follow: str = "full",
+    plane: str = "xy",
+    place: str = "as given",
+    timing: str = "generated",
+    rate: float = 100.0,
+    start: ArrayLike | None = None,
+    steps: Mapping[str, Array] | None = None,
+    force: bool = False,
+) -> RobotMovement:
+    """Make a movement of the tip or of the joints executable on an arm, and check it.
+
+    Parameters
+    ----------
+    movement : Trajectory, Rollout, PoseRollout, primitive, or what else holds one movement
+        Positions of the tip in the frame of the robot, of two or three dimensions, alone or with orientations; or
+        positions of the joints. In meters and radians, unless its channels name another unit. Its discrete channels
+        are kept as `steps`.
+    robot : Robot
+    space : {"auto", "tip", "joints"}, default "auto"
+        Of what the positions are. "auto": of the joints, if there are as many angles as the robot has joints; without
+        channels, if there are as many columns, neither two, three nor a pose. Else of the tip.
+    orientation : array_like of shape (4,), optional
+        Unit quaternion w, x, y, z of the tip throughout; by default as in the movement, and where it has none, that of
+        the rest posture.
+    follow : {"full", "axis", "free"}, default "full"
+        How much of the orientation is followed; see `InverseKinematics`.
+    plane : {"xy", "xz", "yz"}, default "xy"
+        Where the axes of a two-dimensional movement lie; the third coordinate is that of the tip at rest.
+    place : {"as given", "free"}, default "as given"
+        "free" shifts the movement to where the arm executes it best.
+    timing : {"generated", "slowed", "fastest"}, default "generated"
+        That of the movement; the same, slowed down evenly as far as limits demand; or the least time that keeps the
+        limits along the path.
+    rate : float, default 100
+        Samples per second of what is sent, 1 to 10,000.
+    start : array_like of shape (n,), optional
+        Where the joints stand now; by default the rest posture. The approach begins there.
+    steps : dict of str to array_like of shape (T,), optional
+        Discrete channels, as of a gripper, at the samples of the movement: kept as steps, whatever the timing.
+    force : bool, default False
+        Return a trajectory that did not pass its checks.
+
+    Returns
+    -------
+    RobotMovement
+
+    Raises
+    ------
+    InfeasibleError
+        A check did not pass: which joint, when, its value beside the limit, and the least duration that works.
+    TrajectoryError
+        A pose out of reach, a movement of the wrong dimension, or several movements.
+    SpecificationError
+        An unknown option; a start outside the limits; more than a million samples.
+    DataError
+        The extra ``robot`` is not installed.
+    """
+    check_robot(robot)
+    check_choice("space", space, SPACES)
+    check_choice("plane", plane, list(PLANES))
+    check_choice("timing", timing, TIMINGS)
+    check_choice("place", place, PLACES)
+    check_number("rate", rate, least=_SLOWEST_RATE, most=_FASTEST_RATE)
+    check_switch("force", force)
+    request = request_of(movement, robot, space, steps)
+    stands = robot.rest if start is None else _posture(start, robot)
+    if request.space == "joints":
+        joints, path = CubicSpline(request.times, request.positions), None
+    else:
+        ik = InverseKinematics(robot, follow)
+        joints, path = joints_along(ik, path_of_the_tip(ik, request, orientation, plane), place, stands)
+        if not force:
+            check_reached(robot, path, joints(path.times), ik.costs, TRACKED)
+    made = with_timing(Untimed(robot, joints, path, stands, rate, request.times, request.steps), timing)
+    if not force:
+        refuse_failed(made)
+    return made
+
+
+def _posture(start: ArrayLike, robot: Robot) -> Array:
+    q = as_numbers(start, "start")
+    if q.shape != (robot.n_joints,):
+        raise TrajectoryError(f"expected start as the positions of {robot.n_joints} joints, got shape {q.shape}")
+    check_start(robot, q)
+    return q

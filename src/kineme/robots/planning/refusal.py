@@ -1,0 +1,60 @@
+"""Why an arm cannot execute a movement, in words: which joint, when, how far beyond its limit, and what helps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.errors import TrajectoryError
+from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.kinematics.reach import point_in_words
+from kineme.robots.planning.robot_movement import RobotMovement
+
+_NAMED = 4  # checks that the message names, the worst first
+
+
+class InfeasibleError(TrajectoryError):
+    """A trajectory that an arm cannot or must not execute; ``preflight`` holds the checks."""
+
+    def __init__(self, message: str, preflight: Preflight | None = None) -> None:
+        super().__init__(message)
+        self.preflight = preflight
+
+
+def refuse_failed(made: RobotMovement) -> None:
+    """Refuse a movement that did not pass its checks.
+
+    Raises
+    ------
+    InfeasibleError
+        A check that did not pass, with the least duration that works.
+    """
+    if not made.preflight.passed:
+        raise InfeasibleError(_refusal(made), made.preflight)
+
+
+def _refusal(made: RobotMovement) -> str:
+    failed = made.preflight.failed
+    lines = [
+        f"{c.what} of {c.where} at {c.time:.2f} s{_wanted_at(made, c)}: {c.worst:.3g}, limit {c.limit:.3g} {c.unit}"
+        for c in failed[:_NAMED]
+    ]
+    more = f" and {len(failed) - _NAMED} more" if len(failed) > _NAMED else ""
+    return f"{made.robot.name} cannot execute this: {'; '.join(lines)}{more}. {_remedy(made)}"
+
+
+def _remedy(made: RobotMovement) -> str:
+    slower = made.preflight.slower
+    if not np.isfinite(slower):
+        return "No speed helps: choose another place, orientation or posture"
+    duration = made.trajectory.duration - made.begins
+    return (
+        f"It works in {duration * slower:.3g} s instead of {duration:.3g}: slow it down (timing='slowed', --slow-down)"
+    )
+
+
+def _wanted_at(made: RobotMovement, check: Check) -> str:
+    """Where the tip was to be when it was farthest from there."""
+    if check.what != "tracking" or made.path is None:
+        return ""
+    position = made.path.positions[int(np.argmin(np.abs(made.path.times - check.time)))]
+    return f", from {point_in_words(position)} m"

@@ -1,0 +1,71 @@
+"""One movement as an arm is asked for it: samples of the tip or of the joints, in meters and radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.coordinates import as_wxyz
+from kineme.movements.segmentation.segment import as_recording
+from kineme.primitives.discrete.dmp import Primitives
+from kineme.primitives.pose.pose_primitives import PosePrimitives
+from kineme.robots.models.robot import Robot
+from kineme.robots.planning.roles import roles_of, space_of
+from kineme.validation import Array, as_numbers
+
+
+class Request(NamedTuple):
+    """One movement of the tip or of the joints, T samples."""
+
+    times: Array  # (T,) [s], from 0
+    space: str  # "tip" or "joints"
+    positions: Array  # (T, d) [m] or [rad]
+    orientations: Array | None  # (T, 4), w, x, y, z
+    steps: dict[str, Array]  # discrete channels, (T,)
+
+
+def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Request:
+    """What `move` was given, as one movement; `steps` besides the discrete channels of its own.
+
+    Raises
+    ------
+    TrajectoryError
+        Several movements, several orientations, joints of another number, or steps of another length.
+    SpecificationError
+        Steps that are no dict.
+    """
+    if isinstance(movement, Primitives | PosePrimitives):
+        movement = movement.rollout()
+    one = as_recording(movement)
+    columns = np.asarray(one.recorded, dtype=float)
+    space = space_of(one.channels, columns, robot) if space == "auto" else space
+    roles = roles_of(one.channels, columns.shape[1], space)
+    if space == "joints" and len(roles.positions) != robot.n_joints:
+        raise TrajectoryError(
+            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns"
+        )
+    turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
+    recorded = {name: columns[:, k] for name, k in roles.discrete.items()}
+    return Request(
+        one.times - one.times[0],
+        space,
+        columns[:, roles.positions] * roles.units,
+        turned,
+        {name: _one_for_each(one.times, values, name) for name, values in {**recorded, **_given(steps)}.items()},
+    )
+
+
+def _given(steps: Any) -> Mapping[str, Any]:
+    if not isinstance(steps, Mapping | None):
+        raise SpecificationError(f"expected steps as a dict of channels and their values, got {steps!r:.80}")
+    return steps or {}
+
+
+def _one_for_each(times: Array, values: Any, name: str) -> Array:
+    values = as_numbers(values, name)
+    if values.shape != times.shape:
+        raise TrajectoryError(f"expected {len(times)} values of {name}, one for each sample, got {values.shape}")
+    return values

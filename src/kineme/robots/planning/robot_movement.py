@@ -1,0 +1,41 @@
+"""A movement on an arm: what is sent, what the tip follows, and the checks of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kineme.robots.checks.check import Preflight
+from kineme.robots.execution.joint_trajectory import JointTrajectory
+from kineme.robots.kinematics.task_path import TaskPath
+from kineme.robots.models.robot import Robot
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotMovement:
+    """What `move` made.
+
+    Attributes
+    ----------
+    robot : Robot
+    trajectory : JointTrajectory
+        What is sent to the arm: the approach from the posture where it stands, then the movement.
+    path : TaskPath or None
+        What the tip follows, at the samples of the movement; None of a movement of the joints.
+    preflight : Preflight
+        All checks of `trajectory`.
+    begins : float
+        When the approach is over and the movement begins [s].
+    factor : float
+        How many times as long the movement takes as it was generated.
+    """
+
+    robot: Robot
+    trajectory: JointTrajectory
+    path: TaskPath | None
+    preflight: Preflight
+    begins: float
+    factor: float
+
+    def __repr__(self) -> str:
+        as_generated = f"{self.factor:.3g} times as long as generated"
+        return f"RobotMovement({self.robot.name!r}, {self.trajectory.duration:.2f} s, {as_generated})"

@@ -1,0 +1,1 @@
+"""A library as one HTML page that needs no other file, no server and no network."""

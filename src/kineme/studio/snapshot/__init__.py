@@ -1,0 +1,1 @@
+"""A library as arrays and JSON that a browser computes with."""
