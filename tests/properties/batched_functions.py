@@ -459,8 +459,19 @@ def pose_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
         references=primitives.references,
         durations=primitives.durations / demos.durations,
     )
-    parts = [posed(demos, movement) for movement in (primitives.rollout(), asked)]
-    return [a | b | {f"asked {k}": v for k, v in c.items()} for a, b, c in zip(numbers, *parts, strict=True)]
+    points = primitives.rollout(n_samples=11).poses[:, 4]
+    points[:, :3] += 0.05 * unit
+    points[demos.durations > 1.0, 3:] = np.nan
+    moving = 0.1 * units / tau
+    through = type(primitives).from_rollout(primitives.rollout(via=[(0.4, points)], end_velocity=moving)).rollout()
+    towards = primitives.rollout(via=[], goal_velocity=moving)
+    least = {"least": through.least_duration(velocity=np.array([1e12] * 3 + [1.0] * 3))}
+    parts = [posed(demos, movement) for movement in (primitives.rollout(), asked, through, towards)]
+    named = [
+        [{f"{what} {k}": v for k, v in one.items()} for one in part]
+        for what, part in zip(("replayed", "asked", "through", "towards"), parts, strict=True)
+    ]
+    return [a | b | c | d | e | f for a, b, c, d, e, f in zip(numbers, *named, each(len(demos), **least), strict=True)]
 
 
 def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
