@@ -55,6 +55,8 @@ from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
 from kineme.movements.channels.channel import Channel
 from kineme.movements.preparation.arc_length import resample_by_arc_length
+from kineme.movements.rotations.matrices import matrices_of
+from kineme.movements.rotations.quaternions import rotated
 from kineme.movements.trajectories.as_learned import as_learned
 from kineme.movements.trajectories.channels import of_channels
 from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to_tangent
@@ -524,13 +526,21 @@ def learned_coordinates(demos: Demonstrations) -> list[dict[str, Any]]:
 
 
 def tangents(demos: Demonstrations) -> list[dict[str, Any]]:
-    """There and back, and the quaternions one by one."""
+    """There and back, and the quaternions one by one, with the tool's z axis in the world by two ways."""
     tangent, references = to_tangent(demos)
     back = from_tangent(tangent, references)
     found = []
     for i, (one, turned) in enumerate(zip(tangent, back, strict=True)):
         q = continuous(normalized(turned.positions[:, 3:]))
-        found.append({"tangent": one.positions[:, 3:], "quaternions": q * np.sign(q[0, 0]), "reference": references[i]})
+        found.append(
+            {
+                "tangent": one.positions[:, 3:],
+                "quaternions": q * np.sign(q[0, 0]),
+                "reference": references[i],
+                "axis": rotated(q, [0.0, 0.0, 1.0]),
+                "column": matrices_of(q)[:, :, 2],
+            }
+        )
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.table import MODELS
+from kineme.robots.models.rest import rest_posture
+from kineme.robots.models.table import MODELS, Model
 from kineme.robots.models.urdf import Chain, read_chain
 from kineme.validation import Array, as_numbers, check_number
 
@@ -30,6 +30,8 @@ class Robot:
     ----------
     name : str
     joints : tuple of str
+    units : tuple of str
+        "rad", or "m" of joints that slide.
     tip : str
         The frame that follows the movement.
     lower, upper : ndarray of shape (n,)
@@ -50,6 +52,7 @@ class Robot:
 
     name: str
     joints: tuple[str, ...]
+    units: tuple[str, ...]
     tip: str
     lower: Array
     upper: Array
@@ -116,7 +119,7 @@ def load(
         The link that follows the movement; by default that of the model, of a file the end of its only chain.
     rest : array_like of shape (n,), optional
         Posture from which movements are approached; by default that of the model, of a file the middle of the limits
-        (0 of joints that turn several times).
+        (0 of joints that turn several times), with up to three joints bent if that is a singular posture.
     max_velocity, max_acceleration : float, optional
         Upper bounds for all joints, below what the file allows; also of joints whose file says none, which otherwise
         get 1 per second and 5 per second squared.
@@ -133,29 +136,19 @@ def load(
     chain = read_chain(path, tip or default_tip)
     model, geometry = _build(pinocchio, path, chain)
     lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    known = MODELS.get(name) if path.parent == _FOLDER else None
-    assumed = [known.assumed] if known is not None and known.assumed else []
-    assumed += [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
-    assumed += [f"{link} has no shape: its mesh is not there" for link in chain.without_shape]
-    bounds = {
-        "velocity": (velocity, max_velocity, _VELOCITY, "1/s"),
-        "acceleration": (acceleration, max_acceleration, _ACCELERATION, "1/s^2"),
-    }
-    for what, (values, largest, default, unit) in bounds.items():
-        if largest is not None:
-            check_number(f"max_{what}", largest, above=0.0)
-        unknown = np.isnan(values)
-        if unknown.any() and largest is None:
-            named = ", ".join(np.array(chain.joints)[unknown])
-            assumed.append(f"the file says no {what} limit for {named}: {default:g} {unit} is taken")
-        values[unknown] = default if largest is None else largest
-        if largest is not None:
-            np.minimum(values, largest, out=values)
+    assumed = _assumed(chain, MODELS.get(name) if path.parent == _FOLDER else None)
+    assumed += _limit("velocity", velocity, max_velocity, _VELOCITY, "1/s", chain)
+    assumed += _limit("acceleration", acceleration, max_acceleration, _ACCELERATION, "1/s^2", chain)
     posture = default_rest if rest is None and tip in (None, default_tip) else rest
-    at_rest = _posture(posture, lower, upper, chain.joints)
+    if posture is None:
+        at_rest, bent = rest_posture(model, chain.tip, lower, upper)
+        assumed += [_bent_in_words(at_rest)] if bent else []
+    else:
+        at_rest = _posture(posture, lower, upper, chain.joints)
     return Robot(
         name,
         chain.joints,
+        chain.units,
         chain.tip,
         lower,
         upper,
@@ -168,6 +161,40 @@ def load(
         model,
         geometry,
     )
+
+
+def _assumed(chain: Chain, known: Model | None) -> list[str]:
+    """What is said about a model that comes with kineme, and about joints and links of which a file says too little."""
+    assumed = [known.assumed] if known is not None and known.assumed else []
+    if chain.without_stops:
+        assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
+    if chain.without_shape:
+        assumed.append(f"{_have(chain.without_shape)} no shape: its mesh is not there")
+    return assumed
+
+
+def _limit(what: str, values: Array, largest: float | None, default: float, unit: str, chain: Chain) -> list[str]:
+    """Put the default where the file says no limit, and nothing above `largest`, in place; what was assumed."""
+    unknown = np.isnan(values)
+    if largest is None:
+        named = ", ".join(np.array(chain.joints)[unknown])
+        values[unknown] = default
+        return [f"the file says no {what} limit for {named}: {default:g} {unit} is taken"] if unknown.any() else []
+    check_number(f"max_{what}", largest, above=0.0)
+    values[unknown] = largest
+    np.minimum(values, largest, out=values)
+    return []
+
+
+def _have(names: tuple[str, ...]) -> str:
+    """Up to three names, and that each has what follows."""
+    named = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"{named} {'each have' if len(names) > 1 else 'has'}"
+
+
+def _bent_in_words(rest: Array) -> str:
+    posture = ",".join(f"{value:.4g}" for value in rest)
+    return f"in the middle of its limits the arm is singular: it rests at {posture} (choose with rest=, --rest)"
 
 
 def _pinocchio() -> Any:
@@ -207,10 +234,7 @@ def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
     return model, geometry
 
 
-def _posture(rest: ArrayLike | None, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
-    if rest is None:
-        wide = upper - lower > 2 * math.pi + 1e-9
-        return np.where(wide, np.clip(0.0, lower, upper), (lower + upper) / 2)
+def _posture(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
     posture = as_numbers(rest, "rest")
     if posture.shape != lower.shape:
         raise SpecificationError(f"expected a rest posture of {len(joints)} joints, got shape {posture.shape}")
