@@ -12,7 +12,7 @@ from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.timed_movement import FASTEST_RATE, Untimed, with_timing
 
 _NAMED = 4  # checks that the message names, the worst first
-_OF_SAMPLING = ("jump", "tracking", "turned away")  # may be mended by more samples
+_OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
 _TRIED = 20_000  # samples, at most, of the movement slowed down
 _MORE = 10  # times the samples, where they are too few
 
