@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from arm_samples import simulated, tip_in
+from arm_samples import simulated, standing, tip_in
 from kineme.errors import DataError, SpecificationError
 from kineme.robots import load
-from kineme.robots.checks.along import along
-from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.table import MODELS
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -35,16 +33,6 @@ UR5E = [
 ]
 
 
-def tips(robot, postures):
-    """Positions and rotations of the tip, by the library."""
-    postures = np.atleast_2d(postures)
-    still = np.zeros_like(postures)
-    state = along(
-        robot, JointTrajectory(robot.joints, np.arange(len(postures), dtype=float), postures, still, still, {})
-    )
-    return state.tip_positions, state.tip_rotations
-
-
 def random_postures(robot, n=50):
     return np.random.default_rng(1).uniform(robot.lower, robot.upper, (n, robot.n_joints))
 
@@ -53,8 +41,8 @@ def random_postures(robot, n=50):
 def test_kinematics_are_those_of_the_published_parameters(name, rows):
     robot = load(name)
     postures = random_postures(robot)
-    positions, rotations = tips(robot, postures)
-    for q, position, rotation in zip(postures, positions, rotations, strict=True):
+    state = standing(robot, postures)
+    for q, position, rotation in zip(postures, state.tip_positions, state.tip_rotations, strict=True):
         pose = np.eye(4)
         for angle, (a, alpha, d) in zip(q, rows, strict=True):
             link = np.eye(4)
@@ -72,8 +60,8 @@ def test_kinematics_are_those_that_mujoco_computes(name):
     arm = simulated(mujoco, robot)
     data = mujoco.MjData(arm)
     postures = random_postures(robot, 20)
-    positions, rotations = tips(robot, postures)
-    for q, position, rotation in zip(postures, positions, rotations, strict=True):
+    state = standing(robot, postures)
+    for q, position, rotation in zip(postures, state.tip_positions, state.tip_rotations, strict=True):
         data.qpos[:] = q
         mujoco.mj_kinematics(arm, data)
         there, turned = tip_in(mujoco, arm, data, robot)
@@ -85,8 +73,7 @@ def test_kinematics_are_those_that_mujoco_computes(name):
 def test_rest_postures_are_within_the_limits_and_touch_nothing(name):
     robot = load(name)
     assert np.all((robot.rest >= robot.lower) & (robot.rest <= robot.upper))
-    still = np.zeros((1, robot.n_joints))
-    assert not along(robot, JointTrajectory(robot.joints, np.zeros(1), robot.rest[None], still, still, {})).contacts
+    assert not standing(robot, robot.rest).contacts
 
 
 def test_an_unknown_name_lists_the_known_ones():
@@ -162,8 +149,7 @@ def straight_arm(folder, kinds=("revolute",) * 6, names=("hand",)):
 def test_an_arm_that_is_singular_in_the_middle_of_its_limits_rests_bent_and_says_so(tmp_path):
     path = straight_arm(tmp_path)
     robot = load(path)
-    still = np.zeros((1, 6))
-    found = along(robot, JointTrajectory(robot.joints, np.zeros(1), robot.rest[None], still, still, {}))
+    found = standing(robot, robot.rest)
     assert found.smallest_singular_values[0] > 0.05
     assert found.tip_positions[0, 2] > 0
     assert np.count_nonzero(robot.rest) <= 3

@@ -72,7 +72,7 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.output.table import to_text
     from kineme.robots.checks.report import preflight_table
-    from kineme.robots.models.robot import load
+    from kineme.robots.models.load import load
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")
@@ -126,14 +126,14 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
 
 def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
     """The movement, of the tip [m] or of the joints, and which of the two."""
-    from kineme.robots.planning.placed import placed
+    from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)
     space = "joints" if options["joints"] else space_of(learned.primitive.channels, learned.example, robot)
     if options["goal"] and not (options["at"] or options["as_recorded"] or space == "joints"):
         raise click.UsageError("expected --at with --goal: where the movement starts; or --as-recorded")
-    generated = placed(
+    generated = generate_at(
         learned,
         options["at"],
         options["goal"],
