@@ -22,7 +22,7 @@ const runtime = open(element("snapshot").textContent);
 const d = runtime.header.comparison.n_dims;
 const prototypes = runtime.classes.map((name) => runtime.rollout(runtime.primitive(name)).positions);
 const box = viewed();
-const stage = createStage(element("stage"), d, box);
+const stage = createStage(element("stage"), runtime.header.view, box);
 const state = { stroke: null, live: null, answer: null, moving: null, held: null, pointer: null, played: null, note: "" };
 let [follow, frame] = [null, 0];
 
@@ -87,10 +87,10 @@ function showLive() {
 
 function showAnswer() {
   const { answer, moving } = state;
-  if (!answer) return say(moving ? moving.name : "", moving ? "Drag its start, its goal, or the path itself." : "Draw in the field: with a mouse, a pen or a finger.");
+  if (!answer) return say(moving ? moving.name : "What is it?", moving ? "Drag its start, its goal, or the path itself." : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.");
   const guess = answer.calibrated ? "" : " One drawing of each is known: the verdict is a guess.";
   if (answer.label === null) say("Unknown", `Nearest is ${answer.ranked[0]}; only ${percent(answer.pKnown)} of known movements differ as much.${guess}`, "unknown");
-  else say(answer.label, `${percent(answer.confidence)} sure.${guess} Drag the start, the goal, or the path itself.`);
+  else say(answer.label, `${percent(answer.confidence)} sure.${guess} Drag its start, its goal, or the path; or clear it and draw another.`);
   const unknown = answer.label === null ? 1 - answer.pKnown : 0;
   bars([...answer.ranked.map((name) => ({ name, share: answer.shares[name] * (1 - unknown) })), { name: null, share: unknown }]);
 }
@@ -101,7 +101,7 @@ function bars(ranked) {
   [...element("bars").children].forEach((row, i) => {
     const one = shown[i];
     const [name, track, value] = row.children;
-    name.textContent = one ? one.name ?? "unknown" : "–";
+    name.textContent = one ? one.name ?? "unknown" : "";
     row.className = one?.name ? "" : "unknown";
     value.textContent = one ? percent(one.share) : "";
     track.firstChild.style.width = `${100 * (one?.share ?? 0)}%`;
@@ -270,7 +270,7 @@ function list() {
 function pictures() {
   const [turn, tilt] = ["turn", "tilt"].map((id) => Number(element(id).value));
   element("symbols").querySelectorAll("canvas").forEach((canvas, c) => {
-    const small = createStage(canvas, d, boxOf(prototypes[c]));
+    const small = createStage(canvas, runtime.header.view, boxOf(prototypes[c]));
     small.turned(turn, tilt);
     small.cleared();
     small.line(prototypes[c], "--ink", { wide: 2 });

@@ -3,22 +3,29 @@
 const RADIUS = 9; // of start and goal [CSS pixels]
 const FILLED = 0.4; // of the shorter side, by half of a typical movement
 
-/** Rotation matrix of a view: turned about the vertical, then tilted. */
-function viewOf(d, turn, tilt) {
-  if (d === 2) return [1, 0, 0, 1];
+/** Rotation matrix of a view: a first one, turned about what is up on the screen, then tilted. */
+function viewOf(first, turn, tilt) {
+  if (first.length === 4) return first;
   const [a, b] = [turn, tilt].map((one) => (one * Math.PI) / 180);
-  const [c, s, e, f] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
-  return [c, s, 0, -s * e, c * e, f, s * f, -c * f, e];
+  const [right, up, near] = [0, 1, 2].map((k) => first.slice(3 * k, 3 * k + 3));
+  const mix = (u, x, v, y) => u.map((one, k) => x * one + y * v[k]);
+  const behind = mix(near, Math.cos(a), right, -Math.sin(a));
+  return [
+    ...mix(right, Math.cos(a), near, Math.sin(a)),
+    ...mix(up, Math.cos(b), behind, -Math.sin(b)),
+    ...mix(up, Math.sin(b), behind, Math.cos(b)),
+  ];
 }
 
 /**
  * @param {HTMLCanvasElement} canvas
- * @param {number} d dimensions
+ * @param {number[]} view rotation matrix, row by row: what is right, up and near on the screen
  * @param {{center: number[], half: number}} box what is in view, in the unit of the movements
  */
-export function createStage(canvas, d, box) {
+export function createStage(canvas, view, box) {
+  const d = box.center.length;
   const context = canvas.getContext("2d");
-  let [width, height, R] = [1, 1, viewOf(d, 0, 0)];
+  let [width, height, R] = [1, 1, viewOf(view, 0, 0)];
   let style = getComputedStyle(canvas);
   const scale = () => (FILLED * Math.min(width, height)) / box.half;
   const rotated = (x) => Array.from({ length: d }, (_, k) => x.reduce((sum, value, h) => sum + R[k * d + h] * (value - box.center[h]), 0));
@@ -80,7 +87,7 @@ export function createStage(canvas, d, box) {
     context.clearRect(0, 0, width, height);
   }
 
-  const turned = (turn, tilt) => (R = viewOf(d, turn, tilt));
+  const turned = (turn, tilt) => (R = viewOf(view, turn, tilt));
   return { project, unproject, line, dot, word, cleared, turned };
 }
 

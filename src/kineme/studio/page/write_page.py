@@ -7,6 +7,9 @@ from base64 import b64encode
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
+from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.output.atomic import whole_file
@@ -18,6 +21,7 @@ from kineme.studio.snapshot.snapshot import Snapshot
 
 _FOLDER = Path(__file__).parent
 _TOKENS = _FOLDER.parent / "web" / "tokens.css"
+_FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly along z
 #: People draw on a screen faster or slower than they showed: a factor of 7 either way is two standard deviations.
 _EARLY = Early(duration_spread=1.0)
 
@@ -32,8 +36,8 @@ def library_page(library: ActionLibrary, title: str) -> tuple[str, Snapshot]:
     """
     if library.n_dims not in (2, 3) and len(library):
         raise SpecificationError(
-            f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot be "
-            "drawn; learn two or three columns of the recordings, in the shell with --columns"
+            f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "
+            "be drawn; learn two or three columns of the recordings, in the shell with --columns"
         )
     snapshot = snapshot_of_library(library, early=_EARLY)
     return page_of(snapshot, title), snapshot
@@ -41,6 +45,7 @@ def library_page(library: ActionLibrary, title: str) -> tuple[str, Snapshot]:
 
 def page_of(snapshot: Snapshot, title: str) -> str:
     """The page of a snapshot. Its content security policy allows its own script and style by their hashes, no more."""
+    snapshot.header["view"] = view_of(snapshot)
     script = bundled(_FOLDER / "face.js")
     style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
     parts = {
@@ -75,10 +80,26 @@ def write_page(path: str | Path, library: ActionLibrary, title: str | None = Non
     return snapshot
 
 
+def view_of(snapshot: Snapshot) -> list[float]:
+    """Right, up and near on the screen: the plane in which the movements are largest is that of the screen, z is up."""
+    d = snapshot.header["comparison"]["n_dims"]
+    if d == 2:
+        return [1.0, 0.0, 0.0, 1.0]
+    paths = snapshot.arrays["paths"].reshape(-1, d, N_POINTS).astype(float)
+    away = (paths - paths.mean(axis=2, keepdims=True)).transpose(0, 2, 1).reshape(-1, d)
+    near = np.linalg.eigh(away.T @ away)[1][:, 0]
+    axis = np.eye(3)[1] if abs(near[2]) > _FROM_ABOVE else np.eye(3)[2]
+    up = axis - near * near[axis.argmax()]
+    up /= np.linalg.norm(up)
+    near = near if abs(near[2]) <= _FROM_ABOVE or near[2] > 0 else -near
+    return np.concatenate((np.cross(up, near), up, near)).tolist()
+
+
 def _summary(snapshot: Snapshot) -> str:
     held, known = snapshot.header["n_movements"], snapshot.header.get("n_all", snapshot.header["n_movements"])
     of_all = "" if held == known else f" of {known:,}"
-    return f"{counted(len(snapshot.header['classes']), 'symbol')}, {held:,}{of_all} {'movement' if known == 1 else 'movements'}"
+    symbols = counted(len(snapshot.header["classes"]), "symbol")
+    return f"{symbols}, {held:,}{of_all} {'movement' if known == 1 else 'movements'}"
 
 
 def _hash(text: str) -> str:
