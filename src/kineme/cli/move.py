@@ -72,7 +72,7 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.output.table import to_text
     from kineme.robots.checks.report import preflight_table
-    from kineme.robots.models.robot import load
+    from kineme.robots.models.load import load
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")

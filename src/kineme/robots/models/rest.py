@@ -1,4 +1,4 @@
-"""The posture from which an arm starts, where nobody says one."""
+"""The posture from which an arm starts: as it is given, or where nobody says one."""
 
 from __future__ import annotations
 
@@ -7,13 +7,35 @@ from math import pi
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from kineme.validation import Array
+from kineme.errors import SpecificationError
+from kineme.validation import Array, as_numbers
 
 _BEND = pi / 3  # of a joint that is bent [rad]
 _MOST_BENT = 3  # joints
 _FREE = 0.05  # the smallest singular value of the Jacobian from which on a posture is good to start from
 _ALIKE = 6  # digits to which two postures are as good as each other
+
+
+def checked_rest(rest: ArrayLike, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
+    """A rest posture (n,) as it is given.
+
+    Raises
+    ------
+    SpecificationError
+        One of another number of joints, or outside the limits; with the joint.
+    """
+    posture = as_numbers(rest, "rest")
+    if posture.shape != lower.shape:
+        raise SpecificationError(f"expected a rest posture of {len(joints)} joints, got shape {posture.shape}")
+    outside = ~((posture >= lower) & (posture <= upper))
+    if outside.any():
+        i = int(np.argmax(outside))
+        raise SpecificationError(
+            f"rest posture: expected {joints[i]} within [{lower[i]:.4g}, {upper[i]:.4g}], got {posture[i]:.4g}"
+        )
+    return posture
 
 
 def rest_posture(model: Any, tip: str, lower: Array, upper: Array) -> tuple[Array, bool]:
@@ -60,3 +82,9 @@ def _manipulability(model: Any, tip: str, q: Array) -> tuple[float, float]:
     jacobian = pinocchio.getFrameJacobian(model, data, frame, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
     heights = [data.oMf[frame].translation[2], *(data.oMi[j].translation[2] for j in range(1, model.njoints))]
     return float(np.linalg.svd(jacobian.reshape(6, -1), compute_uv=False)[min(6, len(q)) - 1]), float(min(heights))
+
+
+def bent_in_words(rest: Array) -> str:
+    """The sentence about a posture that `rest_posture` bent."""
+    posture = ",".join(f"{value:.4g}" for value in rest)
+    return f"in the middle of its limits the arm is singular: it rests at {posture} (choose with rest=, --rest)"
