@@ -45,7 +45,9 @@ export function startLibrary() {
   const all = () => {
     if (currentView() !== "library" || shown === library().version) return;
     shown = library().version;
+    const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
+    for (const id of ["symbol", "history", "library-head"]) byId(id).hidden = nothing;
     panel.show();
     cards();
     chose();
