@@ -26,7 +26,7 @@ async function showHistory() {
   if (!byId("history").open) return;
   const answer = await tried(() => get("/api/library/history"));
   if (!answer) return;
-  const rows = [...answer.versions].reverse().slice(0, 200);
+  const rows = [...answer.versions].sort((a, b) => b.number - a.number).slice(0, 200);
   fill(byId("versions"), ...rows.map((one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
 }
 
