@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 
+import numpy as np
 import pytest
 from browser_samples import (
     CHROMIUM, HOSTILE, INKED, LETTERS, SHOWN, center, draw, letters, make_letters, wait_for_text, wait_until,
@@ -233,6 +235,56 @@ def test_hostile_names_are_text(opened, studio, tmp_path):
     assert page.locator("main img, main script").count() == 0
 
 
+def test_movements_without_a_name_are_proposed_and_named_together(opened, studio, tmp_path):
+    with kineme.ActionLibrary(tmp_path / "unnamed", create=True) as library:
+        for shape in LETTERS[:3]:
+            library.learn(letters(shape), [None] * len(letters(shape)))
+    page = opened(studio(tmp_path / "unnamed"), "library")
+    wait_until(page, "document.querySelectorAll('.proposal').length > 1", seconds=60)
+    first = page.locator(".proposal").first
+    assert first.locator(".member").count() >= 3
+    first.locator("input").fill("named together")
+    first.locator("input").press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 1")
+    wait_until(page, "document.querySelectorAll('.proposal').length > 0")
+    some = page.locator(".proposal").first
+    some.locator(".member").nth(0).click()
+    some.locator(".member").nth(1).click()
+    assert some.locator("button[type=submit]").inner_text() == "Name the 2 chosen"
+    some.locator("input").fill("two of them")
+    some.locator("input").press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 2")
+    with kineme.ActionLibrary(tmp_path / "unnamed", read_only=True) as library:
+        assert len(library["two of them"].members) == 2
+
+
+def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened, served_letters):
+    page = opened(served_letters, width=390, height=844, has_touch=True, is_mobile=True)
+    box = page.locator("#draw-canvas").bounding_box()
+    client = page.context.new_cdp_session(page)
+    one = letters("GShape")[SHOWN]
+    kept = np.linspace(0, len(one.times) - 1, 50).astype(int)
+    away = (one.positions[kept] - one.positions.min(axis=0)) / np.ptp(one.positions, axis=0).max()
+    points = np.column_stack((box["x"] + 40 + 220 * away[:, 0], box["y"] + 260 - 220 * away[:, 1]))
+    for k, (x, y) in enumerate(points):
+        kind = "touchMove" if k else "touchStart"
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y}]})
+        page.wait_for_timeout(20)
+    client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    wait_for_text(page, "#verdict", "GShape")
+    assert page.evaluate("window.scrollY") == 0
+    assert page.evaluate("document.activeElement.id") != "naming-name"
+
+
+def test_the_program_that_the_page_shows_sends_samples(opened, served_letters, capsys):
+    page = opened(served_letters)
+    program = page.locator("#live-source-text pre").first.text_content()
+    made: dict[str, object] = {}
+    exec(program, made)
+    asyncio.run(made["main"](served_letters.token, letters("Sine")[SHOWN].positions[::20].tolist()))
+    assert "'answer':" in capsys.readouterr().out
+
+
 def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
     page = opened(studio(make_letters(tmp_path / "letters", shown=2)))
     page.keyboard.press("Tab")
@@ -271,8 +323,6 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
 
 
 def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, tmp_path):
-    from browser_samples import np
-
     rows, at, end = [], 0.0, np.zeros(2)
     for shape in ("GShape", "Sine"):
         one = letters(shape)[SHOWN]
@@ -351,8 +401,6 @@ def test_drawing_does_not_move_anything_else(opened, served_letters):
 
 
 def test_movements_in_space_turn(opened, studio, tmp_path):
-    from browser_samples import np
-
     t = np.linspace(0, 2, 80)
     shapes = [np.column_stack((np.cos(k * t), np.sin(2 * t), 0.4 * t)) for k in (1, 2, 3)]
     with kineme.ActionLibrary(tmp_path / "space", create=True) as library:
