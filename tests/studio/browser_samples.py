@@ -15,7 +15,13 @@ LETTERS = ("GShape", "Sine", "Angle", "CShape")
 SHOWN = 5  # demonstrations of each letter that the library gets; the others are drawn
 
 #: Names that would do harm if they were read as markup, as code or as an address.
-HOSTILE = ("<img src=x onerror=alert(1)>", '"><script>alert(1)</script>', "javascript:alert(1)", "‮evil", "x" * 190)
+HOSTILE = (
+    "<img src=x onerror=alert(1)>",
+    '"><script>alert(1)</script>',
+    "javascript:alert(1)",
+    "\u202eevil",
+    "x" * 190,
+)
 
 
 def letters(shape):
@@ -48,7 +54,7 @@ def wait_for_text(page, selector, text, seconds=20):
 
 
 def draw(page, movement, seconds=1.6, n=80, share=1.0, at=(0.5, 0.5)):
-    """Draw a movement by the mouse, as fast as it was but for one factor; with a share, begin it and hold the button."""
+    """Draw a movement by the mouse, all of it in `seconds`; with a share, begin it and hold the button."""
     box = page.locator("#draw-canvas").bounding_box()
     size = np.ptp(movement.positions, axis=0)
     scale = min(0.5 * box["width"] / size[0], 0.6 * box["height"] / size[1])
@@ -75,9 +81,18 @@ def center(page, selector):
 
 
 #: How many pixels of the stage of Move are of the drawn path, around a point of the screen: its color is the token's.
-INKED = """([x, y, r]) => { const c = document.getElementById("move-canvas"); const b = c.getBoundingClientRect();
-  const s = c.width / b.width; const d = c.getContext("2d").getImageData((x - b.left - r) * s, (y - b.top - r) * s, 2 * r * s, 2 * r * s).data;
-  const probe = document.createElement("canvas").getContext("2d"); probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink");
-  probe.fillRect(0, 0, 1, 1); const [R, G, B] = probe.getImageData(0, 0, 1, 1).data; let n = 0;
-  for (let i = 0; i < d.length; i += 4) if (d[i + 3] > 200 && Math.abs(d[i] - R) + Math.abs(d[i + 1] - G) + Math.abs(d[i + 2] - B) < 60) n += 1;
-  return n; }"""
+INKED = """([x, y, r]) => {
+  const canvas = document.getElementById("move-canvas");
+  const box = canvas.getBoundingClientRect();
+  const sharp = canvas.width / box.width;
+  const corner = [(x - box.left - r) * sharp, (y - box.top - r) * sharp];
+  const pixels = canvas.getContext("2d").getImageData(...corner, 2 * r * sharp, 2 * r * sharp).data;
+  const probe = document.createElement("canvas").getContext("2d");
+  probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink");
+  probe.fillRect(0, 0, 1, 1);
+  const ink = probe.getImageData(0, 0, 1, 1).data;
+  const off = (i) => [0, 1, 2].reduce((sum, k) => sum + Math.abs(pixels[i + k] - ink[k]), 0);
+  let inked = 0;
+  for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3] > 200 && off(i) < 60) inked += 1;
+  return inked;
+}"""

@@ -1,4 +1,4 @@
-"""The studio in Chromium: letters of people are drawn, recognized while they are drawn, named, moved; nothing is lost."""
+"""The studio in Chromium: real letters are drawn, recognized while they are drawn, named and moved; nothing is lost."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ import signal
 import numpy as np
 import pytest
 from browser_samples import (
-    CHROMIUM, HOSTILE, INKED, LETTERS, SHOWN, center, draw, letters, make_letters, wait_for_text, wait_until,
+    CHROMIUM,
+    HOSTILE,
+    INKED,
+    LETTERS,
+    SHOWN,
+    center,
+    draw,
+    letters,
+    make_letters,
+    wait_for_text,
+    wait_until,
 )  # fmt: skip
 from studio_samples import Running
 
@@ -379,7 +389,7 @@ def test_every_view_fits_its_window(opened, served_letters, width, scheme):
         page.wait_for_timeout(250)
         assert page.evaluate("document.documentElement.scrollWidth") <= width, view
         small = page.evaluate(
-            """() => [...document.querySelectorAll("button, select, input:not([type=checkbox],[type=radio],[type=file])")]
+            """() => [...document.querySelectorAll("button, select, input[type=text], input[type=number]")]
             .filter((one) => one.checkVisibility() && one.getBoundingClientRect().width && !one.closest(".away"))
             .filter((one) => Math.min(one.getBoundingClientRect().height, one.getBoundingClientRect().width) < 24)
             .map((one) => one.outerHTML.slice(0, 80))"""
