@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kineme.library.recognition.recognize import LibraryRecognizer
     from kineme.library.storage.source import Source
     from kineme.library.storage.symbols import Symbol
+    from kineme.library.storage.undo import Undone
     from kineme.library.storage.verify import Problem
     from kineme.library.storage.versions import Version
     from kineme.library.symbols.proposals import LibraryProposals
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.trajectory import Trajectory
     from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
+    from kineme.recognition.early.hypotheses import Early
+    from kineme.recognition.early.stream import Live
     from kineme.recognition.recognizer import Recognizer
 
 
@@ -274,6 +277,25 @@ class ActionLibrary:
         """
         return self._recognizer.recognize(movements, error_rate)
 
+    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Early | None = None) -> Live:
+        """Recognize a movement while it is under way: `Live`, whose ``update(t, x)`` takes each sample.
+
+        It knows the symbols as they are now; after a change, ask for another one. What streams share is kept, so that
+        any number of them may run side by side, each used by one thread at a time.
+
+        Parameters
+        ----------
+        confidence, patience, early
+            As for `kineme.Recognizer.stream`. With more than 2500 movements of symbols, beginnings are those of at most
+            ten of each symbol and 1000 in all; ``finish()`` answers as `recognize` does, with ids of movements.
+
+        Raises
+        ------
+        SpecificationError
+            No movement belongs to a symbol, or there is only one movement.
+        """
+        return self._recognizer.stream(confidence, patience, early)
+
     @cached_property
     def _recognizer(self) -> LibraryRecognizer:
         from kineme.library.recognition.recognize import LibraryRecognizer
@@ -283,6 +305,38 @@ class ActionLibrary:
     def history(self) -> tuple[Version, ...]:
         """All versions, the first one first."""
         return history(self.store)
+
+    def undo(self, expected: int | None = None) -> Undone:
+        """Take back the last change that was not taken back yet, whoever made it, as a new version.
+
+        Called again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
+        new id, as if it were learned again. Who showed a movement, and its number of dimensions, stay known.
+
+        Parameters
+        ----------
+        expected : int, optional
+            The version to take back, so that no change is that came since it was looked at.
+
+        Returns
+        -------
+        Undone
+            ``(version, to, action)``: the new version has the state of version `to`; `action` is what was taken back.
+
+        Raises
+        ------
+        SpecificationError
+            No change is left, or the library is at another version than expected.
+        """
+        from kineme.library.storage.undo import undo
+
+        return undo(self.store, expected)
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a change that `undo` takes back."""
+        from kineme.library.storage.undo import can_undo
+
+        return can_undo(self.store)
 
     def at(self, version: int) -> ActionLibrary:
         """The library as it was at a version, for reading."""
