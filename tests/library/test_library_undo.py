@@ -7,6 +7,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, SpecificationError
+from kineme.library.storage.undo import can_undo
 
 
 @pytest.fixture
@@ -74,7 +75,7 @@ def test_all_changes_are_taken_back_one_by_one_and_new_ones_after_an_undo_too(li
     for state in (states[1], states[0], {}):
         library.undo()
         assert _state(library) == state
-    assert not library.can_undo
+    assert not can_undo(library.store)
     version = library.version
     with pytest.raises(SpecificationError, match="expected a change to take back, the library has none left"):
         library.undo()
@@ -128,5 +129,5 @@ def test_a_proposal_that_was_accepted_is_one_change(library):
 
 def test_the_past_and_libraries_open_for_reading_undo_nothing(library):
     past = library.at(library.version)
-    assert not past.can_undo
+    assert not can_undo(past.store)
     past.close()

@@ -63,7 +63,7 @@ class Running:
             stderr=subprocess.PIPE,
             env=environment,
             text=True,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+            start_new_session=True,
         )
         guard = threading.Timer(60, self.process.kill)
         guard.start()

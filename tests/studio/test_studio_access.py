@@ -42,10 +42,10 @@ def test_tokens_in_addresses_open_nothing_but_the_page(client):
     assert client.get("/api/library", params={"token": TOKEN}, headers={"Authorization": ""}).status_code == 401
 
 
-HOSTS = ["evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example", "", "[", "192.168.0.9"]
+NAMES = ["evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example", "", "[", "10.0.0.9"]
 
 
-@pytest.mark.parametrize("host", HOSTS)
+@pytest.mark.parametrize("host", NAMES)
 def test_a_name_that_was_pointed_here_is_refused(client, host):
     for path in ("/", "/api/library"):
         answer = client.get(path, headers={"Host": host})

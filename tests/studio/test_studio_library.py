@@ -9,7 +9,15 @@ from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
 
-HOSTILE = ["<img src=x onerror=alert(1)>", "'; DROP TABLE movement; --", "a/../b", "\u202egnirts", "名前 🤚", " ", "x" * 9000]
+HOSTILE = [
+    "<img src=x onerror=alert(1)>",
+    "'; DROP TABLE movement",
+    "a/../b",
+    "\u202egnirts",
+    "名前 🤚",
+    " ",
+    "x" * 9000,
+]
 
 
 def _symbols(client):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, overload
 from warnings import warn
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.storage import changes, read, symbols
+from kineme.library.storage import changes, export_import, read, symbols, undo, verify
 from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
@@ -87,8 +86,7 @@ class ActionLibrary:
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
         self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
-        made = self.specification
-        if Specification.of(recognizer, dmp, made) != made:
+        if Specification.of(recognizer, dmp, self.specification) != self.specification:
             self.close()
             raise SpecificationError(
                 f"expected the recognizer and dmp that the library in {folder} was made with, got others; its features "
@@ -98,9 +96,7 @@ class ActionLibrary:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -327,16 +323,7 @@ class ActionLibrary:
         SpecificationError
             No change is left, or the library is at another version than expected.
         """
-        from kineme.library.storage.undo import undo
-
-        return undo(self.store, expected)
-
-    @property
-    def can_undo(self) -> bool:
-        """Whether there is a change that `undo` takes back."""
-        from kineme.library.storage.undo import can_undo
-
-        return can_undo(self.store)
+        return undo.undo(self.store, expected)
 
     def at(self, version: int) -> ActionLibrary:
         """The library as it was at a version, for reading."""
@@ -346,22 +333,16 @@ class ActionLibrary:
 
     def verify(self) -> list[Problem]:
         """Find damage: a list of problems with table, row or movement, and a text; empty if nothing is damaged."""
-        from kineme.library.storage.verify import verify
-
-        return verify(self.store)
+        return verify.verify(self.store)
 
     def export(self, path: str | Path) -> Path:
         """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
-        from kineme.library.storage.export_import import export
-
-        return export(self.store, path)
+        return export_import.export(self.store, path)
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
         """Create a library in `folder` from a file of `export`, after checking every byte of it, and open it."""
-        from kineme.library.storage.export_import import import_
-
-        import_(path, folder)
+        export_import.import_(path, folder)
         return cls(folder, **options)
 
     def rename(self, old: str, new: str) -> None:

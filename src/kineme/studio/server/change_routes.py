@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from kineme.errors import SpecificationError
 from kineme.studio.server.plain import trajectory
 from kineme.studio.server.records import (
+    AsOf,
     Assign,
     Chosen,
     Describe,
@@ -16,7 +17,6 @@ from kineme.studio.server.records import (
     Merge,
     NewMovement,
     Rename,
-    Seen,
     Split,
     Version,
 )
@@ -91,7 +91,7 @@ def delete_symbol(studio: Writes, key: str, version: int | None = None) -> dict[
 
 
 @router.post("/undo", response_model=Version, summary="Take back the last change")
-def undo(studio: Writes, asked: Seen | None = None) -> dict[str, Any]:
+def undo(studio: Writes, asked: AsOf | None = None) -> dict[str, Any]:
     """As a new version; again, the one before. 409 if another change came since the version that is named."""
     expected = None if asked is None else asked.version
     try:

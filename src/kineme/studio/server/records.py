@@ -69,7 +69,7 @@ class Chosen(_Change):
     ids: Ids
 
 
-class Seen(_Change):
+class AsOf(_Change):
     """The version that the client has seen, if it matters."""
 
 
