@@ -6,16 +6,19 @@ Times are processor times: what others do on the machine does not count.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from bench.rows import Row
 from kineme import DMP, Trajectory
+from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, InverseKinematics, Robot, load, move
 from kineme.robots.checks.along import along
+from kineme.validation import Array
 
 N_SAMPLES, SECONDS, SIZE, DT = 150, 3.0, 0.2, 0.005
+TURN = np.array([0.2, 0.3, 0.4])  # rotation vector [rad]
 MOST_OFF, MOST_WHOLE, MOST_STEP = 0.05, 50.0, 200.0  # mm rms, ms, µs
 
 
@@ -24,7 +27,7 @@ def measure(quick: bool) -> list[Row]:
     rows = []
     for name in ("panda", "ur5e", "wam"):
         robot = load(name)
-        rows += [_accuracy(robot), _whole(robot, repeats), _step(robot, 100 if quick else 600)]
+        rows += [_accuracy(robot), _whole(robot, repeats), *_steps(robot, 100 if quick else 600)]
     return rows
 
 
@@ -70,13 +73,28 @@ def _least(work: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def _step(robot: Robot, n: int) -> Row:
-    control = DMP().learn([stroke(robot)]).controller(DT, duration=SECONDS)
-    arm, times = ArmController(robot, control), np.empty(n)
+def _steps(robot: Robot, n: int) -> Iterator[Row]:
+    positions, poses = stroke(robot), _turning(robot)
+    for what, primitive in (("position", DMP().learn([positions])), ("pose", PoseDMP().learn([poses]))):
+        for feedback in ({}, {"feedback": "phase", "phase_stopping": 1e3}):
+            arm = ArmController(robot, primitive.controller(DT, duration=SECONDS, **feedback))
+            name = f"{robot.name}: live step, controller and joints, {what}{', phase' if feedback else ''}"
+            yield Row(name, "µs", 1e6 * _median_step(arm, n), target=("<=", MOST_STEP))
+
+
+def _turning(robot: Robot) -> Array:
+    """`stroke` with an orientation that turns by 31 degrees, (T, 7)."""
+    there = stroke(robot)
+    turned = np.linspace(0.0, 1.0, len(there.times))[:, None] * TURN
+    at_rest = InverseKinematics(robot).tip_pose[3:]
+    return np.column_stack((there.positions, product(exp(turned), at_rest)))
+
+
+def _median_step(arm: ArmController, n: int) -> float:
+    """Median processor time of a step [s]."""
+    times = np.empty(n)
     for k in range(n):
         begin = time.process_time()
         arm.step()
         times[k] = time.process_time() - begin
-    return Row(
-        f"{robot.name}: live step, controller and joints", "µs", 1e6 * float(np.median(times)), target=("<=", MOST_STEP)
-    )
+    return float(np.median(times))

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.by_person import FOLDER
 from bench.nested_sets import Movements, movement_sets
 from bench.rows import Row
 from kineme.comparison.describe import describe
@@ -48,6 +49,9 @@ SHIPPED = GRID.index(Values(OWN, SHARE, (CONCENTRATION[2], CONCENTRATION[3]), El
 
 def measure(quick: bool) -> list[Row]:
     sets = movement_sets(quick)
+    if sum(one.paths for one in sets) < 2:  # values are chosen on the others
+        print(f"nested: no recordings beside LASA in {FOLDER}; name their folder in KINEME_RECORDINGS")
+        return []
     by_set = {one.name: accuracies(one, GRID) for one in sets}
     rows = []
     for left in sets:

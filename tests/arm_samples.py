@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import kineme
+from kineme.robots.checks.along import along
+from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.inverse import InverseKinematics
 
 _SETTINGS = 'fusestatic="false" balanceinertia="true" boundmass="1e-3" boundinertia="1e-6"'
@@ -17,6 +19,13 @@ def stroke(robot, seconds=3.0, size=1.0, n=150):
     scale = size * (0.25 if robot.name == "so101" else 1.0)
     shape = np.column_stack((0 * s - 0.05, 0.42 * (s - 0.5), 0.1 * np.sin(2 * np.pi * s)))
     return kineme.Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + scale * shape)
+
+
+def standing(robot, postures):
+    """What the library says of an arm that stands in postures (m, n): tips, torques, contacts."""
+    postures = np.atleast_2d(postures)
+    still, times = np.zeros_like(postures), np.arange(len(postures), dtype=float)
+    return along(robot, JointTrajectory(robot.joints, times, postures, still, still, {}))
 
 
 def simulated(mujoco, robot):

@@ -115,18 +115,15 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
 )  # fmt: skip
 
 
-#: Names of the parameters that `layout_options` adds.
-LAYOUT_OPTIONS = (
-    "time", "columns", "movement", "label_column", "person_column", "units", "skip", "kinds", "topic", "frame",
-    "label_pattern", "label_by", "trim", "follow_links",
-)  # fmt: skip
-
-
 def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options for the roles of a table's columns; by default the roles are detected."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
+
+
+#: Names of the parameters that `layout_options` adds.
+LAYOUT_OPTIONS: tuple[str, ...] = tuple(one.name for one in click.command()(layout_options(lambda: None)).params)
 
 
 def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -22,11 +22,11 @@ from kineme.recognition.left_out import (
     ClassDistances,
     Scored,
     broad_law,
+    comparable_groups,
     distances,
     finite,
     law,
     score_classes,
-    several,
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
@@ -221,7 +221,7 @@ def calibrate(
     one group nothing could be compared; they then count as movements without groups.
     """
     counts = references.counts
-    groups = several(groups)
+    groups = comparable_groups(groups)
     blocks, others, impostors = [], [], []
     for own_class, count in zip(references.slices(), counts, strict=True):
         chosen = own_class.start + evenly_spaced(count, _CALIBRATED)

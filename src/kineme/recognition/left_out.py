@@ -76,8 +76,8 @@ def check_groups(groups: ArrayLike, n: int) -> NDArray[np.intp]:
         raise TrajectoryError(f"expected groups to be all texts or all numbers, got {kinds}") from None
 
 
-def several(groups: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
-    """The groups; None where all are one, in which nothing could be compared: they then count as no groups."""
+def comparable_groups(groups: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
+    """The groups; None where there is one alone, in which nothing could be compared: it then counts as no groups."""
     return None if groups is None or len(np.unique(groups)) == 1 else groups
 
 

@@ -15,10 +15,10 @@ from kineme.recognition.left_out import (
     REACH,
     REACH_OF_OTHERS,
     ClassDistances,
+    comparable_groups,
     distances,
     finite,
     score_classes,
-    several,
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
@@ -53,7 +53,7 @@ def calibrate_sample(
     most = int(np.clip(_BUDGET // len(sampled), _FEWEST, _CALIBRATED))
     blank = ClassDistances(np.full((1, 1), np.inf), np.zeros(1, dtype=np.intp))
     windows, wholes = [blank] * n_classes, [blank] * n_classes
-    groups = several(groups)
+    groups = comparable_groups(groups)
     for c, window, whole in _measured(similarity, stored, groups, sampled, most):
         windows[c], wholes[c] = window, whole
     to_others, typical = _impostors(similarity, stored), 0.0

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError, TrajectoryError
-from kineme.movements.rotations.matrices import matrices_of, quaternion_of
+from kineme.movements.rotations.matrices import matrices_of
+from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
 from kineme.robots.kinematics.inverse import InverseKinematics
@@ -134,14 +135,11 @@ class ArmController:
     def _pose(self, movement: State) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of the tip that the movement asks for."""
         columns = movement.position
-        return columns[:3], self._rotation if len(columns) == 3 else matrices_of(columns[3:])
+        return columns[:3], self._rotation if len(columns) == 3 else np.array(matrix_one(columns[3:].tolist()))
 
     def _tip(self) -> Array:
         """Where the tip is, in the columns of the movement."""
-        position = self._ik.tip_position
-        if len(self.state.movement.position) == 3:
-            return position
-        return np.concatenate((position, quaternion_of(self._ik.tip_rotation)))
+        return self._ik.tip_pose[: len(self.state.movement.position)]
 
     def _nearest_start(self) -> Array:
         position, rotation = self._pose(self.controller.state)

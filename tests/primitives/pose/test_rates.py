@@ -79,3 +79,23 @@ def test_the_rate_of_the_rotation_vector_is_not_the_angular_velocity():
     p = np.array([0.0, 0.0, 1.5])
     np.testing.assert_allclose(angular_velocity(p, 2 * p), 2 * p, atol=1e-15)
     assert np.linalg.norm(angular_velocity(p, [1.0, 0, 0]) - [1.0, 0, 0]) > 0.6
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-160, 1e-9, 0.09, 0.99, 1.01, 3.1, 4.0, 100.0])
+@given(seeds)
+def test_one_vector_is_as_in_a_batch(size, seed):
+    p, p_rate, p_acceleration = np.random.default_rng(seed).normal(size=(3, 5, 3))
+    p *= size / np.linalg.norm(p, axis=1, keepdims=True)
+    for f, vectors in (
+        (angular_velocity, (p, p_rate)),
+        (rotation_vector_rate, (p, p_rate)),
+        (angular_acceleration, (p, p_rate, p_acceleration)),
+    ):
+        alone = [f(*each) for each in zip(*vectors, strict=True)]
+        np.testing.assert_allclose(alone, f(*vectors), rtol=1e-13, atol=1e-13)
+
+
+def test_numbers_beyond_range_are_nan_and_raise_nothing():
+    for f in (angular_velocity, rotation_vector_rate):
+        assert np.isnan(f([np.inf, 0, 0], [1.0, 2.0, 3.0])).any()
+    assert np.isnan(angular_acceleration([1e200, 0, 0], [1.0, 2, 3], [1.0, 2, 3])).any()

@@ -20,7 +20,7 @@ from kineme.comparison.similarity import AveragedSimilarity, averaged, similarit
 from kineme.comparison.specification import Compares
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.recognition.left_out import check_groups, several
+from kineme.recognition.left_out import check_groups, comparable_groups
 from kineme.validation import Array, check_choice, check_count
 
 _SPECTRAL = "spectral"
@@ -88,7 +88,7 @@ def propose(  # noqa: PLR0913 - what is asked, and how it is compared
     check_count("min_members", min_members, 2)
     described = describe(movements, like)
     _check_count_of(n_clusters, method, len(described))
-    people = None if groups is None else several(check_groups(groups, len(described)))
+    people = None if groups is None else comparable_groups(check_groups(groups, len(described)))
     limit = _largest(method, described.n_dims) if max_clustered is None else max_clustered
     check_count("max_clustered", limit, 3)
     if len(described) <= limit:

@@ -7,7 +7,8 @@ A quaternion q turns a vector given in the tool frame into the world frame, so `
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,15 +37,19 @@ def as_quaternions(q: ArrayLike) -> Array:
 def product(a: ArrayLike, b: ArrayLike) -> Array:
     """Quaternion product ``a b``: first b, then a; shapes (..., 4) broadcast."""
     a, b = as_quaternions(a), as_quaternions(b)
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    parts = (
+    return np.stack(product_components(np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)), axis=-1)
+
+
+def product_components(a: Iterable[Any], b: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
+    """`product` in components w, x, y, z: arrays of one shape, or floats."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
         aw * bw - ax * bx - ay * by - az * bz,
         aw * bx + ax * bw + ay * bz - az * by,
         aw * by - ax * bz + ay * bw + az * bx,
         aw * bz + ax * by - ay * bx + az * bw,
     )
-    return np.stack(parts, axis=-1)
 
 
 def conjugate(q: ArrayLike) -> Array:

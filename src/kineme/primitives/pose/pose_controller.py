@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.movements.rotations.quaternions import conjugate, normalized, product
-from kineme.movements.rotations.rotation_vectors import exp, log, nearest
+from kineme.movements.rotations.one_rotation import exp_one, log_one
+from kineme.movements.rotations.quaternions import conjugate, product_components
 from kineme.primitives.control import inputs
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.options import Options
 from kineme.primitives.control.plan import Plan
 from kineme.primitives.control.state import State, Status
-from kineme.primitives.pose.rates import angular_acceleration, angular_velocity, rotation_vector_rate
+from kineme.primitives.pose.rates import Components, acceleration_components, rate_components, velocity_components
 from kineme.validation import Array
 
 _MOST_TURNED = 1e6  # rad; quaternions of longer rotation vectors are rounding errors
@@ -47,8 +48,7 @@ class PoseController(Controller):
     """Moves one pose primitive step by step; see `PosePrimitives.controller` and `Controller`.
 
     It steps through position and rotation vector, in the chart around the goal that it is made with: undisturbed it is
-    the rollout. A goal that turns in flight moves in that chart. A step costs some tenths of a millisecond, most of it
-    on the way from rotation vectors to quaternions and angular velocities. Where a step would turn further than a
+    the rollout. A goal that turns in flight moves in that chart. Where a step would turn further than a
     million radians, the orientation stays and is at rest, and the status says so.
 
     Attributes
@@ -60,7 +60,9 @@ class PoseController(Controller):
     state: PoseState
 
     def __init__(self, plan: Plan, dt: float, options: Options, reference: Array) -> None:
-        self._reference = reference.reshape(-1, 4)
+        references = reference.reshape(-1, 4)
+        self._references = references.tolist()
+        self._backwards = conjugate(references).tolist()
         self._linear = plan.n_positions  # columns before the orientations
         super().__init__(plan, dt, options)
 
@@ -130,24 +132,27 @@ class PoseController(Controller):
 
     def _as_tangent(self, value: Any, near: Array) -> Array | None:
         """Position and the rotation vector closest to that of `near`; None for what is no pose."""
-        array, m = inputs.vector(value, self._n_dims + len(self._reference)), self._linear
+        array = inputs.vector(value, self._n_dims + len(self._references))
         if array is None:
             return None
-        try:
-            p = log(product(normalized(array[m:].reshape(-1, 4)), conjugate(self._reference)))
-            return np.concatenate((array[:m], nearest(p, near[m:].reshape(-1, 3)).ravel()))
-        except Exception:  # a quaternion that is none: the motion goes on
-            return None
+        columns, close = array.tolist(), near.tolist()
+        tangent = columns[: self._linear]
+        for i, backwards in enumerate(self._backwards):
+            q, p = self._linear + 4 * i, self._linear + 3 * i
+            vector = log_one(product_components(columns[q : q + 4], backwards), close[p : p + 3])
+            if vector is None:  # a quaternion that is none: the motion goes on
+                return None
+            tangent.extend(vector)
+        return np.array(tangent)
 
     def _as_rates(self, value: Any, x: Array) -> Array | None:
         """Rates of position and rotation vector at x, from linear and angular ones."""
         array = inputs.vector(value, self._n_dims)
         if array is None:
             return None
-        m = self._linear
-        turning = rotation_vector_rate(x[m:].reshape(-1, 3), array[m:].reshape(-1, 3)).ravel()
-        rates = np.concatenate((array[:m], turning))
-        return rates if inputs.usable(rates) and np.abs(turning).max() <= _FASTEST else None
+        columns, m = array.tolist(), self._linear
+        rates = np.array([*columns[:m], *self._of_each(rate_components, x.tolist(), columns)])
+        return rates if inputs.usable(rates) and np.abs(rates[m:]).max() <= _FASTEST else None
 
     def _move(self, dt: float, push: Array, last: Array) -> None:
         super()._move(dt, push, last)
@@ -162,15 +167,24 @@ class PoseController(Controller):
 
     def _derivatives(self) -> tuple[Array, Array]:
         rate, bend = super()._derivatives()
+        x, dx, ddx = (self._origin + self._motion[0]).tolist(), rate.tolist(), bend.tolist()
         m = self._linear
-        p, dp, ddp = (v.reshape(-1, 3) for v in (self._origin[m:] + self._motion[0, m:], rate[m:], bend[m:]))
-        velocity = np.concatenate((rate[:m], angular_velocity(p, dp).ravel()))
-        return velocity, np.concatenate((bend[:m], angular_acceleration(p, dp, ddp).ravel()))
+        velocity = np.array([*dx[:m], *self._of_each(velocity_components, x, dx)])
+        return velocity, np.array([*ddx[:m], *self._of_each(acceleration_components, x, dx, ddx)])
+
+    def _of_each(self, function: Callable[..., Components], *columns: list[float]) -> Iterator[float]:
+        """A function of rotation vectors and their rates, for each of the orientations."""
+        for at in range(self._linear, self._n_dims, 3):
+            yield from function(*(column[at : at + 3] for column in columns))
 
     def _report(self, velocity: Array, acceleration: Array) -> PoseState:
         state = super()._report(velocity, acceleration)
         return PoseState(*state._replace(position=self._as_pose(state.position), goal=self._as_pose(state.goal)))
 
     def _as_pose(self, x: Array) -> Array:
-        m = self._linear
-        return np.concatenate((x[:m], product(exp(x[m:].reshape(-1, 3)), self._reference).ravel()))
+        columns, m = x.tolist(), self._linear
+        pose = columns[:m]
+        for i, reference in enumerate(self._references):
+            at = m + 3 * i
+            pose.extend(product_components(exp_one(columns[at : at + 3]), reference))
+        return np.array(pose)

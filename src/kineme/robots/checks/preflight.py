@@ -58,12 +58,19 @@ def _positions(robot: Robot, trajectory: JointTrajectory, state: Along) -> Itera
         limit = robot.upper[j] if worst > (robot.upper[j] + robot.lower[j]) / 2 else robot.lower[j]
         passed = bool(beyond[t, j] <= 1e-6)
         yield Check(
-            "position", name, _at(trajectory, t), worst, float(limit), "rad", passed, 1.0 if passed else math.inf
+            "position",
+            name,
+            _at(trajectory, t),
+            worst,
+            float(limit),
+            robot.units[j],
+            passed,
+            1.0 if passed else math.inf,
         )
 
 
 def _rates(what: str, order: int) -> Callable[[Robot, JointTrajectory, Along], Iterator[Check]]:
-    unit = f"rad/s{'^2' if order == 2 else ''}"
+    per_time = "/s" if order == 1 else "/s^2"
 
     def check(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
         values = np.abs(trajectory.velocities if order == 1 else trajectory.accelerations)
@@ -77,7 +84,7 @@ def _rates(what: str, order: int) -> Callable[[Robot, JointTrajectory, Along], I
                 _at(trajectory, t),
                 worst,
                 limit,
-                unit,
+                robot.units[j] + per_time,
                 worst <= limit * _SLACK,
                 (worst / limit) ** (1 / order),
             )
@@ -100,7 +107,7 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
             _at(trajectory, t),
             float(total[t]),
             limit,
-            "Nm",
+            "N" if robot.units[j] == "m" else "Nm",
             passed,
             1.0 if passed else _slower_for(holding, moving, limit),
         )
@@ -125,7 +132,7 @@ def _jumps(robot: Robot, trajectory: JointTrajectory, state: Along) -> Check:
         _at(trajectory, int(t)),
         worst,
         _JUMP,
-        "rad",
+        robot.units[j],
         worst <= _JUMP,
         1.0 if worst <= _JUMP else math.inf,
     )

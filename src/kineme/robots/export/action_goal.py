@@ -7,8 +7,7 @@ from pathlib import Path
 
 from kineme.output.atomic import write_atomically
 from kineme.robots.execution.joint_trajectory import JointTrajectory
-
-_SECOND = 1_000_000_000  # [ns]
+from kineme.robots.export.ros_messages import nanoseconds, seconds_and_nanoseconds
 
 
 def write_action_goal(path: Path, trajectory: JointTrajectory) -> Path:
@@ -22,13 +21,12 @@ def action_goal(trajectory: JointTrajectory) -> dict[str, object]:
     for time, q, v, a in zip(
         trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
     ):
-        stamp = round(float(time) * _SECOND)
         points.append(
             {
                 "positions": q.tolist(),
                 "velocities": v.tolist(),
                 "accelerations": a.tolist(),
-                "time_from_start": {"sec": stamp // _SECOND, "nanosec": stamp % _SECOND},
+                "time_from_start": seconds_and_nanoseconds(nanoseconds(time)),
             }
         )
     return {"trajectory": {"joint_names": list(trajectory.joints), "points": points}}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 from kineme.errors import DataError
@@ -39,7 +40,7 @@ def write_bag(path: Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Pa
                 _write_2(folder, trajectory, topic)
                 next(folder.glob("*.mcap")).replace(hidden)
             finally:
-                _remove(folder)
+                rmtree(folder, ignore_errors=True)
     elif not path.suffix:
         with whole_folder(path) as hidden:
             _write_2(hidden / path.name, trajectory, topic)
@@ -49,13 +50,6 @@ def write_bag(path: Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Pa
     else:
         raise DataError(f"expected a bag ending in .bag, .mcap or, for a folder, nothing, got {path.name!r}")
     return path
-
-
-def _remove(folder: Path) -> None:
-    if folder.is_dir():
-        for part in folder.iterdir():
-            part.unlink()
-        folder.rmdir()
 
 
 def _write_1(path: Path, trajectory: JointTrajectory, topic: str) -> None:

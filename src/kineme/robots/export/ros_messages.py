@@ -10,7 +10,7 @@ import numpy as np
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 
 TRAJECTORY, STATE = "trajectory_msgs/msg/JointTrajectory", "sensor_msgs/msg/JointState"
-SECOND = 1_000_000_000  # [ns]
+_SECOND = 1_000_000_000  # [ns]
 
 
 def trajectory_message(types: dict[str, Any], trajectory: JointTrajectory) -> Any:
@@ -21,7 +21,7 @@ def trajectory_message(types: dict[str, Any], trajectory: JointTrajectory) -> An
             velocities=velocities,
             accelerations=accelerations,
             effort=np.zeros(0),
-            time_from_start=types["builtin_interfaces/msg/Duration"](**_split(_nanoseconds(time))),
+            time_from_start=types["builtin_interfaces/msg/Duration"](**seconds_and_nanoseconds(nanoseconds(time))),
         )
         for time, positions, velocities, accelerations in zip(
             trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations, strict=True
@@ -35,7 +35,7 @@ def state_messages(types: dict[str, Any], trajectory: JointTrajectory) -> Iterat
     names = [*trajectory.joints, *trajectory.steps]
     steps = np.column_stack([np.zeros((len(trajectory), 0)), *trajectory.steps.values()])
     for t, time in enumerate(trajectory.times):
-        stamp = _nanoseconds(time)
+        stamp = nanoseconds(time)
         yield (
             stamp,
             types[STATE](
@@ -48,15 +48,17 @@ def state_messages(types: dict[str, Any], trajectory: JointTrajectory) -> Iterat
         )
 
 
-def _nanoseconds(time: float) -> int:
-    return round(float(time) * SECOND)
+def nanoseconds(time: float) -> int:
+    """A time [s] in nanoseconds."""
+    return round(float(time) * _SECOND)
 
 
-def _split(stamp: int) -> dict[str, int]:
-    return {"sec": stamp // SECOND, "nanosec": stamp % SECOND}
+def seconds_and_nanoseconds(stamp: int) -> dict[str, int]:
+    """Nanoseconds as ROS divides them."""
+    return {"sec": stamp // _SECOND, "nanosec": stamp % _SECOND}
 
 
 def _header(types: dict[str, Any], stamp: int) -> Any:
     header = types["std_msgs/msg/Header"]
     counted = {"seq": 0} if "seq" in header.__dataclass_fields__ else {}  # ROS 1 counts messages
-    return header(stamp=types["builtin_interfaces/msg/Time"](**_split(stamp)), frame_id="", **counted)
+    return header(stamp=types["builtin_interfaces/msg/Time"](**seconds_and_nanoseconds(stamp)), frame_id="", **counted)

@@ -17,6 +17,7 @@ ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 
 _PARTIAL = 0.005  # times these costs, for arms with fewer joints than a pose has coordinates: the position comes first
 _GAIN = 0.95  # of the way to a limit that one step may go
 _DAMPING = 1e-12
+_WXYZ = [0, 1, 2, 6, 3, 4, 5]  # pinocchio has w last
 
 
 class InverseKinematics:
@@ -61,7 +62,8 @@ class InverseKinematics:
         if time_step is not None:
             check_number("time_step", time_step, above=0.0)
         self.robot = robot
-        self._pose, self._solve, self._configuration_of = pinocchio.SE3, solve_ik, Configuration
+        self._pose, self._columns = pinocchio.SE3, pinocchio.SE3ToXYZQUAT
+        self._solve, self._configuration_of = solve_ik, Configuration
         self._unsolved: type[Exception] = NoSolutionFound
         self._data = robot.model.createData()
         self._time_step = 1.0 if time_step is None else time_step
@@ -105,6 +107,11 @@ class InverseKinematics:
     def tip_rotation(self) -> Array:
         """How the tip is turned (3, 3)."""
         return np.array(self._configuration.get_transform_frame_to_world(self.robot.tip).rotation)
+
+    @property
+    def tip_pose(self) -> Array:
+        """Position and orientation (w, x, y, z) of the tip (7,)."""
+        return np.array(self._columns(self._configuration.get_transform_frame_to_world(self.robot.tip))[_WXYZ])
 
     @property
     def error(self) -> float:

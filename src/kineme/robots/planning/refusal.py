@@ -45,7 +45,7 @@ def _refusal(made: RobotMovement) -> str:
 def _remedy(made: RobotMovement) -> str:
     slower = made.preflight.slower
     if not np.isfinite(slower):
-        return "No speed helps: choose another place, orientation or posture"
+        return "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
     duration = made.trajectory.duration - made.begins
     return (
         f"It works in {duration * slower:.3g} s instead of {duration:.3g}: slow it down (timing='slowed', --slow-down)"

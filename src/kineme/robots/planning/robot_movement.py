@@ -37,5 +37,10 @@ class RobotMovement:
     factor: float
 
     def __repr__(self) -> str:
-        as_generated = f"{self.factor:.3g} times as long as generated"
-        return f"RobotMovement({self.robot.name!r}, {self.trajectory.duration:.2f} s, {as_generated})"
+        return f"RobotMovement({self.robot.name!r}, {duration_in_words(self)})"
+
+
+def duration_in_words(made: RobotMovement) -> str:
+    """How long it takes, with how much of that is approach, and how many times as long as generated, if it is."""
+    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > 1e-3 else ""
+    return f"{made.trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}"

@@ -34,7 +34,6 @@ class Shapes(NamedTuple):
     urdf: str
     meshes: tuple[Mesh, ...]  # a file name in `urdf` is an index into them
     joints: tuple[str, ...]  # those of the robot, in its order
-    prismatic: tuple[bool, ...]  # the same
     tip: str
     stand_ins: tuple[str, ...]  # links of the file that are drawn as cylinders
 
@@ -66,7 +65,6 @@ def shapes_of(robot: Robot) -> Shapes:
         ElementTree.tostring(made, "unicode"),
         tuple(drawer.meshes),
         tuple(joints[name] for name in robot.joints),
-        tuple(moving[name].get("type") == "prismatic" for name in robot.joints),
         links[robot.tip],
         tuple(name for name in bare if name in drawer.without),
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from kineme.output.atomic import write_atomically
 from kineme.output.text import counted, in_markup, printable
 from kineme.robots.checks.report import preflight_table
-from kineme.robots.planning.robot_movement import RobotMovement
+from kineme.robots.planning.robot_movement import RobotMovement, duration_in_words
 from kineme.robots.view.charts import charts
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data, scene_data
 from kineme.robots.view.shapes import shapes_of
@@ -61,7 +61,7 @@ def view_page(made: RobotMovement) -> str:
         "title": in_markup(f"{made.robot.name} moves"),
         "summary": in_markup(_summary(made)),
         "notes": _notes(made, shapes.stand_ins),
-        "charts": charts(made, shapes.prismatic),
+        "charts": charts(made),
         "preflight": _preflight(made),
         "data": as_script_data(scene_data(made, shapes)),
         "licenses": "\n\n".join(in_markup(_asset(name)) for name in _LICENSES),
@@ -86,12 +86,10 @@ def _hash(text: str) -> str:
 
 
 def _summary(made: RobotMovement) -> str:
-    trajectory = made.trajectory
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > 1e-3 else ""
     result = (
         "All checks passed." if made.preflight.passed else f"{counted(len(made.preflight.failed), 'check')} FAILED."
     )
-    return f"{trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}. {result}"
+    return f"{duration_in_words(made)}. {result}"
 
 
 def _notes(made: RobotMovement, stand_ins: tuple[str, ...]) -> str:

@@ -1,0 +1,1 @@
+"""What the pages of the server are made of."""
