@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import kineme
+from kineme.robots import load
 from kineme.robots.checks.along import along
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.inverse import InverseKinematics
@@ -38,3 +39,23 @@ def tip_in(mujoco, arm, data, robot):
     """Where MuJoCo has the tip, and how it is turned."""
     body = mujoco.mj_name2id(arm, mujoco.mjtObj.mjOBJ_BODY, robot.tip)
     return data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy()
+
+
+_AXES = ("0 0 1", "0 1 0")
+
+
+def simple_arm(folder, effort=100.0, kinds=("revolute", "revolute"), mass=1.0, velocity=2.0):
+    """Two links with masses, and balls on base and tip: at rest the tip's ball is inside that of the base."""
+    ball = '<collision><origin xyz="{} 0 0"/><geometry><sphere radius="0.1"/></geometry></collision>'
+    moments = '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>'
+    inertia = f'<inertial><origin xyz="0.2 0 0"/><mass value="{mass}"/>{moments}</inertial>'
+    contents = (ball.format(0.5), inertia, inertia + ball.format(0.5))
+    links = "".join(f'<link name="l{i}">{content}</link>' for i, content in enumerate(contents))
+    joints = "".join(
+        f'<joint name="j{i}" type="{kind}"><parent link="l{i - 1}"/><child link="l{i}"/><axis xyz="{axis}"/>'
+        f'<limit lower="-2" upper="2" velocity="{velocity}" effort="{effort}"/></joint>'
+        for i, (kind, axis) in enumerate(zip(kinds, _AXES, strict=True), 1)
+    )
+    path = folder / "arm.urdf"
+    path.write_text(f'<robot name="simple">{links}{joints}</robot>')
+    return load(path)
