@@ -23,6 +23,7 @@ from kineme.cli.page import page
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.segment import segment
+from kineme.cli.studio import studio
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -76,3 +77,4 @@ main.add_command(page)
 main.add_command(recognize)
 main.add_command(reproduce)
 main.add_command(segment)
+main.add_command(studio)
