@@ -19,9 +19,11 @@ from kineme.cli.library import library
 from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.move import move
 from kineme.cli.output import write
+from kineme.cli.page import page
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.segment import segment
+from kineme.cli.studio import studio
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -71,6 +73,8 @@ main.add_command(learn)
 main.add_command(library)
 for command in (*MERGE_SPLIT, *MEANING):
     library.add_command(command)
+main.add_command(page)
 main.add_command(recognize)
 main.add_command(reproduce)
 main.add_command(segment)
+main.add_command(studio)

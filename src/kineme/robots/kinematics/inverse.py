@@ -18,6 +18,7 @@ _COORDINATES = 6  # of a pose
 _PARTIAL = 0.005  # times these costs, for arms with fewer joints than that: the position comes first
 _GAIN = 0.95  # of the way to a limit that one step may go
 _DAMPING = 1e-12
+_INSIDE = 0.002  # of the range of a joint, so far from its ends it is kept: between samples a path goes a little beyond
 _WXYZ = [0, 1, 2, 6, 3, 4, 5]  # pinocchio has w last
 
 
@@ -35,7 +36,8 @@ class InverseKinematics:
         "axis" follows the z axis of the tip and leaves the turn about it free, "free" follows the position alone. Arms
         of fewer than six joints follow the orientation as far as the position allows.
     time_step : float, optional
-        Time between two steps [s]: joints then move no faster than their limits of velocity allow.
+        Time between two steps [s]: joints then move no faster than their limits of velocity allow, and up to those of
+        position. Without, they stay 0.2 % of their range inside, which leaves room to what lies between samples.
 
     Attributes
     ----------
@@ -74,9 +76,12 @@ class InverseKinematics:
         self._posture = PostureTask(cost=POSTURE_COST)
         self._posture.set_target(robot.rest)
         self._fastest: Array | None = None if time_step is None else robot.velocity
-        self._limits: list[Any] = [ConfigurationLimit(robot.model, config_limit_gain=_GAIN)]
+        limited = robot.model.copy()
+        if time_step is None:
+            inside = _INSIDE * (robot.upper - robot.lower)
+            limited.lowerPositionLimit, limited.upperPositionLimit = robot.lower + inside, robot.upper - inside
+        self._limits: list[Any] = [ConfigurationLimit(limited, config_limit_gain=_GAIN)]
         if time_step is not None:
-            limited = robot.model.copy()
             limited.velocityLimit = robot.velocity
             self._limits.append(VelocityLimit(limited))
         self.reset(robot.rest)
