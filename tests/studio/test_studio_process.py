@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import httpx
 import pytest
@@ -56,8 +57,8 @@ def test_only_the_loopback_listens(studio):
     port = int(studio.address.rpartition(":")[2])
     own = {found[4][0] for found in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     for address in own - {"127.0.0.1"}:
-        with pytest.raises(OSError, match=""):
-            socket.create_connection((address, port), 0.5).close()
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection((address, port), 0.5)
 
 
 def test_a_real_websocket_is_guarded(studio):
@@ -72,9 +73,11 @@ def test_a_real_websocket_is_guarded(studio):
 
 
 def test_messages_of_many_megabytes_end_their_websocket_alone(studio):
-    with _live(studio) as client, pytest.raises(ConnectionClosed):
-        client.send("[" + "0," * 2_000_000 + "0]")
-        client.recv()
+    with _live(studio) as client:
+        with suppress(ConnectionClosed):
+            client.send("[" + "0," * 2_000_000 + "0]")
+        with pytest.raises(ConnectionClosed):
+            client.recv()
     assert _get(studio)["n_movements"] >= 12
 
 
@@ -84,10 +87,8 @@ def test_raw_nonsense_is_survived(studio):
         with socket.create_connection(("127.0.0.1", port)) as client:
             client.sendall(data)
             client.settimeout(2)
-            try:
+            with suppress(OSError):
                 client.recv(1000)
-            except OSError:
-                pass
     assert _get(studio)["n_movements"] >= 12
 
 
@@ -97,13 +98,11 @@ def test_killed_at_any_time_nothing_that_was_answered_is_lost(folder):
         with running(folder) as one:
             stop = threading.Timer(0.4 + 0.3 * round_, one.process.kill)
             stop.start()
-            try:
+            with suppress(httpx.HTTPError, json.JSONDecodeError):
                 for k in range(1000):
                     body = asked(100 + 1000 * round_ + k, label=f"new {round_} {k}")
                     answer = httpx.post(f"{one.address}/api/library/movements", json=body, headers=BEARER)
                     kept.append((answer.json()["ids"][0], body["label"]))
-            except (httpx.HTTPError, json.JSONDecodeError):
-                pass
             stop.join()
     assert len(kept) > 3
     with ActionLibrary(folder) as library:
@@ -179,7 +178,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("options", "code", "words"), REFUSED, ids=lambda value: str(value))
+@pytest.mark.parametrize(("options", "code", "words"), REFUSED, ids=str)
 def test_what_cannot_be_served_is_refused_in_one_line(tmp_path, monkeypatch, options, code, words):
     monkeypatch.chdir(tmp_path)
     done = _kineme("studio", "--no-open", *options)
