@@ -9,7 +9,7 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 
-_SEEN = 0.005  # of a change of the duration, which is said to three digits
+_LEAST_CHANGE = 0.005  # of a change of the duration, which is said to three digits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,5 +44,5 @@ class RobotMovement:
 
 def duration_in_words(made: RobotMovement) -> str:
     """How long it takes, with how much of that is approach, and how many times as long as generated, if it is."""
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > _SEEN else ""
+    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > _LEAST_CHANGE else ""
     return f"{made.trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}"
