@@ -9,6 +9,7 @@ import numpy as np
 
 from kineme.robots.checks.along import Along, along
 from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.checks.torques import knows_masses
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.execution.timing import STANDS
 from kineme.robots.kinematics.task_path import TaskPath
@@ -16,7 +17,6 @@ from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
 TRACKED = 1e-3  # the tip may be this far from the path [m]
-_TURNED = 1.0  # and turned by so many degrees from it
 _SINGULAR = 0.02  # the smallest singular value of the Jacobian below which an arm is said to be singular
 _JUMP = 0.05  # a joint may deviate so far between two samples from what its velocities say [rad, m]
 _SLACK = 1 + 1e-6
@@ -87,7 +87,7 @@ def _rates(what: str, order: int) -> Callable[[Robot, JointTrajectory, Along], I
 
 def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
     """Of a movement k times as long the torque is ``holding + moving / k^2``."""
-    if not _knows_masses(robot):
+    if not knows_masses(robot):
         return
     for j in np.flatnonzero(~np.isnan(robot.effort)):
         holding, moving, limit = state.holding_torques[:, j], state.moving_torques[:, j], float(robot.effort[j])
@@ -193,17 +193,13 @@ def _tracking(robot: Robot, trajectory: JointTrajectory, state: Along, path: Tas
 
 
 def _unchecked(robot: Robot) -> Iterator[str]:
-    if not _knows_masses(robot):
+    if not knows_masses(robot):
         yield "torques: the model has no masses"
     elif np.isnan(robot.effort).any():
         named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
         yield f"torques of {named}: the model does not say the largest"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
-
-
-def _knows_masses(robot: Robot) -> bool:
-    return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
 
 
 def _at(trajectory: JointTrajectory, t: int) -> float:
