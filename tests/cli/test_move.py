@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from arm_samples import standing
 from kineme.cli import main
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -57,17 +58,12 @@ def test_a_goal_needs_a_start(wave):
 
 def test_the_tip_ends_at_the_goal(wave):
     from kineme.robots import load
-    from kineme.robots.checks.along import along
-    from kineme.robots.execution.joint_trajectory import JointTrajectory
 
     words = ("--robot", "wam", "--at", "0.45,-0.2,0.3", "--goal", "0.5,0.2,0.4", "--duration", "6", "-o", "joints.csv")
     result = run("wave.csv", *words)
     assert result.exit_code == 0, result.output
-    robot = load("wam")
-    q = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[-1:, 1:8]
-    still = np.zeros_like(q)
-    end = along(robot, JointTrajectory(robot.joints, np.zeros(1), q, still, still, {})).tip_positions[0]
-    np.testing.assert_allclose(end, [0.5, 0.2, 0.4], atol=5e-3)
+    q = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[-1, 1:8]
+    np.testing.assert_allclose(standing(load("wam"), q).tip_positions[0], [0.5, 0.2, 0.4], atol=5e-3)
 
 
 def test_bags_and_goals_hold_the_same_joints(wave):
@@ -100,3 +96,55 @@ def test_a_page_in_which_the_arm_moves_is_written(wave):
     assert "panda_joint7 over time" in (wave / "wave.html").read_text(encoding="utf-8")
     assert "wave.html" in run(*words).output  # is there already
     assert run(*words, "--force").exit_code == 0
+
+
+def test_to_write_over_a_file_does_not_need_what_lets_failed_checks_pass(wave):
+    words = ("wave.csv", "--robot", "panda", "--at", "0.45,-0.2,0.3", "-o", "joints.csv")
+    assert run(*words, "--slow-down").exit_code == 0
+    before = (wave / "joints.csv").read_bytes()
+    again = run(*words)
+    assert again.exit_code == 2
+    assert "write over it with --overwrite" in again.output
+    assert run(*words, "--duration", "0.3", "--overwrite").exit_code == 1  # fails a check
+    assert (wave / "joints.csv").read_bytes() == before
+    assert run(*words, "--slow-down", "--duration", "3", "--overwrite").exit_code == 0
+    assert (wave / "joints.csv").read_bytes() != before
+
+
+def test_what_was_assumed_is_said_of_what_is_refused_too(wave):
+    result = run("wave.csv", "--robot", "wam", "--duration", "0.2")
+    assert result.exit_code == 1
+    assert "note: its maker publishes no limits of velocity" in result.output
+
+
+def test_what_is_written_although_it_failed_is_said(wave):
+    result = run("wave.csv", "--robot", "panda", "--duration", "0.3", "-o", "joints.csv", "--force")
+    assert result.exit_code == 0
+    assert "written because of --force" in result.output
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "expected"),
+    [
+        ("--ros1", "w.mcap", ".bag"),
+        ("--ros2", "w.bag", ".mcap, a folder"),
+        ("--ros2", "w.db3", ".mcap, a folder"),
+        ("--view", "w.txt", ".html"),
+        ("--plot", "w", ".png"),
+        ("--action-goal", "w.csv", ".yaml"),
+        ("-o", "w.xlsx", ".csv"),
+    ],
+)
+def test_a_file_of_another_kind_is_refused_before_anything_is_read(wave, option, name, expected):
+    result = run("wave.csv", "--robot", "no such arm", option, name)
+    assert result.exit_code == 2, result.output
+    assert f"expected {expected}" in result.output
+
+
+def test_an_arm_at_rest_elsewhere_turns_its_tip_as_there(wave):
+    words = ("wave.csv", "--robot", "ur5e", "--slow-down", "-o")
+    assert run(*words, "a.csv").exit_code == 0
+    result = run(*words, "b.csv", "--rest", "0,-1.2,1.4,-1.8,-1.5708,0")
+    assert result.exit_code == 0, result.output
+    first = np.loadtxt(wave / "b.csv", delimiter=",", skiprows=1)[0, 1:7]
+    np.testing.assert_allclose(first, [0, -1.2, 1.4, -1.8, -1.5708, 0])

@@ -164,7 +164,10 @@ def test_rhythms_keep_names(tmp_path):
 
 def test_batches_of_other_channels_lose_them():
     a, b = learned("plain")[0], kineme.DMP().learn(recordings((PLAIN[1], PLAIN[0], GRIPPER)))
-    assert kineme.Primitives.concatenate([a, b]).channels is None
+    with pytest.raises(kineme.TrajectoryError, match="their order differs"):
+        kineme.Primitives.concatenate([a, b])
+    others = tuple(Channel(name, "position", (name,)) for name in ("hip", "knee"))
+    assert kineme.Primitives.concatenate([a, kineme.DMP().learn(recordings((*others, GRIPPER)))]).channels is None
 
 
 def test_files_of_before_channels_are_read():

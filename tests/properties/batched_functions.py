@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,6 +26,7 @@ from kineme import (
     ActionLibrary,
     Demonstrations,
     DMPFeatures,
+    ExtrapolationWarning,
     Primitives,
     Recognizer,
     Resample,
@@ -195,6 +197,17 @@ def modulated(demos: Demonstrations) -> list[dict[str, Any]]:
     own = Primitives.from_rollout(path).rollout()
     least = own.least_duration(velocity=1.0) / extents(demos)
     return [one | {"least": np.array(least[i])} for i, one in enumerate(moved(demos, own))]
+
+
+def along_stretches(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Along a stretch that bends more than the basis functions can, each its own."""
+    primitives = DMP("bio-inspired", n_basis=20).learn(demos)
+    ends, u = primitives.goals - primitives.starts, np.linspace(0.4, 0.6, 12)
+    zigzag = 0.05 * (-1.0) ** np.arange(12)
+    points = primitives.starts[:, None] + (u + zigzag)[:, None] * ends[:, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExtrapolationWarning)
+        return moved(demos, primitives.rollout(via=[((0.4, 0.6), points)]))
 
 
 def saved(demos: Demonstrations) -> list[dict[str, Any]]:
@@ -448,8 +461,19 @@ def pose_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
         references=primitives.references,
         durations=primitives.durations / demos.durations,
     )
-    parts = [posed(demos, movement) for movement in (primitives.rollout(), asked)]
-    return [a | b | {f"asked {k}": v for k, v in c.items()} for a, b, c in zip(numbers, *parts, strict=True)]
+    points = primitives.rollout(n_samples=11).poses[:, 4]
+    points[:, :3] += 0.05 * unit
+    points[demos.durations > 1.0, 3:] = np.nan
+    moving = 0.1 * units / tau
+    through = type(primitives).from_rollout(primitives.rollout(via=[(0.4, points)], end_velocity=moving)).rollout()
+    towards = primitives.rollout(via=[], goal_velocity=moving)
+    least = {"least": through.least_duration(velocity=np.array([1e12] * 3 + [1.0] * 3))}
+    parts = [posed(demos, movement) for movement in (primitives.rollout(), asked, through, towards)]
+    named = [
+        [{f"{what} {k}": v for k, v in one.items()} for one in part]
+        for what, part in zip(("replayed", "asked", "through", "towards"), parts, strict=True)
+    ]
+    return [a | b | c | d | e | f for a, b, c, d, e, f in zip(numbers, *named, each(len(demos), **least), strict=True)]
 
 
 def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
@@ -569,6 +593,7 @@ TABLE = [
     feature_row("bio-inspired", "shape-attractor", "forcing", "float32"),
     Batched("Primitives.rollout", rollout_of, 1e-8),
     Batched("Primitives.rollout via", modulated, 1e-8),
+    Batched("Primitives.rollout via stretch", along_stretches, 1e-8),
     Batched("couple", coupled, 1e-8),
     Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),

@@ -33,6 +33,7 @@ OTHER_PARTS = {
     "library": "its class is in the table; what lies under it writes and reads rows of a database",
     "movements.segmentation": "one recording by contract",
     "robots": "one movement by contract",
+    "studio": "its snapshots are a whole library, its server calls the layers below; see tests/studio",
     "validation": "checks that raise",
 }
 

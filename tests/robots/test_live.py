@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kineme
-from arm_samples import simulated, stroke, tip_in
+from arm_samples import simulated, standing, stroke, tip_in
 from kineme.control import ObstacleAvoidance, Status
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
@@ -41,16 +41,7 @@ def test_undisturbed_it_follows_the_rollout(name):
     states, joints, velocities = run(arm, 300)
     check_within_limits(robot, joints, velocities)
     assert max(state.distance for state in states) < 1e-4
-    tips = arm_tips(robot, joints[-1:])
-    np.testing.assert_allclose(tips[0], moving.goals[0], atol=2e-3)
-
-
-def arm_tips(robot, joints):
-    from kineme.robots.execution.joint_trajectory import JointTrajectory
-
-    still = np.zeros_like(joints)
-    times = np.arange(len(joints), dtype=float)
-    return along(robot, JointTrajectory(robot.joints, times, joints, still, still, {})).tip_positions
+    np.testing.assert_allclose(standing(robot, joints[-1]).tip_positions[0], moving.goals[0], atol=2e-3)
 
 
 def test_a_goal_that_moves_is_followed_within_the_limits():
@@ -60,7 +51,7 @@ def test_a_goal_that_moves_is_followed_within_the_limits():
     _, before, first = run(arm, 150)
     states, after, second = run(arm, 900, goal=goal)
     check_within_limits(robot, np.vstack((before, after)), np.vstack((first, second)))
-    np.testing.assert_allclose(arm_tips(robot, after[-1:])[0], goal, atol=1e-3)
+    np.testing.assert_allclose(standing(robot, after[-1]).tip_positions[0], goal, atol=1e-3)
     assert states[-1].movement.status & Status.SETTLED
 
 
@@ -73,7 +64,7 @@ def test_the_tip_steers_around_an_obstacle():
         arm = ArmController(robot, moving.controller(DT, avoidance=ObstacleAvoidance()))
         _, joints, velocities = run(arm, 300, **told)
         check_within_limits(robot, joints, velocities)
-        return np.linalg.norm(arm_tips(robot, joints) - point, axis=1).min()
+        return np.linalg.norm(standing(robot, joints).tip_positions - point, axis=1).min()
 
     assert nearest(obstacles=[point]) > 2 * nearest()
 

@@ -138,3 +138,23 @@ def test_two_dimensional_movements_lie_in_their_plane():
     made = move(kineme.Trajectory(times=there.times, positions=there.positions[:, 1:]), robot, plane="yz")
     np.testing.assert_allclose(made.path.positions[:, 0], InverseKinematics(robot).tip_position[0], atol=1e-12)
     np.testing.assert_allclose(made.path.positions[-1, 1:], there.positions[-1, 1:], atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "lowest"), [("panda", 0.0), ("ur5e", 0.0), ("wam", 0.0), ("so101", -0.03)])
+def test_a_free_place_is_not_below_the_plane_on_which_the_arm_stands(name, lowest):
+    u = np.linspace(0, 1, 120)
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    wave = kineme.Trajectory(4 * u, np.column_stack((0 * s, 0.3 * s, 0.06 * np.sin(2 * np.pi * s))))
+    made = move(wave, load(name), place="free", timing="slowed")
+    assert made.path.positions[:, 2].min() >= lowest - 1e-9
+    assert made.factor < 1.5  # and not where a joint comes to a stop
+
+
+def test_joints_that_come_to_a_stop_stay_within_their_limits_between_samples():
+    robot = load("so101")
+    u = np.linspace(0, 1, 120)
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+    turned = Rotation.from_euler("xyz", np.column_stack((np.pi + 0 * s, 0.3 * s, 0.5 * s))).as_quat(scalar_first=True)
+    positions = np.column_stack((0.2 + 0 * s, 0.3 * s - 0.15, 0.04 + 0.03 * np.sin(2 * np.pi * s)))
+    made = move(np.column_stack((positions, turned)), robot, timing="slowed")  # more of a turn than five joints have
+    assert made.preflight.passed

@@ -10,7 +10,21 @@ from kineme.robots.export.action_goal import write_action_goal
 from kineme.robots.export.bag import STATES, TOPIC, write_bag
 from ros_programs import ros_1, ros_2
 
-_RECEIVE = """
+_AS_SAID = """
+def as_said(message, seconds):
+    return {
+        "names": list(message.joint_names),
+        "times": [seconds(p.time_from_start) for p in message.points],
+        "positions": [list(p.positions) for p in message.points],
+        "velocities": [list(p.velocities) for p in message.points],
+        "accelerations": [list(p.accelerations) for p in message.points],
+    }
+
+"""
+
+_RECEIVE = (
+    _AS_SAID
+    + """
 import json, sys, time
 import rclpy
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -34,48 +48,38 @@ while not received and time.monotonic() < until:
     rclpy.spin_once(arm, timeout_sec=0.1)
 rclpy.shutdown()
 one = received[0]
-print(json.dumps({
-    "names": list(one.joint_names),
-    "times": [p.time_from_start.sec + p.time_from_start.nanosec / 1e9 for p in one.points],
-    "positions": [list(p.positions) for p in one.points],
-    "velocities": [list(p.velocities) for p in one.points],
-    "accelerations": [list(p.accelerations) for p in one.points],
-}))
+print(json.dumps(as_said(one, lambda since: since.sec + since.nanosec / 1e9)))
 """
+)
 
-_READ_2 = """
+_READ_2 = (
+    _AS_SAID
+    + """
 import json, sys
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 one = deserialize_message(bytes.fromhex(sys.stdin.read()), JointTrajectory)
-print(json.dumps({
-    "names": list(one.joint_names),
-    "times": [p.time_from_start.sec + p.time_from_start.nanosec / 1e9 for p in one.points],
-    "positions": [list(p.positions) for p in one.points],
-    "velocities": [list(p.velocities) for p in one.points],
-    "accelerations": [list(p.accelerations) for p in one.points],
-}))
+print(json.dumps(as_said(one, lambda since: since.sec + since.nanosec / 1e9)))
 """
+)
 
-_READ_1 = """
+_READ_1 = (
+    _AS_SAID
+    + """
 import json, sys
 import rosbag
 
 with rosbag.Bag(sys.argv[1]) as bag:
     one = [m for _, m, _ in bag.read_messages(sys.argv[2])][0]
     states = [m for _, m, _ in bag.read_messages(sys.argv[3])]
-print(json.dumps({
-    "names": list(one.joint_names),
-    "times": [p.time_from_start.to_sec() for p in one.points],
-    "positions": [list(p.positions) for p in one.points],
-    "velocities": [list(p.velocities) for p in one.points],
-    "accelerations": [list(p.accelerations) for p in one.points],
+print(json.dumps(as_said(one, lambda since: since.to_sec()) | {
     "states": [list(m.position) for m in states],
     "stamps": [m.header.stamp.to_sec() for m in states],
     "state_names": states[0].name,
 }))
 """
+)
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from kineme.robots import load, move, write_view
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
-from kineme.robots.view import shapes as shapes_module
+from kineme.robots.view import link_shapes
 from kineme.robots.view.scene_data import MOST_SAMPLES, as_script_data
 from kineme.robots.view.shapes import shapes_of
 from kineme.robots.view.write_view import view_page
@@ -217,7 +217,7 @@ def test_meshes_are_in_the_page_and_those_that_are_not_there_become_cylinders(tm
 
 def test_meshes_beyond_the_largest_size_are_left_out(tmp_path, monkeypatch):
     write_stl(tmp_path / "shapes" / "link.stl")
-    monkeypatch.setattr(shapes_module, "_LARGEST", 100)
+    monkeypatch.setattr(link_shapes, "_LARGEST", 100)
     shapes = shapes_of(load(arm(tmp_path, [mesh_visual("link.stl")] * 3 + [""])))
     assert not shapes.meshes
     assert shapes.stand_ins == ("base", "upper", "lower")

@@ -22,6 +22,7 @@ from kineme.cli.output import write
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.segment import segment
+from kineme.cli.studio import studio
 from kineme.cli.symbols import COMMANDS as MEANING
 from kineme.errors import KinemeError
 from kineme.output.text import printable, printable_lines
@@ -74,3 +75,4 @@ for command in (*MERGE_SPLIT, *MEANING):
 main.add_command(recognize)
 main.add_command(reproduce)
 main.add_command(segment)
+main.add_command(studio)

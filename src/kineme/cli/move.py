@@ -7,22 +7,20 @@ from typing import Any
 
 import click
 
+from kineme.cli.move_files import check_files, file_options, write_files
 from kineme.cli.options import (
     Finite,
     Numbers,
     SymbolName,
-    force_option,
     json_option,
     library_option_of,
     specification_options,
     whole,
 )
-from kineme.cli.output import check_new, say, write, write_bytes
+from kineme.cli.output import say, write
 from kineme.cli.reading import layout_options
-from kineme.cli.source import name_of_source, read_source
+from kineme.cli.source import read_source
 
-_OUTPUTS = ("output", "ros1", "ros2", "action_goal", "plot", "view")
-_NEW_FILE = click.Path(path_type=Path)
 _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
@@ -43,6 +41,7 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
               help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
 @click.option("--from", "start", type=Numbers(), help="Where the joints stand now.  [default: the rest posture]")
+@click.option("--rest", type=Numbers(), help="Joints at rest.  [default: of the model, of a file near mid-range]")
 @click.option("--slow-down", is_flag=True, help="Slow the movement down as far as limits demand.")
 @click.option("--fastest", is_flag=True, help="Pass the path in the least time that the limits allow.")
 @click.option("--max-velocity", type=Finite(), help="Of every joint, below what the model allows.")
@@ -51,24 +50,19 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
 @specification_options
 @layout_options
-@click.option("--output", "-o", type=_NEW_FILE, help="A .csv, .npz, .json or .parquet file; - for the screen, as CSV.")
-@click.option("--ros1", type=_NEW_FILE, help="A .bag of ROS 1 with JointTrajectory and JointState.")
-@click.option("--ros2", type=_NEW_FILE, help="A .mcap, or a folder, of ROS 2 with the same.")
+@file_options
 @click.option("--lerobot", type=_NEW_FOLDER, help="A data set of LeRobot: a new one, or one to append an episode to.")
 @click.option("--fps", type=Finite(), default=30.0, show_default=True, help="Frames per second of that data set.")
-@click.option("--action-goal", type=_NEW_FILE, help="A .yaml or .json file for ros2 action send_goal.")
-@click.option("--plot", type=_NEW_FILE, help="Path and joints beside their limits: a .png, .svg or .pdf file.")
-@click.option(
-    "--view", type=_NEW_FILE, help="An .html page in which the arm moves; opens in a browser, needs no network."
-)
 @json_option
-@force_option
+@click.option("--overwrite", is_flag=True, help="Write over files that are there; never over the input.")
+@click.option("--force", is_flag=True, help="Write what fails a check too, and over files that are there.")
 def move(**options: Any) -> None:
     """Move an arm as SOURCE: a symbol of a library, a recording, or a saved primitive (.kineme).
 
     Every trajectory is checked before it is written: limits of joints, velocities, accelerations and torques, jumps,
     singular postures, self-collision, and how well the tip follows. What fails a check is not written, unless
-    --force is given. The trajectory begins with an approach from where the joints stand.
+    --force is given. The trajectory begins with an approach from where the joints stand. Without a file to write,
+    the checks are printed and nothing else is done.
 
     As in:
 
@@ -78,24 +72,26 @@ def move(**options: Any) -> None:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.output.table import to_text
     from kineme.robots.checks.report import preflight_table
-    from kineme.robots.models.robot import load
+    from kineme.robots.models.load import load
 
     if options["slow_down"] and options["fastest"]:
         raise click.UsageError("expected one of --slow-down and --fastest")
-    for name in _OUTPUTS:
-        check_new(options[name], options["force"], options["source"])
-    robot = load(options["robot"], options["tip"], None, options["max_velocity"], options["max_acceleration"])
-    made = _moved(robot, options)
-    to_screen = str(options["output"]) == "-"
+    check_files(options)
+    robot = load(
+        options["robot"], options["tip"], options["rest"], options["max_velocity"], options["max_acceleration"]
+    )
     for sentence in robot.assumed:
         write(f"note: {sentence}", err=True)
-    if not to_screen:
+    made = _moved(robot, options)
+    if str(options["output"]) != "-":
         say(
             options["as_json"],
             _as_data(made),
             lambda: "\n".join([to_text(preflight_table(made.preflight)), _summary(made)]),
         )
-    _write(made, options)
+    if not made.preflight.passed:
+        write(f"warning: checks FAILED: {len(made.preflight.failed)}; written because of --force", err=True)
+    write_files(made, options)
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:
@@ -130,14 +126,14 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
 
 def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
     """The movement, of the tip [m] or of the joints, and which of the two."""
-    from kineme.robots.planning.placed import placed
+    from kineme.robots.planning.generate_at import generate_at
     from kineme.robots.planning.roles import space_of
 
     learned = read_source(options)
     space = "joints" if options["joints"] else space_of(learned.primitive.channels, learned.example, robot)
     if options["goal"] and not (options["at"] or options["as_recorded"] or space == "joints"):
         raise click.UsageError("expected --at with --goal: where the movement starts; or --as-recorded")
-    generated = placed(
+    generated = generate_at(
         learned,
         options["at"],
         options["goal"],
@@ -169,38 +165,8 @@ def _as_data(made: Any) -> dict[str, Any]:
         "duration": made.trajectory.duration,
         "approach": made.begins,
         "factor": made.factor,
+        "assumed": list(made.robot.assumed),
         "passed": made.preflight.passed,
         "checks": checks,
         "not_checked": list(made.preflight.unchecked),
     }
-
-
-def _write(made: Any, options: dict[str, Any]) -> None:
-    from kineme.robots.export.action_goal import write_action_goal
-    from kineme.robots.export.bag import write_bag
-    from kineme.robots.export.columns import encode_joints, write_joints
-
-    trajectory = made.trajectory
-    writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
-    for name, writer in writers.items():
-        path = options[name]
-        if path is None:
-            continue
-        if str(path) == "-":
-            write_bytes(encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
-        else:
-            writer(path, trajectory)
-    if options["plot"]:
-        from kineme.output.figures import save_figure
-        from kineme.robots.figure import draw_robot_movement
-
-        save_figure(draw_robot_movement(made), options["plot"])
-    if options["lerobot"]:
-        from kineme.robots.export.lerobot import write_lerobot
-
-        task = name_of_source(options)
-        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot.name)
-    if options["view"]:
-        from kineme.robots.view.write_view import write_view
-
-        write_view(options["view"], made)

@@ -25,8 +25,8 @@ def write(text: Any = "", *, err: bool = False) -> None:
     click.echo(printable_lines(text), err=err)
 
 
-def check_new(path: Path | None, force: bool, *inputs: str | Path) -> None:
-    """Refuse to write over an input, and without --force over any file.
+def check_new(path: Path | None, force: bool, *inputs: str | Path, remedy: str = "--force") -> None:
+    """Refuse to write over an input, and without --force, or what `remedy` names, over any file.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def check_new(path: Path | None, force: bool, *inputs: str | Path) -> None:
     if any(Path(one).exists() and path.samefile(one) for one in inputs):
         raise click.UsageError(f"expected another file to write than the input {printable(path)}")
     if not force and path.is_file():
-        raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with --force")
+        raise click.UsageError(f"expected a new file to write, {printable(path)} is there; write over it with {remedy}")
 
 
 def write_bytes(data: bytes) -> None:

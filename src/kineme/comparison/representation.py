@@ -110,7 +110,7 @@ class Representation:
         """
         described = paths
         if self.quantity == "forcing":
-            described = (paths.reshape(-1, self.n_points) @ _forcing_operator(self, paths.dtype)).reshape(paths.shape)
+            described = (paths.reshape(-1, self.n_points) @ forcing_operator(self, paths.dtype)).reshape(paths.shape)
             if not translation:
                 described += paths.mean(axis=2, keepdims=True)
         return described.reshape(len(paths), -1)
@@ -167,7 +167,7 @@ def rotating(representations: tuple[Representation, ...]) -> int:
 
 
 @lru_cache(maxsize=32)
-def _forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
+def forcing_operator(representation: Representation, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Matrix (T, T) from positions to f at as many points: subtract the start, encode, apply Eq. (2)."""
     dmp = DMP(
         "bio-inspired",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, overload
 from warnings import warn
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
-from kineme.library.storage import changes, read, symbols
+from kineme.library.storage import changes, export_import, read, symbols, undo, verify
 from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
 from kineme.library.storage.specification import Specification
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from kineme.library.recognition.recognize import LibraryRecognizer
     from kineme.library.storage.source import Source
     from kineme.library.storage.symbols import Symbol
+    from kineme.library.storage.undo import Undone
     from kineme.library.storage.verify import Problem
     from kineme.library.storage.versions import Version
     from kineme.library.symbols.proposals import LibraryProposals
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from kineme.movements.trajectories.trajectory import Trajectory
     from kineme.primitives.discrete.dmp import DMP, Primitives
     from kineme.recognition.answer import Answer
+    from kineme.recognition.early.hypotheses import Early
+    from kineme.recognition.early.stream import Live
     from kineme.recognition.recognizer import Recognizer
 
 
@@ -84,8 +86,7 @@ class ActionLibrary:
     ) -> None:
         specification = Specification.of(recognizer, dmp) if create else None
         self.store = Store(as_folder(folder) / FILE, specification, read_only=read_only, wait=wait)
-        made = self.specification
-        if Specification.of(recognizer, dmp, made) != made:
+        if Specification.of(recognizer, dmp, self.specification) != self.specification:
             self.close()
             raise SpecificationError(
                 f"expected the recognizer and dmp that the library in {folder} was made with, got others; its features "
@@ -95,9 +96,7 @@ class ActionLibrary:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -274,6 +273,25 @@ class ActionLibrary:
         """
         return self._recognizer.recognize(movements, error_rate)
 
+    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Early | None = None) -> Live:
+        """Recognize a movement while it is under way: `Live`, whose ``update(t, x)`` takes each sample.
+
+        It knows the symbols as they are now; after a change, ask for another one. What streams share is kept, so that
+        any number of them may run side by side, each used by one thread at a time.
+
+        Parameters
+        ----------
+        confidence, patience, early
+            As for `kineme.Recognizer.stream`. With more than 2500 movements of symbols, beginnings are those of at most
+            ten of each symbol and 1000 in all; ``finish()`` answers as `recognize` does, with ids of movements.
+
+        Raises
+        ------
+        SpecificationError
+            No movement belongs to a symbol, or there is only one movement.
+        """
+        return self._recognizer.stream(confidence, patience, early)
+
     @cached_property
     def _recognizer(self) -> LibraryRecognizer:
         from kineme.library.recognition.recognize import LibraryRecognizer
@@ -284,6 +302,29 @@ class ActionLibrary:
         """All versions, the first one first."""
         return history(self.store)
 
+    def undo(self, expected: int | None = None) -> Undone:
+        """Take back the last change that was not taken back yet, whoever made it, as a new version.
+
+        Called again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
+        new id, as if it were learned again. Who showed a movement, and its number of dimensions, stay known.
+
+        Parameters
+        ----------
+        expected : int, optional
+            The version to take back, so that no change is that came since it was looked at.
+
+        Returns
+        -------
+        Undone
+            ``(version, to, action)``: the new version has the state of version `to`; `action` is what was taken back.
+
+        Raises
+        ------
+        SpecificationError
+            No change is left, or the library is at another version than expected.
+        """
+        return undo.undo(self.store, expected)
+
     def at(self, version: int) -> ActionLibrary:
         """The library as it was at a version, for reading."""
         past = object.__new__(ActionLibrary)
@@ -292,22 +333,16 @@ class ActionLibrary:
 
     def verify(self) -> list[Problem]:
         """Find damage: a list of problems with table, row or movement, and a text; empty if nothing is damaged."""
-        from kineme.library.storage.verify import verify
-
-        return verify(self.store)
+        return verify.verify(self.store)
 
     def export(self, path: str | Path) -> Path:
         """Write the library, with all its versions, to one new file. Equal libraries give equal bytes."""
-        from kineme.library.storage.export_import import export
-
-        return export(self.store, path)
+        return export_import.export(self.store, path)
 
     @classmethod
     def import_(cls, path: str | Path, folder: str | Path, **options: Any) -> Self:
         """Create a library in `folder` from a file of `export`, after checking every byte of it, and open it."""
-        from kineme.library.storage.export_import import import_
-
-        import_(path, folder)
+        export_import.import_(path, folder)
         return cls(folder, **options)
 
     def rename(self, old: str, new: str) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.alike import check_alike
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.labels import label_array
@@ -92,6 +93,11 @@ class Batch:
         return None if self.recorded_as is None else self.recorded_as.channels
 
     @property
+    def moving_channels(self) -> Channels | None:
+        """Those `channels` that are learned, in the order of the columns of a primitive."""
+        return None if self.recorded_as is None else self.recorded_as.moving
+
+    @property
     def to_recording(self) -> RecordedAs | None:
         """`recorded_as`, if the movements can be written in the columns of the recording; else None.
 
@@ -109,7 +115,8 @@ class Batch:
         SpecificationError
             Batches of different specifications: their weights are not comparable.
         TrajectoryError
-            No batch, something that is not a batch, batches of different dimensions, labels on some batches only.
+            No batch, something that is not a batch, batches of different dimensions, labels on some batches only;
+            channels that are known to differ, as joint angles and positions.
         """
         batches = list(batches)
         if not batches or not all(isinstance(batch, cls) for batch in batches):
@@ -117,7 +124,8 @@ class Batch:
             raise TrajectoryError(f"expected at least one batch of {cls.__name__}, got {got}")
         first = batches[0]
         for i, batch in enumerate(batches):
-            _check_alike(first, batch, i)
+            _check_specification(first, batch, i)
+        check_alike([batch.moving_channels for batch in batches], "batch")
         labels = [batch.labels for batch in batches if batch.labels is not None]
         if len(labels) not in (0, len(batches)):
             raise TrajectoryError(
@@ -202,7 +210,7 @@ class Batch:
         return cls._of_rows(dmp, rows, *labels_and_names(header, n), recorded_as_from(header, arrays, n, d))
 
 
-def _check_alike(first: Batch, batch: Batch, i: int) -> None:
+def _check_specification(first: Batch, batch: Batch, i: int) -> None:
     if batch.dmp != first.dmp:
         name = next(f.name for f in fields(first.dmp) if getattr(first.dmp, f.name) != getattr(batch.dmp, f.name))
         raise SpecificationError(

@@ -1,5 +1,5 @@
 # Arms
-from kineme.robots.models.robot import load as load
+from kineme.robots.models.load import load as load
 from kineme.robots.models.robot import Robot as Robot
 
 # From a movement to an arm

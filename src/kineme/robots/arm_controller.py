@@ -14,14 +14,14 @@ from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
 from kineme.robots.arm_state import ArmState, ArmStatus
-from kineme.robots.checks.preflight import TRACKED
 from kineme.robots.checks.torques import Torques
+from kineme.robots.checks.tracking import TRACKED, TURNED
 from kineme.robots.kinematics.live import LiveKinematics
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
 
-_TURNED = math.radians(1.0)  # an arm whose tip is turned away further lags
+_TURNED = math.radians(TURNED)
 _FOLLOWS = ArmStatus(0)
 _LIMITS = (ArmStatus.POSITION_LIMIT, ArmStatus.VELOCITY_LIMIT, ArmStatus.ACCELERATION_LIMIT)  # as in `Reasons`
 

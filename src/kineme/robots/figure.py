@@ -13,7 +13,9 @@ from kineme.primitives.rollout_figure import set_equal_scales
 from kineme.robots.checks.along import along
 from kineme.robots.planning.robot_movement import RobotMovement
 
-_ROW = 0.8  # height of one joint [inch]
+_ROW = 0.85  # height of one joint [inch]
+_LEAST_SPAN = 0.05  # of what the limits allow: so much of it is drawn at least, that a joint at rest is a straight line
+_LONGEST = 34  # letters of the name of a joint
 
 
 def draw_robot_movement(made: RobotMovement) -> Figure:
@@ -27,11 +29,11 @@ def draw_robot_movement(made: RobotMovement) -> Figure:
     for j, axes in enumerate(rows[: robot.n_joints]):
         _draw_joint(axes, made, j)
     for axes, (name, values) in zip(rows[robot.n_joints :], trajectory.steps.items(), strict=True):
+        axes.axvspan(0, made.begins, color=GRAY, alpha=0.12, linewidth=0)
         axes.step(trajectory.times, values, color=BLUE, where="post")
-        axes.set_ylabel(drawable(_short(name)), fontsize=8)
+        _name(axes, _short(name))
     rows[-1].set_xlabel("time [s]")
-    right.align_ylabels()
-    right.suptitle("joints [rad] over time, their limits at the right; the approach is shaded", fontsize=9)
+    right.suptitle("joints over time, their limits at the right; the approach is shaded", fontsize=9)
     return figure
 
 
@@ -46,7 +48,9 @@ def _draw_path(figure: Any, made: RobotMovement) -> None:
     axes.scatter(*executed[first], color=BLUE, s=24, label="start")
     axes.scatter(*executed[-1], color=BLUE, s=40, marker="*", label="goal")
     set_equal_scales(axes, executed)
-    for name in "xyz":
+    extents = np.ptp(executed, axis=0)
+    for name, extent in zip("xyz", extents, strict=True):
+        axes.locator_params(axis=name, nbins=4 if extent > extents.max() / 2 else 2)  # numbers side by side
         getattr(axes, f"set_{name}label")(f"{name} [m]")
     figure.legend(loc="outside lower center", ncols=3)
     figure.suptitle(f"tip of {drawable(made.robot.name)}", fontsize=9)
@@ -54,17 +58,24 @@ def _draw_path(figure: Any, made: RobotMovement) -> None:
 
 def _draw_joint(axes: Any, made: RobotMovement, j: int) -> None:
     robot, times, values = made.robot, made.trajectory.times, made.trajectory.positions[:, j]
+    lower, upper = float(robot.lower[j]), float(robot.upper[j])
     axes.axvspan(0, made.begins, color=GRAY, alpha=0.12, linewidth=0)
     axes.plot(times, values, color=BLUE)
-    room = 0.15 * max(float(np.ptp(values)), 0.5)
-    low, high = float(values.min()) - room, float(values.max()) + room
-    for limit in (robot.lower[j], robot.upper[j]):
-        if low - room <= limit <= high + room:
+    room = 0.3 * max(float(np.ptp(values)), 0.5)
+    for limit in (lower, upper):
+        if values.min() - room <= limit <= values.max() + room:
             axes.axhline(limit, color=ORANGE, linestyle="--", linewidth=1)
-    axes.set_ylabel(drawable(_short(robot.joints[j])), fontsize=8)
-    limits = f"{robot.lower[j]:.2f} to {robot.upper[j]:.2f}"
+    low, high = axes.get_ylim()
+    narrow = max(0.0, _LEAST_SPAN * (upper - lower) - (high - low)) / 2
+    axes.set_ylim(low - narrow, high + narrow)
+    _name(axes, f"{_short(robot.joints[j])} [{robot.units[j]}]")
+    limits = f"{lower:.2f} to {upper:.2f}"
     axes.text(1.0, 1.0, limits, transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color=ORANGE)
 
 
-def _short(name: str, longest: int = 12) -> str:
-    return name if len(name) <= longest else "…" + name[1 - longest :]
+def _name(axes: Any, name: str) -> None:
+    axes.set_title(drawable(name), loc="left", fontsize=8, pad=2)
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST else "…" + name[1 - _LONGEST :]

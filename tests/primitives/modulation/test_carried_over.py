@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, Demonstrations, Primitives, blend, join
+from kineme import DMP, Demonstrations, Primitives, TrajectoryError, blend, join
 from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 
@@ -91,6 +91,12 @@ def test_labels_and_names_are_kept_where_they_are_equal(parts):
     assert blend(parts[0], parts[1], (0.4, 0.6)).labels.tolist() == ["pick"]
 
 
-def test_parts_that_were_recorded_as_different_things_have_no_channels_in_common(parts):
+def test_parts_of_which_some_have_no_channels_have_none_in_common(parts):
+    plain = DMP().learn(parts[1].rollout().positions)
+    assert join([parts[0], plain], shift=True).channels is None
+
+
+def test_parts_that_were_recorded_in_other_units_are_refused(parts):
     meters = gripped([(0.5, 1.0, 0.0)], [4.0], unit="m")
-    assert join([parts[0], meters], shift=True).channels is None
+    with pytest.raises(TrajectoryError, match="elbow is in mm, elbow in m;"):
+        join([parts[0], meters], shift=True)

@@ -17,7 +17,13 @@ def learned():
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize(
-    "limits", [{"velocity": 30.0}, {"acceleration": [100.0, 300.0]}, {"velocity": [5.0, 1e4], "acceleration": 200.0}]
+    "limits",
+    [
+        {"velocity": 30.0},
+        {"acceleration": [100.0, 300.0]},
+        {"velocity": [5.0, 1e4], "acceleration": 200.0},
+        {"velocity": np.array([30.0, 40.0])},
+    ],
 )
 def test_it_touches_a_limit_and_exceeds_none(formulation, limits):
     primitives = DMP(formulation).learn(kineme.load_lasa(["CShape"]))

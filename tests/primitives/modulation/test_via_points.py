@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import kineme
 from kineme import DMP, ExtrapolationWarning, Primitives, SpecificationError, TrajectoryError
@@ -184,6 +188,53 @@ class TestStretches:
         path = learned[0].rollout(via=[((0.4, 0.6), asked), (0.8, learned.goals[0])], n_samples=11)
         np.testing.assert_allclose(path.positions[0, [4, 5, 6]], asked, atol=1e-6 * 35)
         np.testing.assert_allclose(path.positions[0, 8], learned.goals[0], atol=1e-6 * 35)
+
+    @settings(max_examples=25, deadline=None)
+    @given(
+        st.sampled_from(range(0, len(EVERY), 2)),
+        st.integers(5, 150),
+        st.floats(0.1, 0.7),
+        st.floats(0.03, 0.2),
+        st.integers(0, 10**6),
+    )
+    def test_a_noisy_one_does_not_swing(self, demos, which, n_points, begin, length, seed):
+        """Met as closely as possible, these swung by up to 700 times the movement's extent."""
+        primitive = EVERY[which].learn(demos[:1])
+        plain = primitive.rollout(n_samples=2001).positions[0]
+        places = np.round(2000 * np.linspace(begin, begin + length, n_points)).astype(int)
+        noise = 0.02 * np.random.default_rng(seed).normal(size=(n_points, 2)) * primitive.extents[0]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExtrapolationWarning)
+            path = primitive.rollout(via=[((begin, begin + length), plain[places] + noise)], n_samples=2001)
+        assert np.abs(path.positions[0] - plain).max() < np.linalg.norm(primitive.extents[0])
+        np.testing.assert_allclose(path.positions[0, -1], primitive.goals[0], atol=1e-6 * 35)
+
+    def test_a_smooth_one_of_many_points_does_not_swing_either(self, learned):
+        u = np.linspace(0.1, 0.9, 200)
+        plain, places = learned[0].rollout(n_samples=2001).positions[0], np.round(2000 * u).astype(int)
+        asked = plain[places] + 8.0 * np.sin(np.pi * (u - 0.1) / 0.8)[:, None]
+        path = learned[0].rollout(via=[((0.1, 0.9), asked)], n_samples=2001).positions[0]
+        assert np.abs(path[places] - asked).max() < 1e-3 * 50
+        assert np.abs(path - plain).max() < 1.01 * 8.0
+
+    def test_an_average_does_not_swing_either(self, demos):
+        known = kineme.styles.average(DMP().learn(demos))
+        plain = known.rollout(n_samples=1001).positions[0]
+        noisy = plain[400:600:4] + np.random.default_rng(0).normal(size=(50, 2))
+        with pytest.warns(ExtrapolationWarning, match="from its via stretch"):
+            path = known.rollout(via=[((0.4, 0.596), noisy)], n_samples=1001).positions[0]
+        assert np.abs(path - plain).max() < 25.0  # half of its extent; met as closely as possible, 500 times it
+
+    def test_how_far_one_is_led_away_is_said(self, learned):
+        """The number that is said is that of the path."""
+        plain = learned[0].rollout(n_samples=1001).positions[0]
+        noisy = plain[400:600:4] + np.random.default_rng(0).normal(size=(50, 2))
+        with pytest.warns(ExtrapolationWarning, match=r"smooth its points.*condition\(t, position, std\)") as said:
+            path = learned[0].rollout(via=[((0.4, 0.596), noisy)], n_samples=1001).positions[0]
+        assert len(said) == 1
+        led = float(re.search(r"led away from its path by ([\d.]+), where", str(said[0].message))[1])
+        assert led == pytest.approx(np.abs(path - plain).max(), rel=0.1)
+        assert led < 3.0
 
     def test_one_that_bends_too_much_is_said(self, learned):
         asked = middle(learned) + np.random.default_rng(0).normal(size=(200, 2))

@@ -182,5 +182,6 @@ def style_model(styles: dict[str, Any], dmp: Any) -> StyleModel:
         duration=float(styles["duration"]),
         # What the metric sees of the basis: theta is regressed on the styles, and the metric is linear in theta.
         directions=compared(styles["metric"], dmp, arrays["basis"]),
+        recorded_as=None,
         **arrays,
     )

@@ -15,7 +15,7 @@ from kineme.output.figures import BLUE, GRAY, GREEN, LINES, ORANGE, PURPLE, new_
 from kineme.output.table import Table
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.models.robot import load
+from kineme.robots.models.load import load
 from kineme.robots.planning.move import move
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.validation import Array

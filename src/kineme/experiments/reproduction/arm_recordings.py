@@ -10,7 +10,8 @@ from kineme.movements.preparation.resample import Resample
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.models.robot import Robot, load
+from kineme.robots.models.load import load
+from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
 ROBOT = "wam"  # the arm of Figure 7

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
-
-import numpy as np
 
 from kineme.errors import KinemeError
 from kineme.files.annotations.annotation import Annotation
 from kineme.files.merge_files import Recordings, Source
 from kineme.files.problem import Problem
-from kineme.library.recognition.members import Members, members_of
-from kineme.library.recognition.recognize import known_members
+from kineme.library.recognition.recognize import some_of_each_symbol
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.compared_windows import Templates
 from kineme.recognition.known_classes import KnownClasses
 from kineme.recognition.spotting import Spotted, spot
-from kineme.sampling import evenly_spaced
 
-_MOST = 1000  # movements that a recording is searched for
-_OF_EACH = 10  # members of a symbol that windows of a recording are compared with, evenly spaced; more take longer
 _MAX_PIECES = 8  # most stretches between rests that a movement may consist of, as in `Recognizer.spot`
 
 
@@ -68,7 +60,7 @@ def annotate(
     TrajectoryError
         The recordings have other columns than those of the library.
     """
-    known = spotting_classes(store)
+    known = some_of_each_symbol(store)
     known.comparison.checked(recordings.demonstrations[:1], "recordings")  # all of them have the same columns
     annotations, problems, done = [], [], 0.0
     for one, source in zip(recordings.demonstrations, recordings.sources, strict=True):
@@ -88,12 +80,6 @@ def annotate(
         done += one.duration
         tell(1.0)
     return Annotated(annotations, problems, bool(known.calibration.calibrated(error_rate).all()))
-
-
-def spotting_classes(store: Store) -> KnownClasses:
-    """What recordings are searched for: the symbols by at most ten members each, and 1000 in all."""
-    members = members_of(store)
-    return known_members(store, _some(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
 
 
 def spot_known(
@@ -120,13 +106,3 @@ def annotations_of(found: list[Spotted], recording: Trajectory, source: Source) 
         )
         for one in found
     ]
-
-
-def _some(members: Members, most: int) -> Members:
-    """At most so many members of each symbol, evenly spaced."""
-    ends = np.append(members.first, len(members.ids))
-    rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]
-    kept = np.concatenate(rows)
-    first = np.cumsum([0, *(len(one) for one in rows[:-1])])
-    groups = None if members.groups is None else members.groups[kept]
-    return replace(members, ids=members.ids[kept], first=first, groups=groups)

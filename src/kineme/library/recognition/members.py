@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from kineme.library.storage.read import Ids
 from kineme.library.storage.rows import ALIVE, among, damage, damaged, listed
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.labels import label_array
+from kineme.sampling import evenly_spaced
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +93,13 @@ def described(store: Store, ids: ArrayLike, comparison: Comparison | None = None
 def described_references(store: Store, ids: Ids, labels: NDArray[Any]) -> References:
     """Movements with sorted labels, from their stored features; their samples are read when asked for."""
     return References.of(OnDemand(ids, partial(read.movements, store)), described(store, ids), labels)
+
+
+def some_members(members: Members, most: int) -> Members:
+    """At most so many members of each symbol, evenly spaced."""
+    ends = np.append(members.first, len(members.ids))
+    rows = [start + evenly_spaced(stop - start, most) for start, stop in pairwise(ends)]
+    kept = np.concatenate(rows)
+    first = np.cumsum([0, *(len(one) for one in rows[:-1])])
+    groups = None if members.groups is None else members.groups[kept]
+    return replace(members, ids=members.ids[kept], first=first, groups=groups)

@@ -4,73 +4,116 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from threading import Lock
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.comparison.stored_references import StoredReferences
 from kineme.library.recognition.calibration_cache import calibrated, calibrated_once, sample_comparison
-from kineme.library.recognition.members import Members, described_references, members_of
+from kineme.library.recognition.live import Begun, begun, live
+from kineme.library.recognition.members import Members, described_references, members_of, some_members
 from kineme.library.recognition.reduced_features_cache import ReducedMovements, open_cache, updated
 from kineme.library.storage import read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, Neighbor, is_one
 from kineme.recognition.conformal import calibrate
+from kineme.recognition.early.hypotheses import Early, as_early
+from kineme.recognition.early.stream import Live
 from kineme.recognition.known_classes import Calibrates, KnownClasses, fit_known_classes
 from kineme.recognition.two_stage_search import TwoStageSearch
 
 #: Movements up to which every one is compared: the answer is then the recognizer's own. Processor time of 2000
 #: movements of 26 classes in space: 2.2 s until the first answer and 1.4 ms for each (two stages: 1.0 s, 3.4 ms).
 EXHAUSTIVE = 2500
+_MOST = 1000  # movements that recordings, and in a large library movements under way, are compared with
+_OF_EACH = 10  # of each symbol, evenly spaced; more take longer
+_ERROR_RATE = 0.05
+
+
+class Current(NamedTuple):
+    """What recognizes the symbols of one version, and the ids of its movements."""
+
+    version: int
+    ids: Ids
+    model: KnownClasses | TwoStageSearch
 
 
 @dataclass(eq=False)
 class LibraryRecognizer:
-    """The recognizer of a library; created on first use, and again after a change."""
+    """The recognizer of a library; created on first use, and again after a change. Threads may share it."""
 
     store: Store
     exhaustive: int = EXHAUSTIVE
-    _version: int | None = None
     _reduced: ReducedMovements | None = None
-    _ids: Ids = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    _model: KnownClasses | TwoStageSearch | None = None
+    _current: Current | None = None
+    _begun: Begun | None = None
+    _turn: Lock = field(default_factory=Lock)
 
     def recognize(self, X: MovementsLike, error_rate: float = 0.05) -> Answer | list[Answer]:
         """An `Answer` for one movement, a list for many; see `ActionLibrary.recognize`."""
-        answers = self._named(self.model().recognize(X, error_rate))
+        answers = self._answers(self.current(), X, error_rate)
         return answers[0] if is_one(X) else answers
+
+    def stream(self, confidence: float = 0.9, patience: float = 0.05, early: Early | None = None) -> Live:
+        """Recognize a movement while it is under way; see `ActionLibrary.stream`."""
+        now = self.current()
+        return live(self._beginnings(now, as_early(early)), confidence, patience, partial(self._answer, now))
 
     def model(self) -> KnownClasses | TwoStageSearch:
         """What recognizes the symbols as they are now: by all of their movements, or in two stages."""
-        version = self.store.version
-        if self._model is None or version != self._version:
-            members = members_of(self.store)
-            self._model = self._small(members) if len(members.ids) <= self.exhaustive else self._large(members)
-            self._version = version
-        return self._model
+        return self.current().model
 
-    def _small(self, members: Members) -> KnownClasses:
-        self._ids = members.ids
-        return known_members(self.store, members, partial(calibrated_once, self.store, members))
+    def current(self) -> Current:
+        """The model of the symbols as they are now; one thread makes it, others wait."""
+        with self._turn:
+            version = self.store.version
+            if self._current is None or version != self._current.version:
+                members = members_of(self.store)
+                make = self._small if len(members.ids) <= self.exhaustive else self._large
+                self._current = Current(version, *make(members))
+            return self._current
 
-    def _large(self, members: Members) -> TwoStageSearch:
+    def _small(self, members: Members) -> tuple[Ids, KnownClasses]:
+        return members.ids, known_members(self.store, members, partial(calibrated_once, self.store, members))
+
+    def _large(self, members: Members) -> tuple[Ids, TwoStageSearch]:
         self._reduced = open_cache(self.store) if self._reduced is None else updated(self.store, self._reduced)
-        self._ids = self._reduced.ids
-        return two_stages(self.store, self._reduced, members)
+        return self._reduced.ids, two_stages(self.store, self._reduced, members)
 
-    def _named(self, answers: list[Answer]) -> list[Answer]:
+    def _beginnings(self, now: Current, early: Early) -> Begun:
+        """Of all members of a small library, of some of a large one; kept from the last time."""
+        with self._turn:
+            made = self._begun
+            if made is None or (made.version, made.early) != (now.version, early):
+                known = now.model if isinstance(now.model, KnownClasses) else some_of_each_symbol(self.store)
+                made = self._begun = begun(now.version, known, early)
+            return made
+
+    def _answer(self, now: Current, movement: Trajectory) -> Answer:
+        return self._answers(now, movement, _ERROR_RATE)[0]
+
+    def _answers(self, now: Current, X: MovementsLike, error_rate: float) -> list[Answer]:
         """The answers with ids and names of movements instead of rows."""
-        ids = np.unique([self._ids[near.index] for answer in answers for near in answer.nearest])
+        answers = now.model.recognize(X, error_rate)
+        ids = np.unique([now.ids[near.index] for answer in answers for near in answer.nearest])
         names = {one["id"]: one["name"] for one in read.records(self.store, ids)}
 
         def name(near: Neighbor) -> Neighbor:
-            key = int(self._ids[near.index])
+            key = int(now.ids[near.index])
             return Neighbor(key, names[key], near.similarity)
 
         return [replace(answer, nearest=tuple(map(name, answer.nearest))) for answer in answers]
+
+
+def some_of_each_symbol(store: Store) -> KnownClasses:
+    """What recognizes symbols by at most ten members each, and 1000 in all or one of each."""
+    members = members_of(store)
+    return known_members(store, some_members(members, max(1, min(_OF_EACH, _MOST // len(members.names)))))
 
 
 def known_members(store: Store, members: Members, calibrate_by: Calibrates = calibrate) -> KnownClasses:

@@ -113,8 +113,11 @@ def split(store: Store, name: str, ids: Any, new: str) -> None:
         _move_members(change, members, key)
 
 
-def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
-    """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to."""
+def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None) -> None:
+    """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
+
+    A symbol that is created has the medoid as its prototype, if that is among the movements.
+    """
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
     with store.writing("assign", {"symbol": who, "movements": len(wanted), "how": how}) as change:
@@ -123,6 +126,8 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored") -> None:
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])
         add_members(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
+        if state is None and medoid in wanted.tolist():
+            _replace_state(change, state_of(change.connection, who, NOW), prototype=medoid)
 
 
 def release(store: Store, ids: Any) -> None:

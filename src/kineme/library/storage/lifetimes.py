@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.storage.schema import COUNTED, LARGEST_ID
+from kineme.library.storage.schema import COUNTED, LARGEST_ID, UNDO
 
 Whole = NDArray[np.int64]
 Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
@@ -23,7 +23,9 @@ def lives(connection: sqlite3.Connection) -> Found:
     member = _columns(connection, "member", "movement")
     symbol = _columns(connection, "member", "symbol")
     yield from _apart("member", member, "the movement shows two symbols at a time")
-    yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps="is not there for a while")
+    returned = [key for (key,) in connection.execute("SELECT id FROM version WHERE action = ?", (UNDO,))]
+    gaps = "is not there for a while"  # none but those of symbols that were deleted, until that was undone
+    yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps, returned)
     yield from _apart("symbol_state", _named(connection), "two symbols have its name at a time")
     yield from _within("member", member, movement, "its movement")
     yield from _within("member", symbol, _whole_lives(state), "its symbol")
@@ -65,12 +67,15 @@ def _named(connection: sqlite3.Connection) -> Whole:
     return table[np.lexsort((table[:, 3], table[:, 2], table[:, 1]))]
 
 
-def _apart(table: str, rows: Whole, words: str, gaps: str = "") -> Found:
-    """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean."""
+def _apart(table: str, rows: Whole, words: str, gaps: str = "", returned: Sequence[int] = ()) -> Found:
+    """Check that lifetimes of one owner do not overlap; and have no gaps, if `gaps` says what one would mean.
+
+    At the versions of `returned` a gap may end.
+    """
     same = rows[1:, 1] == rows[:-1, 1]
     yield from ((table, int(key), words) for key in rows[1:][same & (rows[1:, 2] < rows[:-1, 3]), 0])
     if gaps:
-        later = same & (rows[1:, 2] > rows[:-1, 3])
+        later = same & (rows[1:, 2] > rows[:-1, 3]) & ~np.isin(rows[1:, 2], returned)
         yield from ((table, int(key), f"the symbol {gaps}") for key in rows[1:][later, 0])
 
 

@@ -18,7 +18,6 @@ from kineme.library.recognition.members import described, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
 from kineme.library.storage.store import Store, history
-from kineme.library.storage.symbols import exists
 from kineme.library.symbols.recognized import Recognized, known_symbols
 from kineme.movements.trajectories.demonstrations import Demonstrations
 
@@ -123,13 +122,9 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
             f"expected movements without a symbol, all {len(proposal.members)} of this proposal show one by now; "
             "propose again"
         )
-    new = not exists(store, name)
-    said = {} if description is None else {"description": description}
-    changes.assign(store, members, name, "anchored")
-    if new and proposal.medoid in members:
-        changes.annotate(store, name, **said, prototype=proposal.medoid)
-    elif said:
-        changes.annotate(store, name, **said)
+    changes.assign(store, members, name, "anchored", proposal.medoid)
+    if description is not None:
+        changes.annotate(store, name, description=description)
 
 
 def reject(store: Store, proposal: Proposal) -> None:

@@ -126,7 +126,12 @@ def lever_of(channels: Channels) -> float:
     It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
     """
     units = [one.unit for one in channels if one.kind == "position"]
-    return _LEVER * _PER_METER.get((units[0] or "m").lower().removesuffix("s"), 1.0) if units else 1.0
+    return _LEVER * (units_per_meter(units[0] or "m") or 1.0) if units else 1.0
+
+
+def units_per_meter(unit: str) -> float | None:
+    """How many of a unit make a meter; None of what is no length that is known."""
+    return _PER_METER.get(unit.lower().removesuffix("s"))
 
 
 def as_wxyz(q: Array, channel: Channel) -> Array:

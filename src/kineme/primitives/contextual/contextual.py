@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.batch import Batch
 from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
+from kineme.primitives.contextual.task_parameters import check_range, demonstrated_parameters, task_parameters
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.parameters import (
     check_primitives,
@@ -23,10 +24,8 @@ from kineme.primitives.styles.parameters import (
     shared_recording,
     to_numbers,
 )
-from kineme.validation import LARGEST, Array, as_numbers, check_choice, check_number
+from kineme.validation import Array, check_choice, check_number
 
-_SLACK = 1e-9  # of the range: a demonstrated parameter is inside, whatever the rounding
-_ALONE = 1e-9  # of the leverage: a demonstration that differs from all others alone
 _AS_GOOD, _EXACT = 1.05, 1e-6  # times the least error; times that of ignoring the parameters
 REGRESSIONS = ("auto", "linear", "gaussian-process")
 
@@ -117,7 +116,7 @@ class Contextual(BaseEstimator):
         """
         self._check()
         primitives = self._learned(movements)
-        C = _as_parameters(parameters, len(primitives))
+        C = demonstrated_parameters(parameters, len(primitives))
         self.center_, self.scale_ = C.mean(axis=0), C.std(axis=0)
         X = _standardized(C, self.center_, self.scale_)
         Y = _compressed_paths(primitives)
@@ -156,9 +155,9 @@ class Contextual(BaseEstimator):
             Parameters of another number than the demonstrated ones, or not finite.
         """
         check_is_fitted(self, "primitives_")
-        C = _as_tasks(parameters, self.parameters_.shape[1])
+        C = task_parameters(parameters, self.parameters_.shape[1])
         if not extrapolate:
-            _check_range(C, self.parameters_)
+            check_range(C, self.parameters_)
         w = self._solved.weights(_standardized(C, self.center_, self.scale_))
         theta = np.tensordot(w, to_numbers(self.primitives_), axes=1)
         durations = np.exp(w @ np.log(self.primitives_.durations))
@@ -203,73 +202,3 @@ def _rms(errors: Array) -> float:
 
 def _standardized(C: Array, center: Array, scale: Array) -> Array:
     return (C - center) / scale
-
-
-def _finite(C: Array) -> Array:
-    usable = np.abs(C) <= LARGEST
-    if not usable.all():
-        i = int(np.argmin(usable.all(axis=1)))
-        raise TrajectoryError(f"parameters {i}: expected finite numbers up to {LARGEST:g}, got {C[i].tolist()}")
-    return C
-
-
-def _as_parameters(parameters: ArrayLike, n: int) -> Array:
-    """The parameters (n, k) of n demonstrations."""
-    C = as_numbers(parameters, "parameters")
-    C = C[:, None] if C.ndim == 1 else C
-    if C.ndim != 2 or len(C) != n or not C.shape[1]:
-        raise TrajectoryError(
-            f"expected parameters of shape ({n},) or ({n}, k), those of each demonstration, got shape "
-            f"{np.shape(parameters)}"
-        )
-    C, k = _finite(C), C.shape[1]
-    if n < k + 2:
-        raise TrajectoryError(
-            f"expected at least {k + 2} demonstrations for {k} parameters, so that one can be left out, got {n}"
-        )
-    deviations = C - C.mean(axis=0)
-    lengths = np.linalg.norm(deviations, axis=0)
-    still = lengths <= 1e-12 * np.linalg.norm(C, axis=0)
-    if still.any():
-        j = int(np.argmax(still))
-        raise TrajectoryError(
-            f"expected parameter {j} to differ between demonstrations, got {C[0, j]:g} in all; leave it out"
-        )
-    if np.linalg.matrix_rank(deviations / lengths, tol=1e-9) < k:
-        raise TrajectoryError(f"expected {k} parameters of which none follows from the others; leave out those that do")
-    _check_alone(deviations / lengths)
-    return C.copy()
-
-
-def _check_alone(deviations: Array) -> None:
-    """Refuse a demonstration without which the others say nothing about a parameter: it cannot be left out."""
-    leverage = 1.0 / len(deviations) + np.sum(np.linalg.qr(deviations)[0] ** 2, axis=1)
-    if leverage.max() > 1.0 - _ALONE:
-        raise TrajectoryError(
-            f"expected parameters that differ independently in all demonstrations but one, too, so that it can be left "
-            f"out, got demonstration {np.argmax(leverage)} alone with its own; demonstrate another one like it"
-        )
-
-
-def _as_tasks(parameters: ArrayLike, k: int) -> Array:
-    """Parameters (m, k) to generate for."""
-    C = as_numbers(parameters, "parameters")
-    C = C.reshape(-1, 1) if k == 1 and C.ndim < 2 else np.atleast_2d(C)
-    if C.ndim != 2 or C.shape[1] != k or not len(C):
-        raise TrajectoryError(f"expected parameters of shape ({k},) or (m, {k}), got shape {np.shape(parameters)}")
-    return _finite(C)
-
-
-def _check_range(C: Array, shown: Array) -> None:
-    lowest, highest = shown.min(axis=0), shown.max(axis=0)
-    beyond = np.maximum(np.maximum(lowest - C, C - highest), 0.0)
-    outside = beyond > _SLACK * (highest - lowest)
-    if outside.any():
-        i = int(np.argmax(outside.any(axis=1)))
-        j = int(np.argmax(outside[i]))
-        share = 100.0 * beyond[i, j] / (highest[j] - lowest[j])
-        raise SpecificationError(
-            f"parameters {i}: expected parameter {j} within the demonstrated range [{lowest[j]:.6g}, "
-            f"{highest[j]:.6g}], got {C[i, j]:.6g}, {beyond[i, j]:.3g} or {share:.3g} % of the range beyond it; "
-            "demonstrate it, or pass extrapolate=True"
-        )

@@ -59,7 +59,7 @@ class MovingGoal(FilteredValue):
         x'' = (K + coupling(u)) (g + D / K g') + scale f - K x - D x'  =  K (g - x) + D (g' - x') + ...,
 
     which is the moving target of J. Kober, K. Mulling, O. Kromer, C. H. Lampert, B. Scholkopf, J. Peters, "Movement
-    Templates for Learning of Hitting and Batting", ICRA 2010, Eq. (5), the paper's reference [3]: there too what draws
+    Templates for Learning of Hitting and Batting", ICRA 2010, the paper's reference [3]: there too what draws
     to the target is weighted by 1 - s, so that it begins without a jump, wherever the formulation does so with goals.
     Scale f belongs to where the goal will be at the end.
 

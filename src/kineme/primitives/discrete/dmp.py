@@ -292,7 +292,7 @@ class Primitives(Learned):
         -----
         Via points and end velocity change the weights by one linear solve, ``W += S A' (A S A')^-1 e``, so that the
         change of the path has the least mean square acceleration; after Y. Zhou, J. Gao, T. Asfour, "Learning
-        Via-Movement Primitives with Inter- and Extrapolation Capabilities", IROS 2019, Eq. (9) to (11).
+        Via-Movement Primitives with Inter- and Extrapolation Capabilities", IROS 2019.
         """
         from kineme.primitives.discrete.modulate import modulated
         from kineme.primitives.discrete.rollout import rollout

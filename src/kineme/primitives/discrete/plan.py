@@ -10,7 +10,7 @@ from kineme.primitives.control.plan import Plan
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.modulate import modulated
 from kineme.primitives.discrete.own_primitives import own_primitives
-from kineme.primitives.discrete.rollout import rollout
+from kineme.primitives.discrete.rollout import Rollout, rollout
 from kineme.primitives.discrete.via_points import ViaLike
 from kineme.validation import Array, check_number
 
@@ -31,7 +31,7 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
     check_one(len(primitive))
     if duration is not None:
         check_number("duration", duration, above=0.0)
-    d, dmp = primitive.n_dims, primitive.dmp
+    d = primitive.n_dims
     movement = rollout(
         primitive,
         one_vector("start", start, d),
@@ -39,10 +39,14 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
         duration,
         one_vector("velocity", velocity, d),
     )
-    if via is not None or end_velocity is not None or position_limits is not None:
-        movement = modulated(movement, via, one_vector("end_velocity", end_velocity, d), position_limits)
-        primitive = own_primitives(movement)
-        check_one(len(primitive))
+    return plan_along(modulated(movement, via, one_vector("end_velocity", end_velocity, d), position_limits))
+
+
+def plan_along(movement: Rollout) -> Plan:
+    """The plan of one generated movement."""
+    check_one(len(movement))
+    primitive = movement.primitives if movement.change is None else own_primitives(movement)
+    dmp, d = primitive.dmp, primitive.n_dims
     x0, tau = movement.starts[0].copy(), float(movement.durations[0])
     learned, extents = primitive.goals - primitive.starts, primitive.extents
 

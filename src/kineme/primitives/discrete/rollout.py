@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import DegenerateMovementError, SpecificationError
+from kineme.errors import DegenerateMovementError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.learned import Learned
@@ -115,13 +115,7 @@ class Rollout(BaseRollout):
         """
         from kineme.primitives.discrete.least_duration import least_durations
 
-        if self.fixed_velocity:
-            raise SpecificationError(
-                "expected a movement whose velocities scale with its tempo, got one with velocity=, end_velocity= or "
-                "goal_velocity= other than 0: its path depends on the duration; try durations, and look at velocities "
-                "and accelerations"
-            )
-        return least_durations(self.durations, (self.velocities, self.accelerations), (velocity, acceleration))
+        return least_durations(self, (self.velocities, self.accelerations), (velocity, acceleration))
 
     @property
     def _shares(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,8 @@ from kineme.validation import LARGEST, Array, as_numbers
 
 #: What users write: (time, point) or ((begin, end), points), times as shares of the duration.
 ViaLike = Sequence[tuple[float | tuple[float, float], ArrayLike]]
+
+Learned = Callable[[Array, Array], Array]
 
 _SAME_TIME = 1e-9  # durations
 _SAME_PLACE = 1e-9  # of the larger number
@@ -27,8 +29,17 @@ class ViaPoints(NamedTuple):
     stretch: NDArray[np.bool_]  # (k,): whether it belongs to a stretch, which is met in the least squares
 
 
-def via_points(via: ViaLike, n_dims: int) -> ViaPoints:
+def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None) -> ViaPoints:
     """Check what a user wrote; see `Primitives.rollout`.
+
+    Parameters
+    ----------
+    via : as in `Primitives.rollout`
+    n_dims : int
+        Of the points as they are written.
+    learned : callable, optional
+        ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are learned, if
+        these are others.
 
     Raises
     ------
@@ -47,12 +58,15 @@ def via_points(via: ViaLike, n_dims: int) -> ViaPoints:
         if len(points) not in (1, n):
             raise TrajectoryError(f"via[{i}]: expected points of one movement or of {n}, got {len(points)}")
     if not parts:
-        return ViaPoints(np.zeros(0), np.zeros((1, 0, n_dims)), np.zeros(0, bool))
+        none = np.zeros((1, 0, n_dims))
+        return ViaPoints(np.zeros(0), none if learned is None else learned(np.zeros(0), none), np.zeros(0, bool))
     times = np.concatenate([times for times, _, _ in parts])
     points = np.concatenate([np.broadcast_to(p, (n, *p.shape[1:])) for _, p, _ in parts], axis=1)
     stretch = np.repeat([one for _, _, one in parts], [len(times) for times, _, _ in parts])
     order = np.argsort(times, kind="stable")
-    return _merged(ViaPoints(times[order], points[:, order], stretch[order]))
+    written = ViaPoints(times[order], points[:, order], stretch[order])
+    points = written.points if learned is None else learned(written.times, written.points)
+    return _merged(written._replace(points=points), written.points)
 
 
 def _is_time(value: Any) -> bool:
@@ -98,8 +112,8 @@ def _times(i: int, when: Any, n_points: int) -> Array:
     return np.linspace(ends[0], ends[-1], n_points)
 
 
-def _merged(via: ViaPoints) -> ViaPoints:
-    """One point for each time; what contradicts itself is refused."""
+def _merged(via: ViaPoints, written: Array) -> ViaPoints:
+    """One point for each time; what contradicts itself is refused, as it was written."""
     same = np.diff(via.times) <= _SAME_TIME
     if not same.any():
         return via
@@ -111,10 +125,15 @@ def _merged(via: ViaPoints) -> ViaPoints:
             k = int(np.argmax(apart.any(axis=1)))
             raise SpecificationError(
                 f"expected one place at {via.times[j]:g} of the duration, got two via points there: "
-                f"{one[k].tolist()} and {other[k].tolist()}{f' for movement {k}' if len(points) > 1 else ''}"
+                f"{_shown(written, k, int(j))} and {_shown(written, k, int(j) + 1)}"
+                f"{f' for movement {k}' if len(points) > 1 else ''}"
             )
         points[:, j + 1] = np.where(np.isnan(other), one, other)
     kept = np.append(~same, True)
     stretch = via.stretch.copy()
     stretch[1:] &= ~same | stretch[:-1]  # a point on a stretch is met exactly
     return ViaPoints(via.times[kept], points[:, kept], stretch[kept])
+
+
+def _shown(written: Array, movement: int, point: int) -> list[float]:
+    return list(written[min(movement, len(written) - 1), point].tolist())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,12 @@ from kineme.errors import SpecificationError
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.rollout import Rollout
+from kineme.primitives.improvement.costs import checked_costs
 from kineme.primitives.improvement.exploration import exploration_factor
 from kineme.primitives.improvement.methods import METHODS, Search
+from kineme.primitives.improvement.variants import largest_deviation, variants
 from kineme.primitives.styles.parameters import check_primitives
-from kineme.validation import Array, as_numbers, check_choice, check_count, check_number, check_seed, check_switch
+from kineme.validation import Array, check_choice, check_count, check_number, check_seed, check_switch
 
 _FEWEST_BASIS = 4
 _MOST = 100_000  # rollouts, and updates
@@ -135,7 +137,7 @@ def improve(  # noqa: PLR0913 - one parameter per option
         check_seed("seed", seed)
     unit = exploration_factor(primitive.dmp)
     factor = unit * primitive.extents.max() * exploration
-    paths = unit @ decoder(primitive.dmp, primitive.dmp.n_points).Phi[0].T
+    responses = unit @ decoder(primitive.dmp, primitive.dmp.n_points).Phi[0].T
     rng = np.random.default_rng(seed)
     search = Search.start(primitive.n_dims * len(factor))
     tried: list[Array] = []
@@ -145,9 +147,9 @@ def improve(  # noqa: PLR0913 - one parameter per option
         for update in range(updates):
             drawn = search.draw(rollouts, rng)
             moved = variants(primitive, factor, drawn).rollout(start, goal, duration, n_samples=n_samples)
-            costs = _checked_costs(cost(moved), rollouts, update)
+            costs = checked_costs(cost(moved), rollouts, update)
             tried.append(costs)
-            sizes.append(exploration * _largest_deviation(search, paths))
+            sizes.append(exploration * largest_deviation(search, responses))
             best = min(best, (float(costs.min()), drawn[costs.argmin()]), key=lambda pair: pair[0])
             bar.update()
             if target is not None and best[0] <= target:
@@ -158,38 +160,6 @@ def improve(  # noqa: PLR0913 - one parameter per option
                 break
             search = METHODS[method](search, drawn, costs)
     return Improvement(variants(primitive, factor, best[1][None]), np.array(tried), np.array(sizes), stopped)
-
-
-def variants(primitive: Primitives, factor: Array, z: Array) -> Primitives:
-    """A primitive with its weights changed by z (n, d r) times the factor (r, N) of one dimension."""
-    n, d = len(z), primitive.n_dims
-    changes = (z.reshape(n * d, -1) @ factor).reshape(n, d, -1)
-    repeated = primitive[np.zeros(n, dtype=int)]
-    return replace(repeated, scaled_weights=repeated.scaled_weights + changes)
-
-
-def _largest_deviation(search: Search, paths: Array) -> float:
-    """Standard deviation of the paths where it is largest, over dimensions and time; 1 at the start."""
-    r = len(paths)
-    blocks = search.covariance.reshape(-1, r, search.covariance.shape[0] // r, r)
-    variances = [np.einsum("ru,rs,su->u", paths, blocks[k, :, k], paths).max() for k in range(len(blocks))]
-    return float(search.size * np.sqrt(max(variances)))
-
-
-def _checked_costs(costs: ArrayLike, n: int, update: int) -> Array:
-    found = as_numbers(costs, "cost", f"{n} numbers, the cost of each movement")
-    if found.shape != (n,):
-        raise SpecificationError(
-            f"expected the cost to return {n} numbers, one for each movement of the rollout, got shape {found.shape}; "
-            "reduce over samples and dimensions, axis=(1, 2)"
-        )
-    if not np.isfinite(found).all():
-        i = int(np.argmin(np.isfinite(found)))
-        raise SpecificationError(
-            f"expected finite costs, got {found[i]:g} for movement {i} of update {update}; "
-            "give a movement that fails a large cost"
-        )
-    return found.copy()
 
 
 def _check_options(  # noqa: PLR0913, PLR0917 - the options of improve, in its order

@@ -44,8 +44,8 @@ def path_integral(search: Search, variants: Array, costs: Array) -> Search:
     """PI^BB: the mean of the variants, weighted by ``exp(-h (J - min J) / (max J - min J))``, h = 10.
 
     F. Stulp and O. Sigaud, "Policy Improvement Methods: Between Black-Box Optimization and Episodic Reinforcement
-    Learning", 2012, Section 3: path integrals with one change for a whole rollout. The exploration shrinks by 5 % an
-    update and keeps its shape.
+    Learning", 2012: path integrals with one change for a whole rollout. The exploration shrinks by 5 % an update and
+    keeps its shape.
     """
     relative = (costs - costs.min()) / max(np.ptp(costs), np.finfo(float).tiny)
     weights = np.exp(-_SHARPNESS * relative)

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme.primitives.discrete.changes import changes
 from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.discrete.modulate import changes
 from kineme.primitives.discrete.operators import decoder_at, smoothness_factor
 from kineme.primitives.discrete.per_movement import per_movement
 from kineme.primitives.discrete.rollout import Rollout
@@ -61,8 +61,8 @@ def couple(
     Raises
     ------
     TrajectoryError
-        Something else than primitives and rollouts, different dimensions or numbers of movements, an offset of the
-        wrong shape.
+        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions; an offset of the wrong shape.
     SpecificationError
         A stretch that is not within the movement; too few basis functions to keep goals and velocities.
 

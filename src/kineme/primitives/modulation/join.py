@@ -62,7 +62,8 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     Raises
     ------
     TrajectoryError
-        No part, something else than primitives and rollouts, different dimensions or numbers of movements.
+        No part, something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions.
     SpecificationError
         An overlap that is negative or longer than half a part; more than 2,000 basis functions.
     """
@@ -117,7 +118,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     Raises
     ------
     TrajectoryError
-        Something else than primitives and rollouts, different dimensions or numbers of movements.
+        Something else than primitives and rollouts, different dimensions or numbers of movements; channels
+        that are known to differ, as joint angles and positions.
     SpecificationError
         A stretch that is not within the movement.
     """

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.alike import check_alike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.rollout import Rollout
 
@@ -25,6 +26,7 @@ def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
             raise TrajectoryError(f"part {i}: expected {moving[0].n_dims} dimensions as in part 0, got {one.n_dims}")
         if len(one) not in (1, n):
             raise TrajectoryError(f"part {i}: expected one movement or {n}, got {len(one)}")
+    check_alike([one.moving_channels for one in moving])
     return [one if len(one) == n else one[np.zeros(n, dtype=np.intp)] for one in moving]
 
 

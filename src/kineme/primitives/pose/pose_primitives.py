@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import TrajectoryError
+from kineme.movements.channels.channel import Channels
 from kineme.movements.rotations.quaternions import conjugate, normalized, product
 from kineme.movements.rotations.rotation_vectors import exp, log, nearest
 from kineme.movements.trajectories.movements import Names
@@ -16,14 +16,18 @@ from kineme.primitives.batch import Batch
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options, check_one
 from kineme.primitives.discrete.dmp import DMP, Primitives
-from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
-from kineme.primitives.discrete.plan import plan_of
+from kineme.primitives.discrete.modulate import modulated
+from kineme.primitives.discrete.per_movement import broadcast_length
+from kineme.primitives.discrete.plan import plan_along
+from kineme.primitives.discrete.rollout import Rollout, rollout
+from kineme.primitives.discrete.samples import sampled
+from kineme.primitives.discrete.via_points import ViaLike
 from kineme.primitives.persistence import Arrays, check_array
+from kineme.primitives.pose.in_tangent import changes_in_tangent, checked_poses, rates_in_tangent
 from kineme.primitives.pose.pose_controller import PoseController
 from kineme.primitives.pose.pose_rollout import PoseRollout
-from kineme.primitives.pose.rates import rotation_vector_rate
 from kineme.primitives.recorded_as import RecordedAs
-from kineme.validation import Array
+from kineme.validation import Array, check_number
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +87,11 @@ class PosePrimitives(Batch):
         return loaded
 
     @property
+    def moving_channels(self) -> Channels | None:
+        """Those `channels` that are learned, in the order of the columns: the orientations last."""
+        return None if self.recorded_as is None else (*self.recorded_as.plain, *self.recorded_as.orientations)
+
+    @property
     def to_recording(self) -> RecordedAs | None:
         """`recorded_as`, if the movements can be written in the columns of the recording; else None."""
         return self.recorded_as if self.recorded_as is not None and self.recorded_as.has_steps else None
@@ -139,7 +148,10 @@ class PosePrimitives(Batch):
         duration: ArrayLike | None = None,
         *,
         velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
         end_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
         settle: float | None = None,
@@ -157,8 +169,15 @@ class PosePrimitives(Batch):
         velocity : array_like of shape (d - 1,) or (n, d - 1), optional
             Initial angular velocity in the world frame [rad/s], for poses after the linear velocity. By default
             the demonstrated rates of the position and the rotation vector, in proportion to the tempo.
+        via : sequence of (time, point) or ((begin, end), points), optional
+            Where to pass, and when; see `Primitives.rollout`. Points are orientations (d = 4) or poses (d = 7): NaN
+            leaves a position free, NaN in all four numbers an orientation. Each is met the way round that is nearest.
         end_velocity : array_like of shape (d - 1,) or (n, d - 1), optional
-            The same at the goal, at the end of the duration; the goal is then met exactly.
+            As `velocity`, at the goal, at the end of the duration; the goal is then met exactly.
+        goal_velocity : array_like of shape (d - 1,) or (n, d - 1), optional
+            Velocity of the goal, as `velocity`: it is at `goal` at the start, and goes and turns on at that rate.
+        position_limits : (low, high), optional
+            Where the positions stay, each a number or one for each position; see `Primitives.rollout`.
         settle : float, optional
             Go on past the duration until every position and every component of the rotation vector [rad] stays within
             this distance of the goal.
@@ -166,23 +185,42 @@ class PosePrimitives(Batch):
         Raises
         ------
         TrajectoryError
-            A start, goal or velocity of the wrong shape, a quaternion not of norm 1, numbers that do not go together.
+            A start, goal, velocity or via point of the wrong shape, a quaternion not of norm 1, numbers that do not go
+            together.
+        SpecificationError
+            As of `Primitives.rollout`; limits of orientations alone.
         DegenerateMovementError
             The original formulation asked to turn about an axis that the demonstration does not turn about.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            As `Primitives.rollout`, in positions or in radians.
+
+        Notes
+        -----
+        All happens in positions and rotation vectors from the goal, where via points and velocities are linear. At the
+        goal the rotation vector is 0, and its rate the angular velocity.
         """
-        tangent_start, tangent_goal, references, tangent_velocity = self.in_tangent(start, goal, velocity)
-        movement = self.tangent.rollout(
-            tangent_start,
-            tangent_goal,
-            duration,
-            velocity=tangent_velocity,
-            end_velocity=end_velocity,  # at the goal the rotation vector is 0, and its rate the angular velocity
-            rate=rate,
-            n_samples=n_samples,
-            settle=settle,
-        )
+        movement, references = self._asked_for(start, goal, duration, velocity, goal_velocity)
+        movement = modulated(movement, *changes_in_tangent(movement, references, via, end_velocity, position_limits))
+        movement = sampled(movement, rate, n_samples, settle)
         references = np.broadcast_to(references, (len(movement), references.shape[1]))
         return PoseRollout(movement, references, self.recorded_as)
+
+    @classmethod
+    def from_rollout(cls, movement: PoseRollout) -> PosePrimitives:
+        """The movements of a rollout as primitives of their own; see `Primitives.from_rollout`.
+
+        Raises
+        ------
+        SpecificationError
+            A rollout with a goal that moves, which a primitive has not.
+        """
+        about, n = movement.recorded_as, len(movement)
+        if about is not None and len(movement.tangent.primitives) < n:
+            about = about.take(np.zeros(n, dtype=np.intp))
+        return cls(Primitives.from_rollout(movement.tangent), movement.references.copy(), about)
 
     def controller(  # noqa: PLR0913 - an option per parameter
         self,
@@ -192,6 +230,9 @@ class PosePrimitives(Batch):
         goal: ArrayLike | None = None,
         duration: float | None = None,
         velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
+        end_velocity: ArrayLike | None = None,
+        position_limits: tuple[ArrayLike, ArrayLike] | None = None,
         feedback: str = "state",
         phase_stopping: float | None = None,
         goal_filter: float | None = None,
@@ -206,8 +247,8 @@ class PosePrimitives(Batch):
         ----------
         dt : float
             Time of a step [s], at most the duration.
-        start, goal, duration, velocity : optional
-            As in `rollout`, for one movement.
+        start, goal, duration, velocity, via, end_velocity, position_limits : optional
+            As in `rollout`, for one movement. Past the duration the goal attracts again, at rest.
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle : optional
             What to do with measurements, new goals, limits and obstacles; see `kineme.control.Options`. Limits hold for
             linear and angular velocities and accelerations, as the state reports them; obstacles are points (m, 3) that
@@ -223,10 +264,12 @@ class PosePrimitives(Batch):
         SpecificationError, TrajectoryError
             More than one primitive; an option out of its range; a start or goal that is no pose.
         """
-        starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
-        check_one(len(starts))
-        v = None if velocities is None else velocities[0]
-        plan = replace(plan_of(self.tangent, starts[0], goals[0], duration, v), n_positions=self.n_positions)
+        if duration is not None:
+            check_number("duration", duration, above=0.0)
+        movement, references = self._asked_for(start, goal, duration, velocity)
+        check_one(len(movement))
+        movement = modulated(movement, *changes_in_tangent(movement, references, via, end_velocity, position_limits))
+        plan = replace(plan_along(movement), n_positions=self.n_positions)
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return PoseController(plan, dt, options, references[0])
 
@@ -235,11 +278,25 @@ class PosePrimitives(Batch):
     ) -> tuple[Array, Array, Array, Array | None]:
         """Start, goal, reference orientations and initial velocity of the movements that these options make."""
         starts, goals, references = self._endpoints(start, goal)
-        return starts, goals, references, self._tangent_velocity(velocity, starts)
+        return starts, goals, references, rates_in_tangent(velocity, starts, self.n_positions, "velocity")
+
+    def _asked_for(
+        self,
+        start: ArrayLike | None,
+        goal: ArrayLike | None,
+        duration: ArrayLike | None,
+        velocity: ArrayLike | None,
+        goal_velocity: ArrayLike | None = None,
+    ) -> tuple[Rollout, Array]:
+        """The movements in positions and rotation vectors, and the orientations (1 or n, 4 k) that these refer to."""
+        starts, goals, references, velocities = self.in_tangent(start, goal, velocity)
+        return rollout(self.tangent, starts, goals, duration, velocities, goal_velocity), references
 
     def _endpoints(self, start: ArrayLike | None, goal: ArrayLike | None) -> tuple[Array, Array, Array]:
         """Start and goal in positions and rotation vectors, and the orientations that the latter refer to."""
-        starts, goals = self._as_poses(start, "start"), self._as_poses(goal, "goal")
+        starts, goals = (
+            checked_poses(*one, self.n_positions, self.n_columns) for one in ((start, "start"), (goal, "goal"))
+        )
         starts, goals = self.starts if starts is None else starts, self.goals if goals is None else goals
         n = broadcast_length(len(self), {"start": starts, "goal": goals})
         m, k = self.n_positions, self.n_orientations
@@ -254,26 +311,6 @@ class PosePrimitives(Batch):
 
         flat = vectors.reshape(len(vectors), 3 * k)
         return joined(starts[:, :m], flat), joined(goals[:, :m], np.zeros((1, 3 * k))), goals[:, m:]
-
-    def _tangent_velocity(self, velocity: ArrayLike | None, starts: Array) -> Array | None:
-        option = per_movement(velocity, "velocity", self.tangent.n_dims)
-        if option is None:
-            return None
-        n, m = broadcast_length(len(starts), {"velocity": option}), self.n_positions
-        vectors, turning = (columns[:, m:].reshape(len(columns), -1, 3) for columns in (starts, option))
-        rates = rotation_vector_rate(vectors, turning).reshape(n, -1)
-        return np.concatenate((np.broadcast_to(option[:, :m], (n, m)), rates), axis=1)
-
-    def _as_poses(self, option: ArrayLike | None, name: str) -> Array | None:
-        poses = per_movement(option, name, self.n_columns)
-        if poses is None:
-            return None
-        try:
-            m = self.n_positions
-            turned = [normalized(poses[:, at : at + 4]) for at in range(m, self.n_columns, 4)]
-            return np.concatenate((poses[:, :m], *turned), axis=1)
-        except TrajectoryError as error:
-            raise TrajectoryError(f"{name}: {error}") from error
 
     def _poses(self, tangent: Array) -> Array:
         m = self.n_positions

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.rotations.quaternions import product
 from kineme.movements.rotations.rotation_vectors import exp
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
+from kineme.primitives.discrete.least_duration import least_durations
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.pose.rates import angular_acceleration, angular_velocity
 from kineme.primitives.recorded_as import RecordedAs
@@ -89,6 +90,21 @@ class PoseRollout(BaseRollout):
         """Angular accelerations (n, T, 3), for poses after the linear ones (n, T, 6), in the world frame."""
         linear = self.tangent.accelerations[..., : self._n_positions]
         return np.concatenate((linear, self.angular_accelerations), axis=-1)
+
+    def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
+        """The least duration of each movement (n,) [s] within limits; see `Rollout.least_duration`.
+
+        Parameters
+        ----------
+        velocity, acceleration : float or array_like of shape (d,), optional
+            Largest absolute value, in the columns of `velocities`: angular ones after the linear ones.
+
+        Raises
+        ------
+        SpecificationError
+            As of `Rollout.least_duration`.
+        """
+        return least_durations(self.tangent, (self.velocities, self.accelerations), (velocity, acceleration))
 
     @property
     def axis_names(self) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.channels.alike import check_alike
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.modulate import modulated
@@ -137,7 +138,7 @@ class AveragePrimitive:
     ) -> AveragePrimitive:
         """The average of those movements that are at a position, or have a velocity, at some times.
 
-        The Gaussian is updated as Paraschos et al. (2013, Eq. 5 and 6) do, exactly and in its low-rank factor: what was
+        The Gaussian is updated as Paraschos et al. (2013, Section 2.2) do, exactly and in its low-rank factor: what was
         demonstrated together changes together, the duration too. Conditioning on positions one after another, in any
         order, is conditioning on all at once. In an exact velocity the duration counts, and so does the order.
 
@@ -218,7 +219,7 @@ class AveragePrimitive:
     def blend(self, other: AveragePrimitive, activation: ArrayLike) -> AveragePrimitive:
         """One movement from two, each as much as it is active: the product of their Gaussians at each time.
 
-        ``p(x) ~ p_1(x)^(1 - a) p_2(x)^a`` (Paraschos et al. 2013, Section 2.3): where one is certain and the other is
+        ``p(x) ~ p_1(x)^(1 - a) p_2(x)^a`` (Paraschos et al. 2013, Section 2.2): where one is certain and the other is
         not, the path is that of the certain one. The logarithm of the duration is averaged by the mean activation.
 
         Parameters
@@ -257,6 +258,7 @@ class AveragePrimitive:
             raise SpecificationError(f"expected primitives of the same specification, {own.dmp}, got {primitives.dmp}")
         if primitives.n_dims != own.n_dims:
             raise SpecificationError(f"expected movements of {own.n_dims} dimensions, got {primitives.n_dims}")
+        check_alike([own.moving_channels, primitives.moving_channels], "movement")
         return primitives
 
 

@@ -1,6 +1,6 @@
 """Two averages blended into one: at each time the product of their Gaussians, each to the power of its activation.
 
-A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013, Section 2.3: with the
+A. Paraschos, C. Daniel, J. Peters and G. Neumann, "Probabilistic Movement Primitives", NIPS 2013, Section 2.2: with the
 activations a and b of two primitives at a time and their means and covariances of the position there,
 
     Sigma = (a Sigma_1^-1 + b Sigma_2^-1)^-1,    mean = Sigma (a Sigma_1^-1 mean_1 + b Sigma_2^-1 mean_2).

@@ -2,7 +2,7 @@
 
 Theta and ln tau together have the covariance ``F' F``, with F the factors of the average side by side. A position is a
 linear function of theta, so conditioning on it is exact (A. Paraschos, C. Daniel, J. Peters and G. Neumann,
-"Probabilistic Movement Primitives", NIPS 2013, Eq. (5) and (6)):
+"Probabilistic Movement Primitives", NIPS 2013, Section 2.2):
 
     mean += Sigma A' (A Sigma A' + diag(s^2))^-1 e,    Sigma -= Sigma A' (A Sigma A' + diag(s^2))^-1 A Sigma.
 

@@ -19,7 +19,7 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.metrics import METRICS, compared
 from kineme.primitives.styles.model import StyleModel
-from kineme.primitives.styles.parameters import check_primitives, shared_label, to_numbers
+from kineme.primitives.styles.parameters import check_primitives, shared_label, shared_recording, to_numbers
 from kineme.validation import Array, check_choice, check_count, check_number
 
 
@@ -79,6 +79,7 @@ def learn_styles(
         tempo_basis=styles.T @ (tempo - tempo.mean()) / n,
         directions=sign * Vt[:J] * S[:J, None] / np.sqrt(n),
         label=shared_label(primitives),
+        recorded_as=shared_recording(primitives),
     )
 
 

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import SpecificationError
+from kineme.movements.channels.alike import check_alike
+from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import DMP, Primitives
+from kineme.primitives.recorded_as import RecordedAs
 from kineme.primitives.styles.metrics import compared
 from kineme.primitives.styles.parameters import from_numbers, to_numbers
 from kineme.validation import Array, as_numbers, check_count
@@ -39,6 +42,8 @@ class StyleModel:
         Of the demonstrations; each column has mean 0 and mean square 1.
     singular_values : ndarray of shape (min(n, d T),)
         Of all styles that could be told apart, not of the J kept ones only.
+    recorded_as : RecordedAs or None
+        Channels of the recordings, where they are known; see `channels`.
     """
 
     dmp: DMP
@@ -51,6 +56,12 @@ class StyleModel:
     tempo_basis: Array  # (J,), change of ln tau
     directions: Array  # (J, d T), change of what the metric compares
     label: Any = None
+    recorded_as: RecordedAs | None = None
+
+    @property
+    def channels(self) -> Channels | None:
+        """What was recorded, where that is known; see `Demonstrations.channels`."""
+        return None if self.recorded_as is None else self.recorded_as.channels
 
     @property
     def n_styles(self) -> int:
@@ -98,7 +109,8 @@ class StyleModel:
                 "such a movement, or pass extrapolate=True"
             )
         theta = self.mean + np.tensordot(s, self.basis, axes=1)
-        return from_numbers(self.dmp, theta, self.duration * np.exp(s @ self.tempo_basis), self.label)
+        durations = self.duration * np.exp(s @ self.tempo_basis)
+        return from_numbers(self.dmp, theta, durations, self.label, self.recorded_as)
 
     def interpolate(self, style_a: ArrayLike, style_b: ArrayLike, n: int, extrapolate: bool = False) -> Primitives:
         """`n` primitives at even steps from one style to another, both included; errors as in `primitive`."""
@@ -134,6 +146,8 @@ class StyleModel:
             )
         if primitives.n_dims != len(self.mean):
             raise SpecificationError(f"expected movements of {len(self.mean)} dimensions, got {primitives.n_dims}")
+        ours = None if self.recorded_as is None else self.recorded_as.moving
+        check_alike([ours, primitives.moving_channels], "movement")
         rest = compared(self.metric, self.dmp, to_numbers(primitives) - self.mean)
         styles = rest @ (self.directions / np.sum(self.directions**2, axis=1, keepdims=True)).T  # they are orthogonal
         residuals = np.linalg.norm(rest - styles @ self.directions, axis=1)

@@ -40,7 +40,8 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
     for t, (q, v, a) in enumerate(samples):
         pinocchio.computeJointJacobians(model, data, q)
         pinocchio.updateFramePlacement(model, data, tip)
-        jacobians[t] = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobian = pinocchio.getFrameJacobian(model, data, tip, pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        jacobians[t] = jacobian.reshape(6, n)  # of a single joint it has one axis
         positions[t], rotations[t] = data.oMf[tip].translation, data.oMf[tip].rotation
         holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
         whole[t] = pinocchio.rnea(model, data, q, v, a)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from kineme.robots.models.robot import Robot
+
 
 class Check(NamedTuple):
     """The worst instant of one quantity beside its limit."""
@@ -48,3 +50,8 @@ class Preflight:
     def slower(self) -> float:
         """The least factor of the duration with which all pass; inf if no speed helps."""
         return max((check.slower for check in self.checks if not check.passed), default=1.0)
+
+
+def unit_of(robot: Robot, joint: int, order: int = 0) -> str:
+    """Unit of the position of a joint, of its velocity (order 1) or its acceleration (order 2)."""
+    return robot.units[joint] + ("", "/s", "/s^2")[order]

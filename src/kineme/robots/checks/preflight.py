@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
+from kineme.errors import TrajectoryError
 from kineme.robots.checks.along import Along, along
-from kineme.robots.checks.check import Check, Preflight
+from kineme.robots.checks.between_samples import between_samples
+from kineme.robots.checks.check import Check, Preflight, unit_of
 from kineme.robots.checks.torques import knows_masses
+from kineme.robots.checks.tracking import tracking
+from kineme.robots.execution.between import between, dense_times
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.execution.timing import STANDS
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
-TRACKED = 1e-3  # the tip may be this far from the path [m]
 _SINGULAR = 0.02  # the smallest singular value of the Jacobian below which an arm is said to be singular
 _JUMP = 0.05  # a joint may deviate so far between two samples from what its velocities say [rad, m]
 _SLACK = 1 + 1e-6
 
 
 def preflight(
-    robot: Robot, trajectory: JointTrajectory, path: TaskPath | None = None, begins: float = 0.0
+    robot: Robot, trajectory: JointTrajectory, path: TaskPath | None = None, follow: str = "full"
 ) -> Preflight:
     """Every check of a trajectory.
 
@@ -32,57 +35,65 @@ def preflight(
     robot : Robot
     trajectory : JointTrajectory
     path : TaskPath, optional
-        What the tip was asked to follow; the tracking error is that at its samples.
-    begins : float, default 0
-        When the path begins in the trajectory [s]; before it lies the approach.
+        What the tip was asked to follow, at times of the trajectory; before its first one lies the approach.
+    follow : {"full", "axis", "free"}, default "full"
+        How much of the orientation was to be followed; see `InverseKinematics`.
 
     Returns
     -------
     Preflight
-        Limits of position, velocity, acceleration and torque for each joint; jumps, standing at both ends, tracking,
-        singularity and self-collision for the arm.
+        Limits of position, velocity, acceleration and torque for each joint; the same between samples, where a
+        controller interpolates; jumps, standing at both ends, tracking, singularity and self-collision for the arm.
+
+    Raises
+    ------
+    TrajectoryError
+        A trajectory of other joints, of numbers that are not finite, or whose times do not increase.
     """
-    state = along(robot, trajectory)
-    checks = [check for limit in _OF_JOINTS for check in limit(robot, trajectory, state)]
-    checks += [check(robot, trajectory, state) for check in _OF_THE_ARM]
+    _check_numbers(robot, trajectory)
+    times = dense_times(robot, trajectory)
+    dense = trajectory if len(times) == len(trajectory) else between(trajectory, times)
+    state = along(robot, dense)
+    checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
+    checks += between_samples(robot, trajectory)
+    checks += [_jumps(robot, trajectory), _stands(robot, trajectory)]
+    checks += [_singularity(dense, state), _collision(dense, state)]
     if path is not None:
-        checks += _tracking(robot, trajectory, state, path, begins)
+        checks += tracking(robot, trajectory, path, follow, (times, state))
     return Preflight(tuple(checks), tuple(_unchecked(robot)))
 
 
-def _positions(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
+def _check_numbers(robot: Robot, trajectory: JointTrajectory) -> None:
+    shape = (max(2, len(trajectory)), robot.n_joints)
+    arrays = {name: getattr(trajectory, name) for name in ("positions", "velocities", "accelerations")}
+    for name, values in arrays.items():
+        if values.shape != shape:
+            raise TrajectoryError(f"expected {name} of shape {shape}, samples and joints, got {values.shape}")
+    finite = all(np.isfinite(values).all() for values in (trajectory.times, *arrays.values()))
+    if not finite or not np.all(np.diff(trajectory.times) > 0):
+        raise TrajectoryError("expected a trajectory of finite numbers, whose times increase")
+
+
+def _positions(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
     beyond = np.maximum(trajectory.positions - robot.upper, robot.lower - trajectory.positions)
     for j, name in enumerate(robot.joints):
         t = int(np.argmax(beyond[:, j]))
         worst = float(trajectory.positions[t, j])
         limit = robot.upper[j] if worst > (robot.upper[j] + robot.lower[j]) / 2 else robot.lower[j]
-        passed = bool(beyond[t, j] <= 1e-6)
-        yield Check(
-            "position", name, _at(trajectory, t), worst, float(limit), "rad", passed, 1.0 if passed else math.inf
-        )
+        passed, unit = bool(beyond[t, j] <= 1e-6), unit_of(robot, j)
+        slower = 1.0 if passed else math.inf
+        yield Check("position", name, _at(trajectory, t), worst, float(limit), unit, passed, slower)
 
 
-def _rates(what: str, order: int) -> Callable[[Robot, JointTrajectory, Along], Iterator[Check]]:
-    unit = f"rad/s{'^2' if order == 2 else ''}"
-
-    def check(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
-        values = np.abs(trajectory.velocities if order == 1 else trajectory.accelerations)
-        limits = robot.velocity if order == 1 else robot.acceleration
+def _rates(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
+    velocities = ("velocity", trajectory.velocities, robot.velocity)
+    accelerations = ("acceleration", trajectory.accelerations, robot.acceleration)
+    for order, (what, values, limits) in enumerate((velocities, accelerations), 1):
         for j, name in enumerate(robot.joints):
-            t = int(np.argmax(values[:, j]))
-            worst, limit = float(values[t, j]), float(limits[j])
-            yield Check(
-                what,
-                name,
-                _at(trajectory, t),
-                worst,
-                limit,
-                unit,
-                worst <= limit * _SLACK,
-                (worst / limit) ** (1 / order),
-            )
-
-    return check
+            t = int(np.argmax(np.abs(values[:, j])))
+            worst, limit = abs(float(values[t, j])), float(limits[j])
+            passed, slower = worst <= limit * _SLACK, (worst / limit) ** (1 / order)
+            yield Check(what, name, _at(trajectory, t), worst, limit, unit_of(robot, j, order), passed, slower)
 
 
 def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
@@ -100,7 +111,7 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
             _at(trajectory, t),
             float(total[t]),
             limit,
-            "Nm",
+            "N" if robot.units[j] == "m" else "Nm",
             passed,
             1.0 if passed else _slower_for(holding, moving, limit),
         )
@@ -113,83 +124,39 @@ def _slower_for(holding: Array, moving: Array, limit: float) -> float:
     return float(np.sqrt(np.max(np.abs(moving) / room)))
 
 
-def _jumps(robot: Robot, trajectory: JointTrajectory, state: Along) -> Check:
+def _jumps(robot: Robot, trajectory: JointTrajectory) -> Check:
     gaps = np.diff(trajectory.times)[:, None]
     expected = (trajectory.velocities[1:] + trajectory.velocities[:-1]) / 2 * gaps
     off = np.abs(np.diff(trajectory.positions, axis=0) - expected)
     t, j = np.unravel_index(int(np.argmax(off)), off.shape)
-    worst = float(off[t, j])
-    return Check(
-        "jump",
-        robot.joints[j],
-        _at(trajectory, int(t)),
-        worst,
-        _JUMP,
-        "rad",
-        worst <= _JUMP,
-        1.0 if worst <= _JUMP else math.inf,
-    )
+    worst, unit = float(off[t, j]), unit_of(robot, int(j))
+    slower = max(1.0, math.sqrt(worst / _JUMP))
+    return Check("jump", robot.joints[j], _at(trajectory, int(t)), worst, _JUMP, unit, worst <= _JUMP, slower)
 
 
-def _stands(robot: Robot, trajectory: JointTrajectory, state: Along) -> Check:
+def _stands(robot: Robot, trajectory: JointTrajectory) -> Check:
     shares = np.abs(trajectory.velocities[[0, -1]]) / robot.velocity
     end, j = np.unravel_index(int(np.argmax(shares)), shares.shape)
-    worst = float(shares[end, j])
+    worst, unit = float(shares[end, j]), "of the velocity limit"
+    passed = worst <= STANDS
+    slower = 1.0 if passed else math.inf
     return Check(
-        "standing at the ends",
-        robot.joints[j],
-        _at(trajectory, -int(end)),
-        worst,
-        STANDS,
-        "of the velocity limit",
-        worst <= STANDS,
-        worst / STANDS,
+        "standing at the ends", robot.joints[j], _at(trajectory, -int(end)), worst, STANDS, unit, passed, slower
     )
 
 
-def _singularity(robot: Robot, trajectory: JointTrajectory, state: Along) -> Check:
+def _singularity(trajectory: JointTrajectory, state: Along) -> Check:
     t = int(np.argmin(state.smallest_singular_values))
     worst = float(state.smallest_singular_values[t])
     return Check("singularity", "tip", _at(trajectory, t), worst, math.nan, f"(singular below {_SINGULAR:g})", True)
 
 
-def _collision(robot: Robot, trajectory: JointTrajectory, state: Along) -> Check:
+def _collision(trajectory: JointTrajectory, state: Along) -> Check:
     if not state.contacts:
         return Check("self-collision", "none", 0.0, 0, 0, "contacts", True)
     t, first, second = min(state.contacts)
-    return Check(
-        "self-collision",
-        f"{first} and {second}",
-        _at(trajectory, t),
-        len(state.contacts),
-        0,
-        "contacts",
-        False,
-        math.inf,
-    )
-
-
-def _tracking(robot: Robot, trajectory: JointTrajectory, state: Along, path: TaskPath, begins: float) -> list[Check]:
-    first = int(np.searchsorted(trajectory.times, begins - 1e-9))
-    off = np.linalg.norm(state.tip_positions[first:] - path.positions, axis=1)
-    relative = np.einsum("tji,tjk->tik", state.tip_rotations[first:], path.rotations)
-    cosine = np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1)
-    turned = np.degrees(np.arccos(cosine))
-    t, r = int(np.argmax(off)), int(np.argmax(turned))
-    worst = float(off[t])
-    return [
-        Check(
-            "tracking",
-            "tip",
-            _at(trajectory, first + t),
-            1e3 * worst,
-            1e3 * TRACKED,
-            "mm",
-            worst <= TRACKED,
-            1.0 if worst <= TRACKED else math.inf,
-        ),
-        Check("turned away", "tip", _at(trajectory, first + r), float(turned[r]), math.nan, "deg", True),
-    ]
+    n, links = len(state.contacts), f"{first} and {second}"
+    return Check("self-collision", links, _at(trajectory, t), n, 0, "contacts", False, math.inf)
 
 
 def _unchecked(robot: Robot) -> Iterator[str]:
@@ -204,7 +171,3 @@ def _unchecked(robot: Robot) -> Iterator[str]:
 
 def _at(trajectory: JointTrajectory, t: int) -> float:
     return float(trajectory.times[t])
-
-
-_OF_JOINTS = (_positions, _rates("velocity", 1), _rates("acceleration", 2), _torques)
-_OF_THE_ARM = (_jumps, _stands, _singularity, _collision)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from kineme.errors import DataError, TrajectoryError
-from kineme.robots.execution.timing import Timing
+from kineme.robots.execution.timing import Timing, n_samples
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
@@ -50,7 +50,7 @@ def fastest(robot: Robot, path: CubicSpline, rate: float) -> tuple[CubicSpline, 
         raise TrajectoryError(f"{robot.name}: no timing of this path keeps its limits; look at the path for jumps")
     ends = np.concatenate(([0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))))
     accelerations = np.diff(speeds**2) / (2 * np.diff(grid))
-    times = np.linspace(0.0, ends[-1], max(4, round(ends[-1] * rate) + 1))
+    times = np.linspace(0.0, ends[-1], n_samples(float(ends[-1]), rate))
     k = np.clip(np.searchsorted(ends, times, "right") - 1, 0, _GRID - 1)
     since = times - ends[k]
     place = np.clip(grid[k] + speeds[k] * since + accelerations[k] * since**2 / 2, 0.0, grid[-1])

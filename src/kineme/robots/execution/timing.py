@@ -7,14 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from kineme.errors import SpecificationError
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
-STANDS = 0.02  # of the limit of velocity: what counts as standing
-_SHORTEST_RAMP = 0.1  # [s]
+STANDS = 1e-8  # of the limit of velocity: what counts as standing, also for controllers of ROS
+_GENTLE = 0.02, 0.1  # from such a share of the limit of velocity on a ramp takes so long at least [s]
 _SHARE = 0.5  # of the limit of acceleration that a ramp may take
 _PEAK = 1.5  # of the slope of the ramp, over its mean
+LONGEST = 1_000_000  # samples of one trajectory, at most
+_LEAST = 4  # samples
 
 
 class Timing(NamedTuple):
@@ -27,17 +30,34 @@ class Timing(NamedTuple):
     generated: Array  # (T,), the time of the movement as it was generated [s]
 
 
-def as_generated(robot: Robot, path: CubicSpline, rate: float) -> Timing:
+def n_samples(duration: float, rate: float, most: int = LONGEST) -> int:
+    """Number of even samples from 0 to `duration` [s], about `rate` for each second.
+
+    Raises
+    ------
+    SpecificationError
+        More than `most`.
+    """
+    if not duration * rate <= most:
+        raise SpecificationError(
+            f"expected at most {most:,} samples of one trajectory, got {duration * rate:,.0f}; choose a lower "
+            "rate, a shorter movement or higher limits of velocity and acceleration"
+        )
+    return max(_LEAST, round(duration * rate) + 1)
+
+
+def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1.0) -> Timing:
     """The timing of the movement itself, t = s; where it begins or ends in motion, with a ramp from or to a stand.
 
     In a ramp of r seconds, with x = t / r, ``ds/dt = 3 x^2 - 2 x^3`` and so ``s = r (x^3 - x^4 / 2)``: it takes r / 2
-    seconds more than without. r is such that the arm takes half of its acceleration for it.
+    seconds more than without. r is such that the arm takes half of its acceleration for it. All of it takes `factor`
+    times as long, ``s(t / factor)``.
     """
     duration = float(path.x[-1])
     velocities = np.abs(path(np.array([0.0, duration]), 1))
-    first, last = (min(duration, _ramp(robot, velocity)) for velocity in velocities)
+    first, last = (min(duration, _ramp(robot, velocity / factor) / factor) for velocity in velocities)
     total = duration + (first + last) / 2
-    times = np.linspace(0.0, total, max(4, round(total * rate) + 1))
+    times = np.linspace(0.0, total, n_samples(factor * total, rate))
     place, speed, change = times - first / 2, np.ones_like(times), np.zeros_like(times)
     for ramp, at, sign in ((first, times, 1.0), (last, total - times, -1.0)):
         if ramp == 0:
@@ -49,21 +69,16 @@ def as_generated(robot: Robot, path: CubicSpline, rate: float) -> Timing:
         speed[within] = (3 * x**2 - 2 * x**3)[within]
         change[within] = (sign * 6 * (x - x**2) / ramp)[within]
     place = np.clip(place, 0.0, duration)
-    return Timing(times, place, speed, change, place)
+    return Timing(factor * times, place, speed / factor, change / factor**2, place)
 
 
 def _ramp(robot: Robot, velocity: Array) -> float:
-    if np.all(velocity <= STANDS * robot.velocity):
+    """Seconds of a ramp to velocities (n,); next to none where the movement is almost at a stand."""
+    share = float(np.max(velocity / robot.velocity))
+    if share <= STANDS:
         return 0.0
-    return max(_SHORTEST_RAMP, float(np.max(_PEAK * velocity / (_SHARE * robot.acceleration))))
-
-
-def slowed(timing: Timing, factor: float, rate: float) -> Timing:
-    """The same, `factor` times as long, sampled at `rate` again."""
-    times = timing.times * factor
-    even = np.linspace(0.0, times[-1], max(4, round(times[-1] * rate) + 1))
-    place, speed, change, generated = (np.interp(even, times, values) for values in timing[1:])
-    return Timing(even, place, speed / factor, change / factor**2, generated)
+    moving, shortest = _GENTLE
+    return max(shortest * min(1.0, share / moving), float(np.max(_PEAK * velocity / (_SHARE * robot.acceleration))))
 
 
 def timed(robot: Robot, path: CubicSpline, timing: Timing) -> JointTrajectory:

@@ -18,6 +18,7 @@ _KEY_POSES = 10  # of the movement, where branches are compared
 _STEPS = 3  # of inverse kinematics between two of them
 _FIRST_STEPS = 12  # from the rest posture to the first of them
 _OFFSETS = (-0.25, 0.0, 0.25)  # along each axis, in distances of the tip at rest from the base
+_BELOW = 100.0  # cost of a meter that the tip goes below the plane on which the arm stands
 _APPROACH = 0.1  # cost of a joint that first has to go a radian, beside shares of the limits of velocity
 
 
@@ -54,6 +55,8 @@ def choose_posture(robot: Robot, path: TaskPath, turn_costs: Array, stands: Arra
 def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array) -> Choice:
     """The shift, among 27 around where the tip rests, and the posture, with which the whole movement costs least.
 
+    A meter below z = 0, where the arm stands, or below the resting tip if that is lower, costs 100.
+
     The parameters and errors are those of `choose_posture`.
     """
     tip = kinematics(robot, robot.rest[None])[0][0]
@@ -61,7 +64,9 @@ def choose_place(robot: Robot, path: TaskPath, turn_costs: Array, stands: Array)
     shifts = tip - center + np.array(list(product(_OFFSETS, repeat=3))) * np.linalg.norm(tip)
     rest = np.tile(robot.rest, (len(shifts), 1))
     starts = descend(robot, rest, path.positions[0] + shifts, path.rotations[0], turn_costs, _FIRST_STEPS)
-    shift = shifts[int(np.argmin(_costs_of_movements(robot, path, starts.joints, shifts, turn_costs)))]
+    costs = _costs_of_movements(robot, path, starts.joints, shifts, turn_costs)
+    costs += _BELOW * np.maximum(0.0, min(0.0, tip[2]) - (path.positions[:, 2].min() + shifts[:, 2]))
+    shift = shifts[int(np.argmin(costs))]
     moved = path._replace(positions=path.positions + shift)
     return choose_posture(robot, moved, turn_costs, stands)._replace(shift=shift)
 

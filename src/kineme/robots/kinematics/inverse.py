@@ -15,9 +15,11 @@ from kineme.validation import Array, check_choice
 #: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
 ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 0.0, 0.0)}
 
-_PARTIAL = 0.005  # times these costs, for arms with fewer joints than a pose has coordinates: the position comes first
+_COORDINATES = 6  # of a pose
+_PARTIAL = 0.005  # times these costs, for arms with fewer joints than that: the position comes first
 _GAIN = 0.95  # of the way to a limit that one step may go
 _DAMPING = 1e-12
+_INSIDE = 0.002  # of the range of a joint, so far from its ends it is kept: between samples a path goes a little beyond
 _WXYZ = [0, 1, 2, 6, 3, 4, 5]  # pinocchio has w last
 
 
@@ -25,8 +27,9 @@ class InverseKinematics:
     """The joints of one arm, step by step; the quadratic programs are those of pink, solved by DAQP.
 
     One step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the
-    joints q, subject to the limits of position. p and R are position and orientation of the tip, starred the wanted
-    ones, log the rotation vector of a rotation, c the costs of turning. `LiveKinematics` keeps limits of velocity too.
+    joints q, subject to the limits of position, less 0.2 % of their range: between samples a path goes a little beyond.
+    p and R are position and orientation of the tip, starred the wanted ones, log the rotation vector of a rotation, c
+    the costs of turning. `LiveKinematics` keeps the limits of velocity and acceleration too.
 
     Parameters
     ----------
@@ -63,12 +66,14 @@ class InverseKinematics:
         self._log, self._exp = pinocchio.log3, pinocchio.exp3
         self._program, self._solve, self._configuration_of = build_ik, solve_problem, Configuration
         self._data = robot.model.createData()
-        partial = 1.0 if robot.n_joints >= 6 else _PARTIAL
+        partial = _PARTIAL if is_partial(robot) else 1.0
         self.costs = partial * np.array(ORIENTATIONS[orientation])
         self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
         self._posture = PostureTask(cost=POSTURE_COST)
         self._posture.set_target(robot.rest)
-        self._limits = (ConfigurationLimit(robot.model, config_limit_gain=_GAIN),)
+        limited, inside = robot.model.copy(), _INSIDE * (robot.upper - robot.lower)
+        limited.lowerPositionLimit, limited.upperPositionLimit = robot.lower + inside, robot.upper - inside
+        self._limits = (ConfigurationLimit(limited, config_limit_gain=_GAIN),)
         self.reset(robot.rest)
 
     def reset(self, q: Array) -> None:
@@ -155,3 +160,8 @@ class InverseKinematics:
         problem = self._program(self._configuration, tasks, 1.0, _DAMPING + damping, limits)
         found = self._solve(problem, solver="daqp")
         return np.asarray(found.x) if found.found and found.x is not None else None
+
+
+def is_partial(robot: Robot) -> bool:
+    """Whether the arm has fewer joints than a pose has coordinates: it follows orientations as far as it can."""
+    return robot.n_joints < _COORDINATES

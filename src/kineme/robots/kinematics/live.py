@@ -9,7 +9,7 @@ import numpy as np
 
 from kineme.robots.kinematics.braking import Braking, Range, Reasons, brakeable
 from kineme.robots.kinematics.descent import POSTURE_COST
-from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.kinematics.inverse import InverseKinematics, is_partial
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
@@ -49,7 +49,7 @@ class LiveKinematics(InverseKinematics):
         super().__init__(robot, orientation)
         self._weights = np.concatenate((np.ones(3), self.costs))
         self._still = np.zeros(robot.n_joints)
-        self._turns = np.where(self.costs == 1.0, 1.0, 0.0)
+        self._turns = np.zeros(3) if is_partial(robot) else self.costs
 
     def reset(self, q: Array) -> None:
         """Start from joint positions q (n,), at rest; the pose to follow is that of the tip."""

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from kineme.errors import DataError, SpecificationError
-from kineme.robots.models.table import MODELS
-from kineme.robots.models.urdf import Chain, read_chain
-from kineme.validation import Array, as_numbers, check_number
+from kineme.errors import SpecificationError
+from kineme.validation import Array
 
-_FOLDER = Path(__file__).parent
-_ACCELERATION = 5.0  # of joints whose file says none [rad/s^2 or m/s^2]
 _ROUNDING = 1e-6  # so far outside a limit a joint still counts as at it [rad, m]
-_VELOCITY = 1.0  # the same for velocities
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,6 +22,8 @@ class Robot:
     ----------
     name : str
     joints : tuple of str
+    units : tuple of str
+        "rad", or "m" of joints that slide.
     tip : str
         The frame that follows the movement.
     lower, upper : ndarray of shape (n,)
@@ -50,6 +44,7 @@ class Robot:
 
     name: str
     joints: tuple[str, ...]
+    units: tuple[str, ...]
     tip: str
     lower: Array
     upper: Array
@@ -97,127 +92,3 @@ def check_start(robot: Robot, q: Array) -> None:
         raise SpecificationError(
             f"expected {robot.joints[i]} to start within [{robot.lower[i]:.4g}, {robot.upper[i]:.4g}], got {q[i]:.4g}"
         )
-
-
-def load(
-    robot: str | Path,
-    tip: str | None = None,
-    rest: ArrayLike | None = None,
-    max_velocity: float | None = None,
-    max_acceleration: float | None = None,
-) -> Robot:
-    """An arm by name or from a URDF file.
-
-    Parameters
-    ----------
-    robot : str or Path
-        "panda", "ur5e", "wam", "so101", or the path of a URDF file. A path ends in ``.urdf`` or ``.xml``.
-    tip : str, optional
-        The link that follows the movement; by default that of the model, of a file the end of its only chain.
-    rest : array_like of shape (n,), optional
-        Posture from which movements are approached; by default that of the model, of a file the middle of the limits
-        (0 of joints that turn several times).
-    max_velocity, max_acceleration : float, optional
-        Upper bounds for all joints, below what the file allows; also of joints whose file says none, which otherwise
-        get 1 per second and 5 per second squared.
-
-    Raises
-    ------
-    DataError
-        The extra ``robot`` is not installed, no such file, or a file that is not a usable URDF.
-    SpecificationError
-        An unknown name; a rest posture of another number of joints or outside the limits.
-    """
-    pinocchio = _pinocchio()
-    path, default_tip, default_rest, name = _find(robot, tip)
-    chain = read_chain(path, tip or default_tip)
-    model, geometry = _build(pinocchio, path, chain)
-    lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
-    known = MODELS.get(name) if path.parent == _FOLDER else None
-    assumed = [known.assumed] if known is not None and known.assumed else []
-    assumed += [f"{joint} has no stops: it is kept within one turn to each side" for joint in chain.without_stops]
-    assumed += [f"{link} has no shape: its mesh is not there" for link in chain.without_shape]
-    bounds = {
-        "velocity": (velocity, max_velocity, _VELOCITY, "1/s"),
-        "acceleration": (acceleration, max_acceleration, _ACCELERATION, "1/s^2"),
-    }
-    for what, (values, largest, default, unit) in bounds.items():
-        if largest is not None:
-            check_number(f"max_{what}", largest, above=0.0)
-        unknown = np.isnan(values)
-        if unknown.any() and largest is None:
-            named = ", ".join(np.array(chain.joints)[unknown])
-            assumed.append(f"the file says no {what} limit for {named}: {default:g} {unit} is taken")
-        values[unknown] = default if largest is None else largest
-        if largest is not None:
-            np.minimum(values, largest, out=values)
-    posture = default_rest if rest is None and tip in (None, default_tip) else rest
-    at_rest = _posture(posture, lower, upper, chain.joints)
-    return Robot(
-        name,
-        chain.joints,
-        chain.tip,
-        lower,
-        upper,
-        velocity,
-        acceleration,
-        effort,
-        at_rest,
-        tuple(assumed),
-        path,
-        model,
-        geometry,
-    )
-
-
-def _pinocchio() -> Any:
-    try:
-        import pinocchio
-    except ImportError as error:
-        raise DataError("expected the package pin for arms; pip install 'kineme[robot]'") from error
-    return pinocchio
-
-
-def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLike | None, str]:
-    if not isinstance(tip, str | None):
-        raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
-    if not isinstance(robot, str | os.PathLike):
-        raise SpecificationError(f"expected the name of a robot or the path of a .urdf file, got {robot!r:.80}")
-    text = os.fspath(robot)
-    if text in MODELS:
-        return _FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
-    path = Path(text)
-    if path.suffix.lower() not in (".urdf", ".xml"):
-        raise SpecificationError(f"expected one of {', '.join(MODELS)} or the path of a .urdf file, got {text!r}")
-    return path, None, None, path.stem
-
-
-def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
-    """The reduced model of the chain's joints, and the geometry of those links whose shapes can be had."""
-    try:
-        whole = pinocchio.buildModelFromXML(chain.text)
-        shapes = pinocchio.buildGeomFromUrdfString(whole, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
-        locked = [whole.getJointId(name) for name in list(whole.names)[1:] if name not in chain.joints]
-        model, geometry = pinocchio.buildReducedModel(whole, shapes, locked, pinocchio.neutral(whole))
-    except (ValueError, RuntimeError) as error:
-        raise DataError(f"{path}: pinocchio cannot read this URDF: {error}") from error
-    order = [str(name) for name in list(model.names)[1:]]
-    if order != list(chain.joints):
-        raise DataError(f"{path}: expected the joints in the order {list(chain.joints)}, got {order}")
-    return model, geometry
-
-
-def _posture(rest: ArrayLike | None, lower: Array, upper: Array, joints: tuple[str, ...]) -> Array:
-    if rest is None:
-        wide = upper - lower > 2 * math.pi + 1e-9
-        return np.where(wide, np.clip(0.0, lower, upper), (lower + upper) / 2)
-    posture = as_numbers(rest, "rest")
-    if posture.shape != lower.shape:
-        raise SpecificationError(f"expected a rest posture of {len(joints)} joints, got shape {posture.shape}")
-    outside = ~((posture >= lower) & (posture <= upper))
-    if outside.any():
-        i = int(np.argmax(outside))
-        raise SpecificationError(
-            f"rest posture: expected {joints[i]} within [{lower[i]:.4g}, {upper[i]:.4g}], got {posture[i]:.4g}"
-        )
-    return posture

@@ -12,6 +12,7 @@ from kineme.robots.models.meshes import resolve_meshes
 
 _LARGEST = 20_000_000  # bytes
 _MOVING = ("revolute", "continuous", "prismatic")
+_TWIN = " link"  # is added to the name of a link that a joint has too
 _TURNS = 2 * math.pi  # a joint without stops is kept within one turn to each side
 
 
@@ -30,6 +31,7 @@ class Chain(NamedTuple):
 
     text: str  # the URDF, joints without stops given those of one turn
     joints: tuple[str, ...]
+    units: tuple[str, ...]  # rad, or m of joints that slide
     limits: tuple[JointLimits, ...]
     tip: str
     without_stops: tuple[str, ...]  # joints that the file calls continuous
@@ -64,11 +66,12 @@ def read_chain(path: Path, tip: str | None) -> Chain:
     limits = tuple(_limits(joint, path) for joint in moving)
     missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
     joints = tuple(str(joint.get("name")) for joint in moving)
-    return Chain(ElementTree.tostring(robot, "unicode"), joints, limits, tip, free, missing)
+    units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
+    return Chain(ElementTree.tostring(robot, "unicode"), joints, units, limits, tip, free, missing)
 
 
 def read_root(path: Path) -> ElementTree.Element:
-    """The root of a URDF file.
+    """The root of a URDF file, in which no link is called like a joint.
 
     Raises
     ------
@@ -88,7 +91,20 @@ def read_root(path: Path) -> ElementTree.Element:
             f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>; "
             "a xacro file is turned into one with: xacro FILE > robot.urdf"
         )
+    _name_apart(robot)
     return robot
+
+
+def _name_apart(robot: ElementTree.Element) -> None:
+    """Give links that are called like a joint another name, in place: frames of the model are known by their names."""
+    joints = {joint.get("name") for joint in robot.findall("joint")}
+    for link in robot.findall("link"):
+        name = link.get("name")
+        if name in joints:
+            link.set("name", f"{name}{_TWIN}")
+            for end in robot.iterfind("joint/*[@link]"):
+                if end.get("link") == name:
+                    end.set("link", f"{name}{_TWIN}")
 
 
 def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
@@ -104,6 +120,7 @@ def _child(joint: ElementTree.Element, path: Path) -> str:
 
 def _tip(tip: str | None, links: list[str], parents: dict[str, ElementTree.Element], path: Path) -> str:
     if tip is not None:
+        tip = f"{tip}{_TWIN}" if tip not in links and f"{tip}{_TWIN}" in links else tip
         if tip not in links:
             from difflib import get_close_matches
 
@@ -124,7 +141,10 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
     """The limits of a joint; one without stops becomes a joint with those of one turn to each side, in place."""
     name = joint.get("name")
     if joint.find("mimic") is not None:
-        raise DataError(f"{path}: joint {name!r} mimics another one; an arm whose own joints are coupled is not known")
+        raise DataError(
+            f"{path}: joint {name!r} mimics another one, which is not known within an arm; "
+            f"choose a tip before it, as {_end(joint, 'parent', path)!r} (tip=..., --tip)"
+        )
     limit = joint.find("limit")
     if joint.get("type") == "continuous":
         limit = ElementTree.SubElement(joint, "limit") if limit is None else limit

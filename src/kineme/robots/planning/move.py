@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from kineme.errors import TrajectoryError
-from kineme.robots.checks.preflight import TRACKED
+from kineme.robots.checks.tracking import TRACKED
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.kinematics.reach import check_reached
 from kineme.robots.kinematics.task_path import PLANES
@@ -19,10 +19,8 @@ from kineme.robots.planning.refusal import refuse_failed
 from kineme.robots.planning.request import request_of
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import SPACES
-from kineme.robots.planning.timed_movement import TIMINGS, Untimed, with_timing
+from kineme.robots.planning.timed_movement import FASTEST_RATE, SLOWEST_RATE, TIMINGS, Untimed, with_timing
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
-
-_SLOWEST_RATE, _FASTEST_RATE = 1.0, 10_000.0  # samples per second of what is sent
 
 
 def move(  # noqa: PLR0913 - one parameter per option
@@ -93,7 +91,7 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_choice("plane", plane, list(PLANES))
     check_choice("timing", timing, TIMINGS)
     check_choice("place", place, PLACES)
-    check_number("rate", rate, least=_SLOWEST_RATE, most=_FASTEST_RATE)
+    check_number("rate", rate, least=SLOWEST_RATE, most=FASTEST_RATE)
     check_switch("force", force)
     request = request_of(movement, robot, space, steps)
     stands = robot.rest if start is None else _posture(start, robot)
@@ -104,9 +102,10 @@ def move(  # noqa: PLR0913 - one parameter per option
         joints, path = joints_along(ik, path_of_the_tip(ik, request, orientation, plane), place, stands)
         if not force:
             check_reached(robot, path, joints(path.times), ik.costs, TRACKED)
-    made = with_timing(Untimed(robot, joints, path, stands, rate, request.times, request.steps), timing)
+    untimed = Untimed(robot, joints, path, stands, rate, request.times, request.steps, follow)
+    made = with_timing(untimed, timing)
     if not force:
-        refuse_failed(made)
+        refuse_failed(made, untimed, timing)
     return made
 
 

@@ -14,11 +14,10 @@ _EDGE = 4.0  # above the upper limit and below the lower one
 _POINTS = 400
 
 
-def charts(made: RobotMovement, prismatic: tuple[bool, ...]) -> str:
+def charts(made: RobotMovement) -> str:
     """A figure for each joint, from its lower limit to its upper one, and for each discrete channel."""
     trajectory, robot = made.trajectory, made.robot
-    units = ["m" if slides else "rad" for slides in prismatic]
-    columns = zip(trajectory.joints, trajectory.positions.T, robot.lower, robot.upper, units, strict=True)
+    columns = zip(trajectory.joints, trajectory.positions.T, robot.lower, robot.upper, robot.units, strict=True)
     figures = [_chart(made, name, values, (low, high), unit) for name, values, low, high, unit in columns]
     return "\n".join(figures + [_chart(made, name, values, None, "") for name, values in trajectory.steps.items()])
 

@@ -4,28 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from kineme.robots.models.meshes import find_mesh
 from kineme.robots.models.robot import Robot
 from kineme.robots.models.urdf import read_root
+from kineme.robots.view.elements import Element, as_text, numbers, origin_of, set_color
+from kineme.robots.view.link_shapes import LinkShapes, Mesh
 
-Element = ElementTree.Element
-_LARGEST = 16_000_000  # bytes of all meshes of one page
-_MESHES = {".stl": "stl", ".dae": "collada"}
-_SHAPES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
 _GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
 _THICKNESS = 0.12  # of the cylinder between two joints: its radius for each meter of its length
 _THIN, _THICK = 0.01, 0.05  # bounds of that radius [m]
-
-
-class Mesh(NamedTuple):
-    """A mesh as the page holds it."""
-
-    kind: str  # "stl" or "collada"
-    content: bytes
 
 
 class Shapes(NamedTuple):
@@ -34,7 +23,6 @@ class Shapes(NamedTuple):
     urdf: str
     meshes: tuple[Mesh, ...]  # a file name in `urdf` is an index into them
     joints: tuple[str, ...]  # those of the robot, in its order
-    prismatic: tuple[bool, ...]  # the same
     tip: str
     stand_ins: tuple[str, ...]  # links of the file that are drawn as cylinders
 
@@ -48,8 +36,8 @@ def shapes_of(robot: Robot) -> Shapes:
     root = read_root(robot.source)
     links = {str(link.get("name")): f"l{i}" for i, link in enumerate(root.findall("link"))}
     joints = {str(joint.get("name")): f"j{i}" for i, joint in enumerate(root.findall("joint"))}
-    drawer = _Drawer(root, robot.source)
-    drawn = {name: drawer.shapes(link) for name, link in zip(links, root.findall("link"), strict=True)}
+    drawer = LinkShapes(root, robot.source)
+    drawn = {name: drawer.of(link) for name, link in zip(links, root.findall("link"), strict=True)}
     nothing = not any(drawn.values())
     bare = [name for name in links if not drawn[name] and (nothing or name in drawer.without)]
     made = ElementTree.Element("robot", name="arm")
@@ -57,7 +45,7 @@ def shapes_of(robot: Robot) -> Shapes:
         to = ElementTree.SubElement(made, "link", name=link)
         shapes = drawn[name] if name not in bare else list(_cylinders(root, name))
         for shape in shapes:
-            _color(shape, _GRAYS[i % 2])
+            set_color(shape, _GRAYS[i % 2])
         to.extend(shapes)
     moving = {str(joint.get("name")): joint for joint in root.findall("joint") if joint.get("name") in robot.joints}
     for joint in root.findall("joint"):
@@ -66,91 +54,22 @@ def shapes_of(robot: Robot) -> Shapes:
         ElementTree.tostring(made, "unicode"),
         tuple(drawer.meshes),
         tuple(joints[name] for name in robot.joints),
-        tuple(moving[name].get("type") == "prismatic" for name in robot.joints),
         links[robot.tip],
         tuple(name for name in bare if name in drawer.without),
     )
-
-
-class _Drawer:
-    """The shapes of one link after the other, and the meshes that they need."""
-
-    def __init__(self, root: Element, path: Path) -> None:
-        self.colors = {
-            material.get("name"): color
-            for material in root.findall("material")
-            if (color := material.find("color")) is not None
-        }
-        self.path = path
-        self.meshes: list[Mesh] = []
-        self.without: list[str] = []  # links with shapes, none of which can be drawn
-        self._numbers: dict[Path, int] = {}
-        self._bytes = 0
-
-    def shapes(self, link: Element) -> list[Element]:
-        for tag in ("visual", "collision"):
-            found = [shape for one in link.findall(tag) if (shape := self._shape(one)) is not None]
-            if found:
-                return found
-        if link.find("visual") is not None or link.find("collision") is not None:
-            self.without.append(str(link.get("name")))
-        return []
-
-    def _shape(self, given: Element) -> Element | None:
-        geometry = given.find("geometry")
-        shape = None if geometry is None or len(geometry) == 0 else self._geometry(geometry[0])
-        if shape is None:
-            return None
-        made = ElementTree.Element("visual")
-        made.append(_origin(given))
-        ElementTree.SubElement(made, "geometry").append(shape)
-        color = given.find("material/color")
-        if color is None and (material := given.find("material")) is not None:
-            color = self.colors.get(material.get("name"))
-        values = [] if color is None else numbers(color.get("rgba"), 4)
-        if values:
-            _color(made, tuple(min(max(value, 0.0), 1.0) for value in values))
-        return made
-
-    def _geometry(self, given: Element) -> Element | None:
-        if given.tag == "mesh":
-            number = self._mesh(given.get("filename", ""))
-            if number is None:
-                return None
-            scale = numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
-            return ElementTree.Element("mesh", filename=str(number), scale=_text(scale))
-        if given.tag not in _SHAPES:
-            return None
-        names, length = _SHAPES[given.tag]
-        sizes = {name: numbers(given.get(name), length) for name in names.split()}
-        if not all(values and min(values) > 0 for values in sizes.values()):
-            return None
-        return ElementTree.Element(given.tag, {name: _text(values) for name, values in sizes.items()})
-
-    def _mesh(self, name: str) -> int | None:
-        path = find_mesh(name, self.path)
-        if path is None or path.suffix.lower() not in _MESHES:
-            return None
-        if path not in self._numbers:
-            self._bytes += path.stat().st_size
-            if self._bytes > _LARGEST:
-                return None
-            self._numbers[path] = len(self.meshes)
-            self.meshes.append(Mesh(_MESHES[path.suffix.lower()], path.read_bytes()))
-        return self._numbers[path]
 
 
 def _joint(given: Element, name: str, links: dict[str, str], moves: bool) -> Element:
     """The joint; one that the arm does not move is fixed where the model has it, at 0."""
     kind = ("prismatic" if given.get("type") == "prismatic" else "revolute") if moves else "fixed"
     made = ElementTree.Element("joint", name=name, type=kind)
-    made.append(_origin(given))
+    made.append(origin_of(given))
     for end in ("parent", "child"):
         found = given.find(end)
         ElementTree.SubElement(made, end, link=links["" if found is None else str(found.get("link"))])
     axis = given.find("axis")
     values = [] if axis is None else numbers(axis.get("xyz"), 3)
-    ElementTree.SubElement(made, "axis", xyz=_text(values if any(values) else [1.0, 0.0, 0.0]))
+    ElementTree.SubElement(made, "axis", xyz=as_text(values if any(values) else [1.0, 0.0, 0.0]))
     return made
 
 
@@ -160,39 +79,14 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         parent = joint.find("parent")
         if parent is None or parent.get("link") != link:
             continue
-        x, y, z = numbers(_origin(joint).get("xyz"), 3)
+        x, y, z = numbers(origin_of(joint).get("xyz"), 3)
         length = math.hypot(x, y, z)
         if length < 1e-3:
             continue
         made = ElementTree.Element("visual")
         turned = [0.0, math.acos(z / length), math.atan2(y, x)]
-        ElementTree.SubElement(made, "origin", xyz=_text([x / 2, y / 2, z / 2]), rpy=_text(turned))
+        ElementTree.SubElement(made, "origin", xyz=as_text([x / 2, y / 2, z / 2]), rpy=as_text(turned))
         radius = min(max(_THICKNESS * length, _THIN), _THICK)
-        shape = ElementTree.Element("cylinder", radius=_text([radius]), length=_text([length]))
+        shape = ElementTree.Element("cylinder", radius=as_text([radius]), length=as_text([length]))
         ElementTree.SubElement(made, "geometry").append(shape)
         yield made
-
-
-def _origin(given: Element) -> Element:
-    origin = given.find("origin")
-    values = {name: [] if origin is None else numbers(origin.get(name), 3) for name in ("xyz", "rpy")}
-    return ElementTree.Element("origin", {name: _text(value or [0.0, 0.0, 0.0]) for name, value in values.items()})
-
-
-def _color(shape: Element, rgba: tuple[float, ...]) -> None:
-    if shape.find("material") is None:
-        material = ElementTree.SubElement(shape, "material", name="")
-        ElementTree.SubElement(material, "color", rgba=_text(list(rgba)))
-
-
-def numbers(text: str | None, length: int) -> list[float]:
-    """The finite numbers of an attribute; none of them where there are not as many as expected."""
-    try:
-        values = [float(word) for word in (text or "").split()]
-    except ValueError:
-        return []
-    return values if len(values) == length and all(map(math.isfinite, values)) else []
-
-
-def _text(values: list[float]) -> str:
-    return " ".join(f"{value:.9g}" for value in values)

@@ -61,7 +61,7 @@ def view_page(made: RobotMovement) -> str:
         "title": in_markup(f"{made.robot.name} moves"),
         "summary": in_markup(_summary(made)),
         "notes": _notes(made, shapes.stand_ins),
-        "charts": charts(made, shapes.prismatic),
+        "charts": charts(made),
         "preflight": _preflight(made),
         "data": as_script_data(scene_data(made, shapes)),
         "licenses": "\n\n".join(in_markup(_asset(name)) for name in _LICENSES),

@@ -1,4 +1,4 @@
-"""A learned movement, generated where an arm is to execute it."""
+"""A learned movement, generated where an arm is to execute it: start and goal in the frame of the robot."""
 
 from __future__ import annotations
 
@@ -17,14 +17,28 @@ from kineme.robots.planning.roles import Roles, roles_of
 from kineme.validation import Array, as_numbers
 
 
-class Placed(NamedTuple):
+class Generated(NamedTuple):
     """A movement of the tip, or of the joints, with the discrete channels of its recording."""
 
-    movement: Trajectory
+    movement: Trajectory  # [m] or [rad]; of the tip alone or, (T, 7), with its orientations w, x, y, z
     steps: dict[str, Array]  # name -> (T,)
 
 
-def placed(  # noqa: PLR0913 - one parameter per option
+class _Frame(NamedTuple):
+    """Where n recorded positions lie in the frame of the robot: the recorded start at the origin, scaled by units."""
+
+    start: Array  # (n,), as recorded
+    units: Array  # (n,), meters or radians for one of each
+    origin: Array  # (n,) [m] or [rad]
+
+    def to_robot(self, recorded: Array) -> Array:
+        return (recorded - self.start) * self.units + self.origin
+
+    def to_recording(self, point: Array) -> Array:
+        return self.start + (point - self.origin) / self.units
+
+
+def generate_at(  # noqa: PLR0913 - one parameter per option
     learned: Learned,
     at: ArrayLike | None = None,
     goal: ArrayLike | None = None,
@@ -34,7 +48,7 @@ def placed(  # noqa: PLR0913 - one parameter per option
     rate: float = 100.0,
     joints: bool = False,
     plane: str = "xy",
-) -> Placed:
+) -> Generated:
     """Generate a movement with start and goal in the frame of a robot.
 
     Parameters
@@ -62,37 +76,46 @@ def placed(  # noqa: PLR0913 - one parameter per option
     SpecificationError
         A start or goal of another number of coordinates.
     """
-    found = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip")
-    _check_tip(found, learned, joints)
-    shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
-    n = len(found.positions)
-    axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
+    roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip")
+    _check_tip(roles, learned, joints)
+    n = len(roles.positions)
     begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
-    unit = found.units if scale is None else np.full(n, scale)
-    start = shown[0, found.positions]
-    origin = start * unit if begin is None else begin[axes]
-    target = None
-    if end is not None:
-        wanted = shown[-1].copy()
-        wanted[found.positions] = start + (end[axes] - origin) / unit
-        target = wanted[found.moving]
+    axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
+    shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
+    start = shown[0, roles.positions]
+    units = roles.units if scale is None else np.full(n, scale)
+    frame = _Frame(start, units, start * units if begin is None else begin[axes])
+    target = None if end is None else _goal_as_recorded(shown[-1], roles, frame.to_recording(end[axes]))
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
     made = generate(learned, options).columns
-    moved = (made["positions"][:, found.positions] - start) * unit + origin
-    if begin is not None and not joints and n == 2:
-        in_space = np.tile(begin, (len(moved), 1))
-        in_space[:, axes] = moved
-        moved = in_space
-    if found.orientation is not None and moved.shape[1] == 3:
-        moved = np.column_stack((moved, as_wxyz(made["positions"][:, found.orientation[1]], found.orientation[0])))
-    steps = {name: made["positions"][:, column] for name, column in found.discrete.items()}
-    return Placed(Trajectory(times=made["times"], positions=moved), steps)
+    moved = frame.to_robot(made["positions"][:, roles.positions])
+    if begin is not None and len(begin) > n:
+        moved = _in_space(moved, axes, begin)
+    if roles.orientation is not None and moved.shape[1] == 3:
+        channel, columns = roles.orientation
+        moved = np.column_stack((moved, as_wxyz(made["positions"][:, columns], channel)))
+    steps = {name: made["positions"][:, column] for name, column in roles.discrete.items()}
+    return Generated(Trajectory(times=made["times"], positions=moved), steps)
 
 
-def _check_tip(found: Roles, learned: Learned, joints: bool) -> None:
-    if not joints and len(found.positions) not in (2, 3):
+def _goal_as_recorded(end: Array, roles: Roles, goal: Array) -> Array:
+    """The goal in all columns that move: the positions as asked for, the others as they are demonstrated."""
+    wanted = end.copy()
+    wanted[roles.positions] = goal
+    return np.asarray(wanted[roles.moving])
+
+
+def _in_space(flat: Array, axes: list[int], through: Array) -> Array:
+    """A movement of two dimensions (T, 2) in the plane through a point (3,), shape (T, 3)."""
+    points = np.tile(through, (len(flat), 1))
+    points[:, axes] = flat
+    return points
+
+
+def _check_tip(roles: Roles, learned: Learned, joints: bool) -> None:
+    if not joints and len(roles.positions) not in (2, 3):
         raise TrajectoryError(
-            f"expected two or three positions of the tip, got {len(found.positions)} among "
+            f"expected two or three positions of the tip, got {len(roles.positions)} among "
             f"{', '.join(learned.columns)}; choose columns, or say that it is a movement of the joints (joints=True, "
             "--joints)"
         )

@@ -1,0 +1,87 @@
+"""The files of ``kineme move``: refused before the work if they cannot be written, written after the checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from kineme.cli.output import check_new, write_bytes
+from kineme.cli.source import name_of_source
+
+_NEW_FILE = click.Path(path_type=Path)
+
+#: Option -> its short name if it has one, endings of its files, what it says about itself.
+_FILES = {
+    "output": (
+        "-o",
+        (".csv", ".npz", ".json", ".parquet"),
+        "A .csv, .npz, .json or .parquet file; - for the screen, as CSV.",
+    ),
+    "ros1": (None, (".bag",), "A .bag of ROS 1 with JointTrajectory and JointState."),
+    "ros2": (None, (".mcap", ""), "A .mcap, or a folder, of ROS 2 with the same."),
+    "action_goal": (None, (".yaml", ".yml", ".json"), "A .yaml or .json file for ros2 action send_goal."),
+    "plot": (None, (".png", ".svg", ".pdf"), "Path and joints beside their limits: a .png, .svg or .pdf file."),
+    "view": (None, (".html", ".htm"), "An .html page in which the arm moves; opens in a browser, needs no network."),
+}
+
+
+def file_options(command: Any) -> Any:
+    """An option for each file that is written."""
+    for name, (short, _, words) in reversed(_FILES.items()):
+        names = [f"--{name.replace('_', '-')}", *([short] if short else [])]
+        command = click.option(*names, type=_NEW_FILE, help=words)(command)
+    return command
+
+
+def check_files(options: dict[str, Any]) -> None:
+    """Refuse files that no writer writes, or that are there, before an arm is loaded.
+
+    Raises
+    ------
+    click.UsageError
+        The message names the option or the file.
+    """
+    for name, (_, endings, _) in _FILES.items():
+        path = options[name]
+        if path is None or (name == "output" and str(path) == "-"):
+            continue
+        if path.suffix.lower() not in endings:
+            known = ", ".join(ending or "a folder" for ending in endings)
+            raise click.BadParameter(
+                f"expected {known}, got {path.suffix or 'no ending'}", param_hint=f"--{name.replace('_', '-')}"
+            )
+        check_new(path, options["overwrite"] or options["force"], options["source"], remedy="--overwrite")
+
+
+def write_files(made: Any, options: dict[str, Any]) -> None:
+    """Write what is asked for."""
+    from kineme.robots.export.action_goal import write_action_goal
+    from kineme.robots.export.bag import write_bag
+    from kineme.robots.export.columns import encode_joints, write_joints
+
+    trajectory = made.trajectory
+    writers = {"output": write_joints, "ros1": write_bag, "ros2": write_bag, "action_goal": write_action_goal}
+    for name, writer in writers.items():
+        path = options[name]
+        if path is None:
+            continue
+        if str(path) == "-":
+            write_bytes(encode_joints(trajectory, ".json" if options["as_json"] else ".csv"))
+        else:
+            writer(path, trajectory)
+    if options["plot"]:
+        from kineme.output.figures import save_figure
+        from kineme.robots.figure import draw_robot_movement
+
+        save_figure(draw_robot_movement(made), options["plot"])
+    if options["lerobot"]:
+        from kineme.robots.export.lerobot import write_lerobot
+
+        task = name_of_source(options)
+        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot.name)
+    if options["view"]:
+        from kineme.robots.view.write_view import write_view
+
+        write_view(options["view"], made)

@@ -1,0 +1,59 @@
+"""``kineme studio``: an action library in the browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+
+import click
+
+from kineme.cli.options import library_option_of
+from kineme.cli.output import write
+from kineme.output.text import printable
+
+_PORTS = click.IntRange(1, 65535)
+
+
+@click.command(short_help="Show, name and move it in the browser.")
+@library_option_of(required=True, words="Folder of the action library; made if there is none.")
+@click.option("--port", type=_PORTS, help="Port to serve at.  [default: 8420, or any that is free]")
+@click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
+@click.option("--read-only", is_flag=True, help="Show the library, and refuse every change.")
+@click.option("--host", default="127.0.0.1", show_default=True,
+              help="Address to listen at. Another one lets others on the network in who know the token.")  # fmt: skip
+def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host: str) -> None:
+    """Draw movements and be told what they are, name them, move them, in the browser.
+
+    Only this machine reaches the studio, and only who knows the token in the address, which is new each time (or taken
+    from KINEME_STUDIO_TOKEN). Connections are not encrypted: use --host in networks that you trust alone. Any number of
+    browsers and commands may work on one library at once. Stopped at any time, it loses nothing.
+
+    As in:
+
+    \b
+    kineme studio --library actions/
+    """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.studio.server.serve import Options, is_loopback, serve
+
+    def ready(address: str) -> None:
+        _say(folder, address, read_only)
+        if not is_loopback(host):
+            write("others on the network reach it with this address, unencrypted: give it to those you trust", err=True)
+        if not no_open and _has_display():
+            webbrowser.open(address)
+
+    serve(Options(folder, host, port, read_only), ready)
+
+
+def _say(folder: Path, address: str, read_only: bool) -> None:
+    only = ", for reading only" if read_only else ""
+    write(f"{printable(folder)} is open{only} at {address}")
+    write("stop it with Ctrl-C")
+    sys.stdout.flush()
+
+
+def _has_display() -> bool:
+    """Whether a browser with windows can be opened: one of the terminal would take the terminal."""
+    return sys.platform in {"darwin", "win32"} or any(os.environ.get(one) for one in ("DISPLAY", "WAYLAND_DISPLAY"))

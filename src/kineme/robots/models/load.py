@@ -1,0 +1,148 @@
+"""Load an arm: its URDF, its limits and its posture at rest, with what is assumed where the file says nothing."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kineme.errors import DataError, SpecificationError
+from kineme.robots.models.rest import bent_in_words, checked_rest, rest_posture
+from kineme.robots.models.robot import Robot
+from kineme.robots.models.table import MODELS, Model
+from kineme.robots.models.urdf import Chain, read_chain
+from kineme.validation import Array, check_number
+
+_FOLDER = Path(__file__).parent
+_ACCELERATION = 5.0  # of joints whose file says none [rad/s^2 or m/s^2]
+_VELOCITY = 1.0  # the same for velocities
+
+
+def load(
+    robot: str | Path,
+    tip: str | None = None,
+    rest: ArrayLike | None = None,
+    max_velocity: float | None = None,
+    max_acceleration: float | None = None,
+) -> Robot:
+    """An arm by name or from a URDF file.
+
+    Parameters
+    ----------
+    robot : str or Path
+        "panda", "ur5e", "wam", "so101", or the path of a URDF file. A path ends in ``.urdf`` or ``.xml``.
+    tip : str, optional
+        The link that follows the movement; by default that of the model, of a file the end of its only chain.
+    rest : array_like of shape (n,), optional
+        Posture from which movements are approached; by default that of the model, of a file the middle of the limits
+        (0 of joints that turn several times), with up to three joints bent if that is a singular posture.
+    max_velocity, max_acceleration : float, optional
+        Upper bounds for all joints, below what the file allows; also of joints whose file says none, which otherwise
+        get 1 per second and 5 per second squared.
+
+    Raises
+    ------
+    DataError
+        The extra ``robot`` is not installed, no such file, or a file that is not a usable URDF.
+    SpecificationError
+        An unknown name; a rest posture of another number of joints or outside the limits.
+    """
+    pinocchio = _pinocchio()
+    path, default_tip, default_rest, name = _find(robot, tip)
+    chain = read_chain(path, tip or default_tip)
+    model, geometry = _build(pinocchio, path, chain)
+    lower, upper, velocity, acceleration, effort = (np.array(column) for column in zip(*chain.limits, strict=True))
+    assumed = _assumed_of(chain, MODELS.get(name) if path.parent == _FOLDER else None)
+    assumed += _limit("velocity", velocity, max_velocity, _VELOCITY, "1/s", chain)
+    assumed += _limit("acceleration", acceleration, max_acceleration, _ACCELERATION, "1/s^2", chain)
+    posture = default_rest if rest is None and tip in (None, default_tip) else rest
+    if posture is None:
+        at_rest, bent = rest_posture(model, chain.tip, lower, upper)
+        assumed += [bent_in_words(at_rest)] if bent else []
+    else:
+        at_rest = checked_rest(posture, lower, upper, chain.joints)
+    return Robot(
+        name,
+        chain.joints,
+        chain.units,
+        chain.tip,
+        lower,
+        upper,
+        velocity,
+        acceleration,
+        effort,
+        at_rest,
+        tuple(assumed),
+        path,
+        model,
+        geometry,
+    )
+
+
+def _pinocchio() -> Any:
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise DataError("expected the package pin for arms; pip install 'kineme[robot]'") from error
+    return pinocchio
+
+
+def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLike | None, str]:
+    if not isinstance(tip, str | None):
+        raise SpecificationError(f"expected tip as the name of a link, got {tip!r:.80}")
+    if not isinstance(robot, str | os.PathLike):
+        raise SpecificationError(f"expected the name of a robot or the path of a .urdf file, got {robot!r:.80}")
+    text = os.fspath(robot)
+    if text in MODELS:
+        return _FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
+    path = Path(text)
+    if path.suffix.lower() not in (".urdf", ".xml"):
+        raise SpecificationError(f"expected one of {', '.join(MODELS)} or the path of a .urdf file, got {text!r}")
+    return path, None, None, path.stem
+
+
+def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
+    """The reduced model of the chain's joints, and the geometry of those links whose shapes can be had."""
+    try:
+        whole = pinocchio.buildModelFromXML(chain.text)
+        shapes = pinocchio.buildGeomFromUrdfString(whole, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
+        locked = [whole.getJointId(name) for name in list(whole.names)[1:] if name not in chain.joints]
+        model, geometry = pinocchio.buildReducedModel(whole, shapes, locked, pinocchio.neutral(whole))
+    except (ValueError, RuntimeError) as error:
+        raise DataError(f"{path}: pinocchio cannot read this URDF: {error}") from error
+    order = [str(name) for name in list(model.names)[1:]]
+    if order != list(chain.joints):
+        raise DataError(f"{path}: expected the joints in the order {list(chain.joints)}, got {order}")
+    return model, geometry
+
+
+def _limit(what: str, values: Array, largest: float | None, default: float, unit: str, chain: Chain) -> list[str]:
+    """Put the default where the file says no limit, and nothing above `largest`, in place; what was assumed."""
+    unknown = np.isnan(values)
+    if largest is None:
+        named = ", ".join(np.array(chain.joints)[unknown])
+        values[unknown] = default
+        return [f"the file says no {what} limit for {named}: {default:g} {unit} is taken"] if unknown.any() else []
+    check_number(f"max_{what}", largest, above=0.0)
+    values[unknown] = largest
+    np.minimum(values, largest, out=values)
+    return []
+
+
+def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
+    """What is said about a model that comes with kineme, and about joints and links of which a file says too little."""
+    assumed = [known.assumed] if known is not None and known.assumed else []
+    if chain.without_stops:
+        assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
+    if chain.without_shape:
+        assumed.append(f"{_have(chain.without_shape)} no shape: its mesh is not there")
+    return assumed
+
+
+def _have(names: tuple[str, ...]) -> str:
+    """Up to three names, and that each has what follows."""
+    named = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"{named} {'each have' if len(names) > 1 else 'has'}"

@@ -1,0 +1,98 @@
+// A snapshot of a library: JSON with one block of numbers in base64, as kineme.studio.snapshot writes it.
+
+/**
+ * @typedef {Object} Snapshot
+ * @property {Object} header everything that is no array
+ * @property {Object<string, Float64Array|Float32Array|Int32Array>} arrays
+ */
+
+const KINDS = { float64: Float64Array, float32: Float32Array, int32: Int32Array };
+const FORMAT = "kineme-snapshot";
+const VERSION = 1;
+
+/**
+ * The arrays of a snapshot; they share one block of memory.
+ * @param {string|Object} text a JSON document, or what was parsed of it
+ * @returns {Snapshot}
+ */
+export function unpack(text) {
+  const given = typeof text === "string" ? JSON.parse(text) : text;
+  if (given.format !== FORMAT || given.version !== VERSION) {
+    throw new Error(`expected a snapshot of version ${VERSION}, got ${given.format} ${given.version}; make it again`);
+  }
+  const characters = atob(given.data);
+  const bytes = new Uint8Array(characters.length);
+  for (let k = 0; k < bytes.length; k++) bytes[k] = characters.charCodeAt(k);
+  const arrays = {};
+  for (const [name, [kind, offset, length]] of Object.entries(given.arrays)) {
+    arrays[name] = new KINDS[kind](bytes.buffer, offset, length);
+  }
+  const { data: _data, arrays: _arrays, ...header } = given;
+  return { header, arrays };
+}
+
+/**
+ * Sum of products of two rows of n numbers that begin at i and j.
+ * @param {ArrayLike<number>} a
+ * @param {number} i
+ * @param {ArrayLike<number>} b
+ * @param {number} j
+ * @param {number} n
+ */
+export function product(a, i, b, j, n) {
+  let total = 0;
+  for (let k = 0; k < n; k++) total += a[i + k] * b[j + k];
+  return total;
+}
+
+/**
+ * Linear interpolation at rising targets of a function with values y at rising x; constant beyond its ends.
+ * @param {ArrayLike<number>} targets
+ * @param {ArrayLike<number>} x
+ * @param {ArrayLike<number>} y
+ * @returns {Float64Array}
+ */
+export function interpolate(targets, x, y) {
+  const found = new Float64Array(targets.length);
+  const last = x.length - 1;
+  for (let p = 0, j = 0; p < targets.length; p++) {
+    const t = targets[p];
+    while (j < last - 1 && x[j + 1] <= t) j++;
+    if (t >= x[last]) found[p] = y[last];
+    else if (t <= x[0]) found[p] = y[0];
+    else found[p] = y[j] + ((y[j + 1] - y[j]) * (t - x[j])) / (x[j + 1] - x[j]);
+  }
+  return found;
+}
+
+/** Numbers from a to b at n even steps. @returns {Float64Array} */
+export function linspace(a, b, n) {
+  return Float64Array.from({ length: n }, (_, k) => (k === n - 1 ? b : a + ((b - a) * k) / (n - 1)));
+}
+
+/** Index of the largest number; of several the first. @param {ArrayLike<number>} values */
+export function argmax(values) {
+  let best = 0;
+  for (let k = 1; k < values.length; k++) if (values[k] > values[best]) best = k;
+  return best;
+}
+
+/** Indices of the numbers, largest first; of equal ones the first. @param {ArrayLike<number>} values @returns {number[]} */
+export function descending(values) {
+  return Array.from(values, (_, k) => k).sort((i, j) => (values[j] === values[i] ? i - j : values[j] - values[i]));
+}
+
+/** log(sum(exp(values))), without overflow. @param {ArrayLike<number>} values */
+export function logSumExp(values) {
+  const top = values[argmax(values)];
+  if (!Number.isFinite(top)) return top;
+  let sum = 0;
+  for (let k = 0; k < values.length; k++) sum += Math.exp(values[k] - top);
+  return Math.log(sum) + top;
+}
+
+/** Shares of numbers given by their logarithms: none negative, their sum 1. @returns {Float64Array} */
+export function softmax(logs) {
+  const top = logSumExp(logs);
+  return Float64Array.from(logs, (one) => Math.exp(one - top));
+}

@@ -1,0 +1,200 @@
+// What movements are compared by: rows of numbers, segments and points; in single precision, as stored ones are.
+
+import { arcLengthPhase, evenPath } from "./preparation.js";
+import { interpolate, linspace } from "./arrays.js";
+
+const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scaled up
+const NO_LENGTH = 1e-6; // of a movement of size 1: a shorter vector has no direction
+export const N_POINTS = 199; // even samples from which the phases are computed
+
+/**
+ * @typedef {Object} Representation
+ * @property {string} quantity positions, forcing, elastic, turning or cloud
+ * @property {number} arc_share
+ * @property {number} n_points
+ * @property {string} name
+ *
+ * @typedef {Object} Shapes segments and points of m movements, see `shapes`
+ * @property {Float32Array} segments m times K times (tangent, midpoint, turning angle / pi)
+ * @property {Float32Array} points m times P times (point, turning angle / pi, tangent)
+ */
+
+/**
+ * A path at even values of a phase: d rows of n_points numbers.
+ * @param {Float64Array|Float32Array} path d rows
+ * @param {number} d
+ * @param {Representation} one
+ * @param {Float64Array} [matrix] (n_points, n) where time does not fall on samples
+ */
+function along(path, d, one, matrix) {
+  const n = path.length / d;
+  const m = one.n_points;
+  const found = new Float64Array(d * m);
+  const every = (n - 1) / (m - 1);
+  const phase = one.arc_share > 0 ? arcLengthPhase(path, d, one.arc_share) : null;
+  for (let k = 0; k < d; k++) {
+    const own = path.subarray(k * n, (k + 1) * n);
+    if (phase) found.set(interpolate(linspace(0, 1, m), phase, own), k * m);
+    else if (Number.isInteger(every)) for (let p = 0; p < m; p++) found[k * m + p] = own[p * every];
+    else for (let p = 0; p < m; p++) for (let t = 0; t < n; t++) found[k * m + p] += matrix[p * n + t] * own[t];
+  }
+  return found;
+}
+
+/** A path minus its center, divided by its size, as far as the normalization says. */
+function normalized(path, d, { translation, scale }) {
+  const n = path.length / d;
+  const squares = new Float64Array(d);
+  const found = Float64Array.from(path);
+  for (let k = 0; k < d; k++) {
+    let center = 0;
+    for (let t = 0; t < n; t++) center += path[k * n + t] / n;
+    for (let t = 0; t < n; t++) squares[k] += (path[k * n + t] - center) ** 2 / n;
+    if (translation) for (let t = 0; t < n; t++) found[k * n + t] -= center;
+  }
+  if (scale === "none") return found;
+  const whole = Math.sqrt(squares.reduce((sum, one) => sum + one, 0)) || 1;
+  for (let k = 0; k < d; k++) {
+    const own = Math.sqrt(squares[k]);
+    const size = scale === "per-dimension" && own > FLAT * whole ? own : whole;
+    for (let t = 0; t < n; t++) found[k * n + t] /= size;
+  }
+  return found;
+}
+
+/** Rows times a matrix (n, n): the forcing term of a DMP fitted to a path of n points. */
+function forcing(path, d, operator, translation) {
+  const n = path.length / d;
+  const found = new Float64Array(d * n);
+  for (let k = 0; k < d; k++) {
+    let mean = 0;
+    for (let t = 0; t < n; t++) {
+      const x = path[k * n + t];
+      mean += x / n;
+      for (let p = 0; p < n; p++) found[k * n + p] += x * operator[t * n + p];
+    }
+    if (!translation) for (let p = 0; p < n; p++) found[k * n + p] += mean;
+  }
+  return found;
+}
+
+/**
+ * Feature rows of a smooth path, one of each representation that is compared sample by sample.
+ * @param {Float64Array} path d rows, relative, or as recorded where position matters
+ * @param {Object} how the header's comparison
+ * @param {Object} arrays of the snapshot
+ * @returns {Float32Array[]}
+ */
+export function featureRows(path, how, arrays) {
+  const d = how.n_dims;
+  return how.by_rows.map((one, r) => {
+    const matrix = one.resample === undefined ? undefined : arrays[one.resample];
+    const single = Float32Array.from(normalized(along(path, d, one, matrix), d, how));
+    if (one.quantity !== "forcing") return single;
+    return Float32Array.from(forcing(single, d, arrays[one.operator], how.translation));
+  });
+}
+
+/**
+ * Segments and points of a path of positions over arc length, centered, at size 1; written as number i of the shapes.
+ * @param {ArrayLike<number>} path d rows
+ * @param {number} d
+ * @param {Shapes} into
+ * @param {number} i
+ * @param {number} [factor] by which the path is multiplied
+ */
+export function fillShapes(path, d, into, i, factor = 1) {
+  const { n_segments: K, n_points: P } = into;
+  const w = 2 * d + 1;
+  const ends = evenly(path, d, K + 1, factor);
+  const points = evenly(path, d, P, factor);
+  const tangents = units(K, d, (p, k) => ends[(p + 1) * d + k] - ends[p * d + k]);
+  const steps = units(P - 1, d, (p, k) => points[(p + 1) * d + k] - points[p * d + k]);
+  const slopes = units(P, d, (p, k) => {
+    const [a, b] = [Math.max(p - 1, 0), Math.min(p + 1, P - 1)];
+    return (points[b * d + k] - points[a * d + k]) / (b - a);
+  });
+  for (let p = 0, at = i * K * w; p < K; p++, at += w) {
+    for (let k = 0; k < d; k++) {
+      into.segments[at + k] = tangents[p * d + k];
+      into.segments[at + d + k] = 0.5 * (ends[(p + 1) * d + k] + ends[p * d + k]);
+    }
+    const inner = p > 0 && p < K - 1 && directed(tangents, p, d);
+    into.segments[at + 2 * d] = inner ? angle(tangents, p - 1, p + 1, d) : 0;
+  }
+  for (let p = 0, at = i * P * w; p < P; p++, at += w) {
+    for (let k = 0; k < d; k++) {
+      into.points[at + k] = points[p * d + k];
+      into.points[at + d + 1 + k] = slopes[p * d + k];
+    }
+    into.points[at + d] = p > 0 && p < P - 1 ? angle(steps, p - 1, p, d) : 0;
+  }
+}
+
+/** Room for the shapes of m movements. @returns {Shapes} */
+export function roomForShapes(m, d, { n_segments, n_points }) {
+  const w = 2 * d + 1;
+  const [segments, points] = [new Float32Array(m * n_segments * w), new Float32Array(m * n_points * w)];
+  return { segments, points, n_segments, n_points };
+}
+
+/** Positions at n even values along a path, each d numbers, interpolated linearly. */
+function evenly(path, d, n, factor) {
+  const T = path.length / d;
+  const found = new Float64Array(n * d);
+  for (let p = 0; p < n; p++) {
+    const at = (p * (T - 1)) / (n - 1);
+    const before = Math.min(Math.floor(at), T - 2);
+    const share = at - before;
+    for (let k = 0; k < d; k++) {
+      found[p * d + k] = factor * (path[k * T + before] * (1 - share) + path[k * T + before + 1] * share);
+    }
+  }
+  return found;
+}
+
+/** n vectors divided by their lengths; zero where they have none. */
+function units(n, d, vector) {
+  const found = new Float64Array(n * d);
+  for (let p = 0; p < n; p++) {
+    let square = 0;
+    for (let k = 0; k < d; k++) square += (found[p * d + k] = vector(p, k)) ** 2;
+    const length = Math.sqrt(square);
+    for (let k = 0; k < d; k++) found[p * d + k] = length > NO_LENGTH ? found[p * d + k] / length : 0;
+  }
+  return found;
+}
+
+function directed(vectors, p, d) {
+  for (let k = 0; k < d; k++) if (vectors[p * d + k] !== 0) return true;
+  return false;
+}
+
+/** Angle between two unit vectors, divided by pi; 0 where one of them is zero. */
+function angle(vectors, p, q, d) {
+  if (!directed(vectors, p, d) || !directed(vectors, q, d)) return 0;
+  let cosine = 0;
+  for (let k = 0; k < d; k++) cosine += vectors[p * d + k] * vectors[q * d + k];
+  return Math.acos(Math.min(Math.max(cosine, -1), 1)) / Math.PI;
+}
+
+/**
+ * A movement as it is compared: its smooth path, rows with their squared norms, and shapes.
+ * @param {import("./preparation.js").Movement} one
+ * @param {Object} how
+ * @param {Object} arrays
+ */
+export function describeMovement(one, how, arrays) {
+  return describePath(evenPath(one, how.cutoff, N_POINTS), one.positions, how, arrays);
+}
+
+/** The same of a smooth path relative to a first position. */
+export function describePath(path, start, how, arrays) {
+  const d = how.n_dims;
+  const placed = how.translation ? path : path.map((x, j) => x + start[Math.floor(j / N_POINTS)]);
+  const rows = featureRows(placed, how, arrays);
+  const squares = rows.map((row) => row.reduce((sum, x) => sum + x * x, 0));
+  const shapes = how.shapes ? roomForShapes(1, d, how.shapes) : null;
+  if (shapes) fillShapes(rows[how.rotating], d, shapes, 0);
+  return { path, rows, squares, shapes };
+}

@@ -1,0 +1,213 @@
+// Squared distances of a movement to stored ones, in every representation.
+
+import { align } from "./rotation.js";
+
+const FAR = 1e300;
+
+/**
+ * @typedef {Object} Stored m movements that others are compared with
+ * @property {number} m
+ * @property {Float32Array[]} rows of each block, one movement after the other
+ * @property {Float64Array[]} squares their squared norms, (m,) of each block
+ * @property {import("./description.js").Shapes|null} shapes
+ *
+ * @typedef {Object} PairRule how segments and points are compared
+ * @property {number} n_segments
+ * @property {number} band
+ * @property {number} n_points
+ * @property {number} position_weight
+ * @property {number} turning_weight of segments
+ * @property {number} cloud_turning_weight of points
+ * @property {number} line_weight
+ */
+
+/**
+ * Elastic, turning and point-cloud distances of one movement to others; see kineme.kernels.elastic and point_cloud.
+ * @param {PairRule} how
+ * @param {number} d
+ * @param {import("./description.js").Shapes} own of the one movement
+ * @param {boolean} cloud whether the point cloud is wanted
+ * @param {boolean} elastic whether the others are
+ * @returns {function(import("./description.js").Shapes, number, Float64Array, Float64Array): void} of the others, the
+ *   number of one of them and the rotation that brings it onto the one movement, it writes three squares
+ */
+export function pairDistances(how, d, own, cloud = true, elastic = true) {
+  const { n_segments: K, n_points: P, band } = how;
+  const w = 2 * d + 1;
+  const line = how.line_weight ** 0.25;
+  const factors = [1, Math.sqrt(how.position_weight), Math.sqrt(how.turning_weight)];
+  const place = [1, Math.sqrt(how.cloud_turning_weight), line];
+  const IDENTITY = Float64Array.from({ length: d * d }, (_, k) => (k % (d + 1) === 0 ? 1 : 0));
+  const [a, b] = [new Float64Array(K * w), new Float64Array(K * w)];
+  const [x, y] = [new Float64Array(P * w), new Float64Array(P * w)];
+  turned(own.segments, 0, K, d, d, IDENTITY, factors, a);
+  turned(own.points, 0, P, d, d + 1, IDENTITY, place, x);
+  const work = { elastic: new Float64Array(K + 1), turning: new Float64Array(K + 1) };
+  const room = { rows: new Float64Array(P), columns: new Float64Array(P), nearest: new Int32Array(P), halves: new Float64Array(2 * P) };
+  return (others, j, R, squares) => {
+    if (elastic) {
+      turned(others.segments, j * K * w, K, d, d, R, factors, b);
+      warp(a, b, K, w, band, work, squares);
+    }
+    if (cloud) {
+      turned(others.points, j * P * w, P, d, d + 1, R, place, y);
+      squares[2] = matched(x, y, P, d, room);
+    }
+  };
+}
+
+/**
+ * n records of a vector, a second one and a number, rotated and multiplied by the roots of their weights.
+ * Of segments the records are tangent, midpoint and angle; of points they are point, angle and tangent.
+ */
+function turned(source, from, n, d, second, R, factors, into) {
+  const w = 2 * d + 1;
+  const scalar = second === d ? 2 * d : d;
+  const weight = second === d ? factors[2] : factors[1];
+  const other = second === d ? factors[1] : factors[2];
+  for (let p = 0; p < n; p++) {
+    const at = from + p * w;
+    const to = p * w;
+    for (let k = 0; k < d; k++) {
+      let u = 0;
+      let v = 0;
+      for (let h = 0; h < d; h++) {
+        u += R[k * d + h] * source[at + h];
+        v += R[k * d + h] * source[at + second + h];
+      }
+      into[to + k] = factors[0] * u;
+      into[to + second + k] = other * v;
+    }
+    into[to + scalar] = weight * source[at + scalar];
+  }
+}
+
+/** Dynamic time warping of segments: the sums of both costs along their best paths, divided by K. */
+function warp(a, b, K, w, band, work, squares) {
+  const { elastic, turning } = work;
+  elastic.fill(FAR);
+  turning.fill(FAR);
+  elastic[0] = turning[0] = 0;
+  for (let p = 0; p < K; p++) {
+    const first = Math.max(0, p - band);
+    const end = Math.min(K, p + band + 1);
+    const at = p * w;
+    let corner = elastic[first];
+    let cornerTurning = turning[first];
+    let left = FAR;
+    let leftTurning = FAR;
+    elastic[first] = turning[first] = FAR;
+    for (let q = first, from = first * w; q < end; q++, from += w) {
+      const angle = a[at + w - 1] - b[from + w - 1];
+      const square = angle * angle;
+      let cost = square;
+      for (let k = 0; k < w - 1; k++) {
+        const gap = a[at + k] - b[from + k];
+        cost += gap * gap;
+      }
+      const above = elastic[q + 1];
+      const aboveTurning = turning[q + 1];
+      let least = above < corner ? above : corner;
+      left = cost + (least < left ? least : left);
+      least = aboveTurning < cornerTurning ? aboveTurning : cornerTurning;
+      leftTurning = square + (least < leftTurning ? least : leftTurning);
+      elastic[q + 1] = left;
+      turning[q + 1] = leftTurning;
+      corner = above;
+      cornerTurning = aboveTurning;
+    }
+  }
+  squares[0] = elastic[K] / K;
+  squares[1] = turning[K] / K;
+}
+
+/** Squared mean distance of matched points, in the direction in which it is smaller. */
+function matched(x, y, P, d, room) {
+  const { rows, columns, nearest, halves } = room;
+  const w = 2 * d + 1;
+  columns.fill(FAR);
+  for (let p = 0; p < P; p++) {
+    let square = 0;
+    let other = 0;
+    for (let k = d + 1; k < w; k++) {
+      square += x[p * w + k] * x[p * w + k];
+      other += y[p * w + k] * y[p * w + k];
+    }
+    // The weight of the tangents' lines is in their lengths twice: once here.
+    halves[p] = 0.5 * square * square;
+    halves[P + p] = 0.5 * other * other;
+  }
+  let taken = 0; // bits of the points of y that a point of x is nearest to
+  for (let p = 0; p < P; p++) {
+    let smallest = FAR;
+    let at = 0;
+    for (let q = 0; q < P; q++) {
+      let cost = halves[p] + halves[P + q];
+      let both = 0;
+      for (let k = 0; k <= d; k++) {
+        const gap = x[p * w + k] - y[q * w + k];
+        cost += gap * gap;
+      }
+      for (let k = d + 1; k < w; k++) both += x[p * w + k] * y[q * w + k];
+      cost -= both * both;
+      if (cost < smallest) {
+        smallest = cost;
+        at = q;
+      }
+      if (cost < columns[q]) {
+        columns[q] = cost;
+        nearest[q] = p;
+      }
+    }
+    taken |= 1 << at;
+    rows[p] = Math.sqrt(Math.max(smallest, 0));
+  }
+  return sums(rows, columns, nearest, taken, P);
+}
+
+function sums(rows, columns, nearest, taken, P) {
+  let forth = 0;
+  let back = 0;
+  let takenBack = 0;
+  for (let q = 0; q < P; q++) {
+    const distance = Math.sqrt(Math.max(columns[q], 0));
+    back += distance;
+    if (!(taken & (1 << q))) forth += distance;
+    takenBack |= 1 << nearest[q];
+  }
+  for (let p = 0; p < P; p++) {
+    forth += rows[p];
+    if (!(takenBack & (1 << p))) back += rows[p];
+  }
+  return (Math.min(forth, back) / P) ** 2;
+}
+
+/**
+ * Squared distances of a described movement to m stored ones: R rows of m numbers.
+ * @param {Object} how the header's comparison
+ * @param {{rows: Float32Array[], squares: number[], shapes: Object}} one
+ * @param {Stored} stored
+ * @returns {Float64Array}
+ */
+export function squaredDistances(how, one, stored) {
+  const { rule, by_rows: blocks, by_pairs: measures, n_dims: d } = how;
+  const m = stored.m;
+  const found = new Float64Array((blocks.length + measures.length) * m);
+  const compare = measures.length ? pairDistances(how.shapes, d, one.shapes, measures.includes(2), measures.some((k) => k < 2)) : null;
+  const R = new Float64Array(d * d);
+  const squares = new Float64Array(3);
+  for (let j = 0; j < m; j++) {
+    for (let r = 0; r < blocks.length; r++) {
+      const n = blocks[r].n_points;
+      const square = stored.squares[r][j];
+      const turns = compare !== null && r === how.rotating;
+      const best = align(rule, one.rows[r], 0, stored.rows[r], j * n * d, n, Math.sqrt(one.squares[r] * square), turns ? R : null);
+      found[r * m + j] = Math.max(one.squares[r] + square - 2 * best, 0);
+    }
+    if (compare === null) continue;
+    for (let k = 0; k < d * d; k++) R[k] = Math.fround(R[k]);
+    compare(stored.shapes, j, R, squares);
+    for (let k = 0; k < measures.length; k++) found[(blocks.length + k) * m + j] = squares[measures[k]];
+  }
+  return found;
+}

@@ -1,0 +1,230 @@
+// What a movement is, or that it is unknown: similarities, classes, calibrated p-values.
+
+import { argmax, descending, logSumExp, softmax } from "./arrays.js";
+import { describeMovement, fillShapes, featureRows, N_POINTS, roomForShapes } from "./description.js";
+import { squaredDistances } from "./distances.js";
+
+const EXPONENT = 15; // of the ratio of distances: the odds of two classes
+const LEAST = 5e-3; // smallest distance that counts, in kernel widths
+const NO_DISTANCE = 1e-5; // of a log similarity: rounding
+const SHOWN = 3; // movements named in an answer
+const MEAN_IN_EIGHT = (Math.SQRT2 * 11.631728396567448) / 6; // of chi with 8 degrees of freedom: gamma(4.5) / gamma(4)
+
+/** A-averages of kernels given by their logarithms. */
+const MEANS = {
+  arithmetic: (logs) => logSumExp(logs) - Math.log(logs.length),
+  geometric: (logs) => logs.reduce((sum, one) => sum + one, 0) / logs.length,
+  harmonic: (logs) => Math.log(logs.length) - logSumExp(logs.map((one) => -one)),
+  quadratic: (logs) => 0.5 * (logSumExp(logs.map((one) => 2 * one)) - Math.log(logs.length)),
+  min: (logs) => Math.min(...logs),
+};
+
+/** Share of each kernel in an average. */
+const SHARES = {
+  arithmetic: softmax,
+  geometric: (logs) => logs.map(() => 1 / logs.length),
+  harmonic: (logs) => softmax(logs.map((one) => -one)),
+  quadratic: (logs) => softmax(logs.map((one) => 2 * one)),
+  min: (logs) => logs.map((one) => (one === Math.min(...logs) ? 1 : 0)),
+};
+
+/**
+ * @typedef {Object} Known what is known of the classes
+ * @property {Object} header
+ * @property {Object} arrays
+ * @property {import("./distances.js").Stored} stored
+ *
+ * @typedef {Object} Answer
+ * @property {string|null} label null: unknown
+ * @property {number} confidence
+ * @property {number} pKnown
+ * @property {Object<string, number>} pValues
+ * @property {string} rule class, pooled or guess
+ * @property {boolean} calibrated
+ * @property {string[]} ranked
+ * @property {{index: number, similarity: number}[]} nearest
+ * @property {Object<string, number>} responsibilities
+ */
+
+/**
+ * The stored movements, described by their smooth paths.
+ * @param {import("./arrays.js").Snapshot} snapshot
+ * @returns {Known}
+ */
+export function knownClasses({ header, arrays }) {
+  const how = header.comparison;
+  const d = how.n_dims;
+  const m = header.n_movements;
+  const rows = how.by_rows.map((one) => new Float32Array(m * d * one.n_points));
+  const squares = how.by_rows.map(() => new Float64Array(m));
+  const shapes = how.shapes ? roomForShapes(m, d, how.shapes) : null;
+  for (let i = 0; i < m; i++) {
+    const path = Float64Array.from(arrays.paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS));
+    const start = arrays.starts.subarray(i * d, (i + 1) * d);
+    const placed = how.translation ? path : path.map((x, j) => x + start[Math.floor(j / N_POINTS)]);
+    featureRows(placed, how, arrays).forEach((row, r) => {
+      rows[r].set(row, i * row.length);
+      squares[r][i] = row.reduce((sum, x) => sum + x * x, 0);
+    });
+    if (shapes) {
+      const size = d * how.by_rows[how.rotating].n_points;
+      fillShapes(rows[how.rotating].subarray(i * size, (i + 1) * size), d, shapes, i);
+    }
+  }
+  return { header, arrays, stored: { m, rows, squares, shapes } };
+}
+
+/**
+ * Logarithms of each representation's kernel times R times its weight: R rows of m numbers.
+ * @param {Object} how
+ * @param {Float64Array} squares
+ */
+export function kernelLogs(how, squares) {
+  const { widths, weights } = how;
+  const m = squares.length / widths.length;
+  const equal = weights.every((one) => one === weights[0]);
+  return squares.map((square, k) => {
+    const r = Math.floor(k / m);
+    const log = widths[r] === null ? 0 : -square / (2 * widths[r] ** 2);
+    return equal ? log : log + Math.log(widths.length * weights[r]);
+  });
+}
+
+/** The averages of R logarithms, for each of m movements. @returns {Float64Array} */
+export function logAverages(how, logs) {
+  const R = how.widths.length;
+  const m = logs.length / R;
+  const one = new Float64Array(R);
+  return Float64Array.from({ length: m }, (_, j) => {
+    for (let r = 0; r < R; r++) one[r] = logs[r * m + j];
+    return MEANS[how.mean](one);
+  });
+}
+
+/** The largest of each class's numbers. */
+function largest(values, first) {
+  return Float64Array.from(first, (start, c) => {
+    let most = -Infinity;
+    for (let j = start; j < (first[c + 1] ?? values.length); j++) most = Math.max(most, values[j]);
+    return most;
+  });
+}
+
+/**
+ * How a movement compares with every class.
+ * @param {Known} known
+ * @param {Object} described
+ */
+export function compare(known, described) {
+  const { comparison: how, first, classifier, medoids } = known.header;
+  const logs = kernelLogs(how, squaredDistances(how, described, known.stored));
+  const m = known.stored.m;
+  const average = logAverages(how, logs);
+  const nearest = largest(average, first);
+  let scores = nearest;
+  let similar = nearest; // what odds are told by
+  if (classifier === "nearest-each") {
+    const each = how.widths.map((_, r) => largest(logs.subarray(r * m, (r + 1) * m), first));
+    scores = similar = Float64Array.from(first, (_, c) => MEANS[how.mean](Float64Array.from(each, (one) => one[c])));
+  } else if (classifier === "prototype") {
+    scores = Float64Array.from(medoids, (j) => average[j]);
+  }
+  return { logs, average, nearest, scores, similar };
+}
+
+/** `sqrt(-2 log K)`: the distance, in kernel widths, of an averaged similarity. */
+const distance = (log) => (log < -NO_DISTANCE ? Math.sqrt(-2 * log) : 0);
+
+/** Share of distances above a score, broad: normal vectors in the plane. */
+const broadLaw = (score) => Math.exp(-0.25 * Math.PI * score * score);
+
+/** The same of normal vectors in eight dimensions. */
+function law(score) {
+  const y = 0.5 * (MEAN_IN_EIGHT * score) ** 2;
+  return Math.exp(-y) * (1 + y + (y * y) / 2 + (y * y * y) / 6);
+}
+
+/** `(1 + #{calibrating >= score}) / (number + 1)`, of rising numbers. */
+function shareAbove(calibrating, score) {
+  let below = 0;
+  for (let end = calibrating.length; below < end; ) {
+    const middle = (below + end) >> 1;
+    if (calibrating[middle] < score) below = middle + 1;
+    else end = middle;
+  }
+  return (1 + calibrating.length - below) / (calibrating.length + 1);
+}
+
+/** The rule and the rising scores that count for a class: its own if they suffice, else those of all, else none. */
+function counted(known, kind, c, errorRate) {
+  const { arrays, header } = known;
+  const part = (name, i) => arrays[name].subarray(arrays[`${name} ends`][i - 1] ?? 0, arrays[`${name} ends`][i]);
+  const enough = (scores) => (scores.length + 1) * errorRate > 1 - 1e-12;
+  const own = part(`own ${kind}`, c);
+  const pooled = part(`pooled ${kind}`, header.calibration.pooled[c]);
+  if (enough(own)) return { rule: "class", scores: own, pooled };
+  return enough(pooled) ? { rule: "pooled", scores: pooled, pooled } : { rule: "guess", scores: null, pooled };
+}
+
+/**
+ * P-values of each class and of all together, see kineme.recognition.conformal.
+ * @param {Known} known
+ * @param {Float64Array} nearest log similarity to the nearest movement of each class
+ * @param {number} errorRate
+ */
+export function pValues(known, nearest, errorRate) {
+  const scores = nearest.map((log, c) => distance(log) / known.arrays.scales[c]);
+  const found = Array.from(scores, (_, c) => counted(known, "scores", c, errorRate));
+  const each = scores.map((score, c) => (found[c].scores ? shareAbove(found[c].scores, score) : broadLaw(score)));
+  const like = scores.reduce((best, score, c) => (score < scores[best] ? c : best), 0);
+  const all = counted(known, "novelties", like, errorRate);
+  const mean = all.pooled.reduce((sum, one) => sum + one, 0) / all.pooled.length;
+  const guess = all.pooled.length ? law(scores[like] / Math.max(mean, LEAST)) : broadLaw(scores[like]);
+  return {
+    each,
+    known: all.scores ? shareAbove(all.scores, scores[like]) : guess,
+    rule: all.rule,
+    calibrated: found.every((one) => one.scores !== null),
+  };
+}
+
+/** Probability of each class for movements of one of them: the odds are ratios of distances to the power of 15. */
+function probabilities(similar) {
+  return softmax(similar.map((log) => -EXPONENT * Math.log(Math.max(distance(log), LEAST))));
+}
+
+/**
+ * The answer to a movement.
+ * @param {Known} known
+ * @param {import("./preparation.js").Movement} one
+ * @param {number} [errorRate] share of known movements that may be called unknown
+ * @returns {Answer}
+ */
+export function recognize(known, one, errorRate = 0.05) {
+  const { comparison: how, classes, first } = known.header;
+  const compared = compare(known, describeMovement(one, how, known.arrays));
+  const p = pValues(known, compared.nearest, errorRate);
+  const possible = p.each.some((share) => share > errorRate);
+  const chosen = argmax(compared.scores.map((score, c) => (!possible || p.each[c] > errorRate ? score : -Infinity)));
+  const isKnown = p.known > errorRate;
+  const ranked = descending(compared.scores);
+  const shown = isKnown ? chosen : ranked[0];
+  const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
+  const nearest = descending(own).slice(0, SHOWN)
+    .map((j) => ({ index: first[shown] + j, similarity: Math.exp(own[j]) }));
+  const m = known.stored.m;
+  const shares = SHARES[how.mean](Float64Array.from(how.widths, (_, r) => compared.logs[r * m + nearest[0].index]));
+  const responsibilities = {};
+  how.names.forEach((name, r) => (responsibilities[name] = (responsibilities[name] ?? 0) + shares[r]));
+  return {
+    label: isKnown ? classes[chosen] : null,
+    confidence: isKnown ? probabilities(compared.similar)[shown] : 1 - p.known,
+    pKnown: p.known,
+    pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
+    rule: p.rule,
+    calibrated: p.calibrated,
+    ranked: ranked.map((c) => classes[c]),
+    nearest,
+    responsibilities,
+  };
+}

@@ -1,0 +1,155 @@
+"""Who may ask: the right token, from this page or a program, under a name that is this machine's.
+
+A web page of anybody may send requests to a server on this machine. It cannot know the token; nor can it use the cookie
+of the studio's own page: browsers name the page that asks in ``Origin``, and a name that was pointed at this machine to
+make its page this one, in ``Host``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import ipaddress
+import socket
+from collections.abc import Mapping
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from kineme.studio.server.refusals import refuse
+
+_READING = frozenset({"GET", "HEAD", "OPTIONS"})
+_FRAMED = "/arm.html"  # the only page that the studio's page shows inside itself
+
+
+class Guard:
+    """Check every request and every websocket, and say with every answer what browsers may do with it.
+
+    Parameters
+    ----------
+    app : ASGI application
+    token : str
+    hosts : sequence of str
+        Names beside those of the loopback under which the server may be asked, from `--host`; with one, any address.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, hosts: tuple[str, ...] = ()) -> None:
+        self.app, self.token = app, token
+        self.names = {"localhost", "127.0.0.1", "::1", *map(str.lower, hosts)}
+        self.any_address = bool(hosts)
+        self.cookie = "kineme_" + hashlib.sha256(token.encode()).hexdigest()[:12]  # two studios on one machine
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what may be asked."""
+        if scope["type"] not in {"http", "websocket"}:
+            await self.app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        guarded = _with_headers(send, scope, headers.get("host", ""))
+        if refusal := self._refusal(scope, headers):
+            await refuse(scope, guarded, *refusal)
+        elif self._opens(scope):
+            await self._set_cookie(guarded)
+        else:
+            await self.app(scope, receive, guarded)
+
+    def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> tuple[int, str] | None:
+        host = headers.get("host", "")
+        if not self._is_ours(host):
+            return 403, f"expected the address that kineme studio printed, got {host[:80]!r}; open that one"
+        if not _same_origin(scope, headers):
+            return 403, "expected a request of the studio's own page or of a program, got one of another page"
+        if not self._knows_token(scope, headers):
+            return 401, "expected the token: open the address that kineme studio printed, with ?token=..."
+        return None
+
+    def _is_ours(self, host: str) -> bool:
+        try:
+            name = (urlsplit(f"//{host}").hostname or "").lower()
+        except ValueError:
+            return False
+        return name in self.names or (self.any_address and _is_address(name))
+
+    def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
+        kind, _, bearer = headers.get("authorization", "").partition(" ")
+        told = [bearer.strip()] if kind.lower() == "bearer" else []
+        told += [_cookies(headers.get("cookie", "")).get(self.cookie, "")]
+        if scope["type"] == "websocket" or scope["path"] == "/":
+            told += _query(scope).get("token", [])
+        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in told)
+
+    def _opens(self, scope: Scope) -> bool:
+        return scope["type"] == "http" and scope["path"] == "/" and "token" in _query(scope)
+
+    async def _set_cookie(self, send: Send) -> None:
+        cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+        headers = [(b"location", b"/"), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
+        await send({"type": "http.response.start", "status": 303, "headers": headers})
+        await send({"type": "http.response.body", "body": b""})
+
+
+def own_names(host: str) -> tuple[str, ...]:
+    """Names under which others may reach this machine, where it listens on `host`."""
+    name = socket.gethostname()
+    return host, name, f"{name}.local", socket.getfqdn()
+
+
+def _is_address(name: str) -> bool:
+    """Whether a host is an address, which nobody can point elsewhere."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _same_origin(scope: Scope, headers: Mapping[str, str]) -> bool:
+    """Whether a request is of no page or of our own."""
+    origin = headers.get("origin")
+    if origin is not None:
+        scheme, _, host = origin.partition("://")
+        return scheme in {"http", "https"} and host.lower() == headers.get("host", "").lower()
+    if scope["type"] == "http" and scope["method"] in _READING:
+        return True
+    return headers.get("sec-fetch-site", "none") in {"same-origin", "none"}
+
+
+def _cookies(text: str) -> dict[str, str]:
+    pairs = (part.partition("=") for part in text.split(";"))
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _query(scope: Scope) -> dict[str, list[str]]:
+    return parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=20)
+
+
+def _with_headers(send: Send, scope: Scope, host: str) -> Send:
+    added = _headers(scope, host)
+
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            own = {name.lower() for name, _ in message["headers"]}
+            message = {**message, "headers": [*message["headers"], *(one for one in added if one[0] not in own)]}
+        await send(message)
+
+    return guarded
+
+
+def _headers(scope: Scope, host: str) -> list[tuple[bytes, bytes]]:
+    """What browsers are told: scripts, styles and requests of this server alone, and no page around it."""
+    framed = scope["path"] == _FRAMED
+    socket_of = f"ws://{host} wss://{host}" if all(mark.isalnum() or mark in ".-:[]" for mark in host) else ""
+    policy = (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
+        f"connect-src 'self' {socket_of}; frame-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; "
+        f"frame-ancestors {chr(39)}{'self' if framed else 'none'}{chr(39)}"
+    )
+    return [
+        (b"content-security-policy", policy.encode("latin-1")),
+        (b"x-content-type-options", b"nosniff"),
+        (b"x-frame-options", b"SAMEORIGIN" if framed else b"DENY"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"cross-origin-opener-policy", b"same-origin"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+        (b"cache-control", b"no-store" if scope["path"].startswith("/api/") else b"no-cache"),
+    ]

@@ -1,0 +1,159 @@
+"""The library as it is: symbols, movements, the map, the history."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter, Query
+
+from kineme.anchoring.figures.symbol_map import classical_scaling
+from kineme.anchoring.grounding.space import conceptual_space
+from kineme.files.write_movement import WRITERS
+from kineme.library.recognition.members import described
+from kineme.library.storage import read
+from kineme.library.storage.undo import can_undo
+from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.sampling import evenly_spaced
+from kineme.studio.server.plain import numbers, thumbnail
+from kineme.studio.server.records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
+from kineme.studio.server.studio import Reads, Studio
+
+router = APIRouter(prefix="/api/library", tags=["library"])
+
+_ON_MAP = 600  # movements; their distances take 0.3 s
+_VERSIONS = 200  # of the history
+
+
+@router.get("", response_model=LibraryOut, summary="What the library holds")
+def library(studio: Reads) -> dict[str, Any]:
+    """Symbols with the path of their prototype, and how many movements have none."""
+    return studio.kept("library", lambda: _library(studio))
+
+
+@router.get("/movements", response_model=MovementsOut, summary="Movements, some at a time")
+def movements(
+    studio: Reads,
+    symbol: str | None = None,
+    unlabeled: bool = False,
+    offset: int = Query(0, ge=0),
+    limit: int = Query(60, ge=1, le=500),
+) -> dict[str, Any]:
+    """Those of a symbol, those without one, or all; in the order in which they were learned."""
+    if symbol is not None:
+        ids = studio.symbol(symbol).members
+    else:
+        ids = studio.library.unlabeled() if unlabeled else studio.library.ids()
+    return {"total": len(ids), "movements": _listed(studio, ids[offset : offset + limit])}
+
+
+@router.get("/movements/{key}", response_model=RecordingOut, summary="One whole movement")
+def movement(studio: Reads, key: int) -> dict[str, Any]:
+    """Its times [s] and positions as they were recorded."""
+    studio.check_movements([key])
+    one = studio.library.movements(ids=[key])[0]
+    symbol = studio.shown().symbol_of.get(key)
+    return {
+        "id": key,
+        "name": one.name,
+        "symbol": symbol,
+        "times": numbers(one.times),
+        "positions": numbers(one.positions),
+    }
+
+
+@router.get("/map", response_model=MapOut, summary="Movements in the plane, alike ones near each other")
+def movement_map(studio: Reads) -> dict[str, Any]:
+    """Classical scaling of their distances, of at most 600 movements, equally many of each symbol."""
+    return studio.kept("map", lambda: _map(studio))
+
+
+@router.get("/history", response_model=HistoryOut, summary="What was changed, the last change first")
+def history(studio: Reads) -> dict[str, Any]:
+    """The last 200 versions."""
+    every = studio.library.history()
+    return {
+        "total": len(every),
+        "versions": [
+            {"number": one.id, "time": one.at, "what": one.action, "detail": _short(dict(one.detail))}
+            for one in every[: -_VERSIONS - 1 : -1]
+        ],
+    }
+
+
+def _library(studio: Studio) -> dict[str, Any]:
+    library, shown = studio.library, studio.shown()
+    symbols = sorted(shown.symbols.values(), key=lambda one: one.name)
+    typical = [one.prototype or (int(one.members[0]) if len(one) else None) for one in symbols]
+    drawn = {one["id"]: one for one in _listed(studio, np.array([key for key in typical if key], dtype=np.int64))}
+    channels = library.channels
+    return {
+        "folder": str(library.folder),
+        "version": shown.version,
+        "n_movements": len(library),
+        "n_dims": library.n_dims,
+        "channels": None if channels is None else [one._asdict() for one in channels],
+        "read_only": studio.read_only,
+        "can_undo": can_undo(library.store),
+        "unlabeled": len(library) - len(shown.symbol_of),
+        "formats": list(WRITERS),
+        "formulations": list(FORMULATIONS),
+        "symbols": [
+            {
+                "id": one.id,
+                "name": one.name,
+                "description": one.description,
+                "n_members": len(one),
+                "prototype": one.prototype,
+                "path": drawn[key]["path"] if key else None,
+                "duration": drawn[key]["duration"] if key else None,
+            }
+            for one, key in zip(symbols, typical, strict=True)
+        ],
+    }
+
+
+def _listed(studio: Studio, ids: read.Ids) -> list[dict[str, Any]]:
+    """Movements with thumbnails."""
+    if not len(ids):
+        return []
+    store, symbol_of = studio.library.store, studio.shown().symbol_of
+    people = read.groups(store, ids)
+    return [
+        {
+            "id": key,
+            "name": one.name,
+            "symbol": symbol_of.get(key),
+            "group": person,
+            "duration": float(one.duration),
+            "path": thumbnail(one.positions),
+        }
+        for key, one, person in zip(ids.tolist(), read.movements(store, ids), people, strict=True)
+    ]
+
+
+def _map(studio: Studio) -> dict[str, Any]:
+    shown = studio.shown()
+    groups = [one.members for one in shown.symbols.values() if len(one)]
+    if len(rest := studio.library.unlabeled()):
+        groups.append(rest)
+    if not groups:
+        return {"points": []}
+    share = max(1, _ON_MAP // len(groups))
+    ids = np.concatenate([one[evenly_spaced(len(one), share)] for one in groups])[:2000]
+    like = studio.library.specification.comparison
+    space = conceptual_space(tuple(ids.tolist()), described(studio.library.store, ids), like)
+    where = classical_scaling(space.distances)[0]
+    return {
+        "points": [
+            {"id": key, "symbol": shown.symbol_of.get(key), "x": x, "y": y}
+            for key, (x, y) in zip(ids.tolist(), where.tolist(), strict=True)
+        ]
+    }
+
+
+def _short(detail: dict[str, Any]) -> dict[str, Any]:
+    """What a change says of itself; long lists by their length."""
+    return {
+        name: len(value) if isinstance(value, list) and len(value) > 20 else value for name, value in detail.items()
+    }

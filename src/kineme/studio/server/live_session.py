@@ -1,0 +1,93 @@
+"""One client that sends a movement while it is under way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import KinemeError, TrajectoryError
+from kineme.recognition.early.stream import Live
+from kineme.studio.server.plain import plain_answer, plain_state
+from kineme.studio.server.studio import Studio
+from kineme.validation import LARGEST, Array
+
+MOST_SAMPLES = 10_000  # in one message
+_EMPTY: dict[str, Any] = {
+    "ranked": [],
+    "unknown": None,
+    "decided": None,
+    "progress": None,
+    "arrival": None,
+    "path": [],
+    "skipped": 0,
+    "status": [],
+}
+
+
+class LiveSession:
+    """The stream of one client; made anew for the next movement if the library has changed."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio = studio
+        self._stream: Live | None = None
+        self._version, self._begun = -1, False
+
+    def reset(self) -> None:
+        """Forget the movement."""
+        if self._stream is not None:
+            self._stream.reset()
+        self._begun = False
+
+    def update(self, samples: Array) -> dict[str, Any]:
+        """Take in samples (k, 1 + d): the state of the movement."""
+        if not self._begun:
+            self._begin()
+        if self._stream is None:
+            return _EMPTY
+        return plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+
+    def finish(self) -> dict[str, Any] | None:
+        """The answer to the whole movement; None if nothing recognizes it."""
+        stream, begun = self._stream, self._begun
+        self._begun = False
+        if stream is None or not begun:
+            return None
+        try:
+            return plain_answer(stream.finish())
+        finally:
+            stream.reset()
+
+    def _begin(self) -> None:
+        version = self.studio.library.version
+        if version != self._version:
+            try:
+                self._stream = self.studio.library.stream()
+            except KinemeError:  # no symbols to recognize, or one movement
+                self._stream = None
+            self._version = version
+        self._begun = True
+
+
+def parsed_samples(given: Any) -> Array:
+    """Samples of a message: rows of a time stamp and positions.
+
+    Raises
+    ------
+    TrajectoryError
+        Anything else.
+    """
+    words = f"samples as [[t, x, y, ...], ...], at most {MOST_SAMPLES:,} rows of equally many finite numbers"
+    if not isinstance(given, list) or not 0 < len(given) <= MOST_SAMPLES or not all(map(_is_row, given)):
+        raise TrajectoryError(f"expected {words}; got something else")
+    if len({len(row) for row in given}) > 1:
+        raise TrajectoryError(f"expected {words}; got rows of different lengths")
+    return np.array(given, dtype=np.float64)
+
+
+def _is_row(row: Any) -> bool:
+    return isinstance(row, list) and 1 < len(row) <= 1000 and all(map(_is_number, row))
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in {int, float} and abs(value) <= LARGEST  # of NaN this is false

@@ -1,0 +1,127 @@
+"""The websocket: samples in, what the movement is out, and word of every change of the library."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+
+from kineme.errors import KinemeError, TrajectoryError
+from kineme.studio.server.changes import Changes
+from kineme.studio.server.live_session import LiveSession, parsed_samples
+from kineme.studio.server.studio import Studio
+from kineme.validation import Array
+
+router = APIRouter()
+
+_WAITING = 64  # messages of one client that wait; it is not read on before
+_WORDS = '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true} or {"watch": true}'
+
+
+@router.websocket("/api/live")
+async def live(socket: WebSocket) -> None:
+    """Recognize a movement while its samples arrive, and tell of changes."""
+    studio: Studio = socket.app.state.studio
+    changes: Changes = socket.app.state.changes
+    await socket.accept()
+    client = _Client(socket, studio)
+    changes.listen(client.tell_of)
+    reading = asyncio.create_task(client.read())
+    try:
+        with suppress(WebSocketDisconnect, RuntimeError):  # gone while it was answered
+            await client.answer_all()
+    finally:
+        changes.leave(client.tell_of)
+        reading.cancel()
+
+
+class _Told(NamedTuple):
+    """What a client sent: samples, a command, or what was wrong with it; `_END` at the end."""
+
+    samples: Array | None = None
+    command: str | None = None
+    wrong: str | None = None
+
+
+_END = _Told()
+
+
+class _Client:
+    """One websocket, with a task that reads and one that answers."""
+
+    def __init__(self, socket: WebSocket, studio: Studio) -> None:
+        self.socket, self.studio, self.session = socket, studio, LiveSession(studio)
+        self._waiting: asyncio.Queue[_Told] = asyncio.Queue(_WAITING)
+        self._held: _Told | None = None
+        self._turn = asyncio.Lock()
+
+    async def tell_of(self, version: int) -> None:
+        """Send the version that the library has now."""
+        with suppress(WebSocketDisconnect, RuntimeError):
+            await self._send({"changed": version})
+
+    async def read(self) -> None:
+        """Queue what arrives, and an empty one at the end."""
+        while True:
+            message = await self.socket.receive()
+            if message["type"] == "websocket.disconnect":
+                await self._waiting.put(_END)
+                return
+            await self._waiting.put(_parsed(message))
+
+    async def answer_all(self) -> None:
+        """Answer to one message after the other, until the client goes."""
+        while (told := await self._next()) is not _END:
+            try:
+                answer = await self._answer(told)
+            except KinemeError as error:
+                answer = {"error": str(error)}
+            if answer is not None:
+                await self._send(answer)
+
+    async def _next(self) -> _Told:
+        """The next message; samples that wait behind samples are taken in with them, and answered once."""
+        told, self._held = self._held or await self._waiting.get(), None
+        blocks = [told.samples]
+        while told.samples is not None and not self._waiting.empty():
+            following = self._waiting.get_nowait()
+            if following.samples is None or following.samples.shape[1] != told.samples.shape[1]:
+                self._held = following
+                break
+            blocks.append(following.samples)
+        return told if len(blocks) == 1 else _Told(np.concatenate([one for one in blocks if one is not None]))
+
+    async def _answer(self, told: _Told) -> dict[str, Any] | None:
+        run = asyncio.get_running_loop().run_in_executor
+        if told.samples is not None:
+            return {"state": await run(self.studio.live, self.session.update, told.samples)}
+        if told.command == "finish":
+            return {"answer": await run(self.studio.live, self.session.finish)}
+        if told.command == "reset":
+            self.session.reset()
+        return None if told.wrong is None else {"error": told.wrong}
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        text = json.dumps(message, allow_nan=False, ensure_ascii=False)
+        async with self._turn:  # changes are told while an answer is sent
+            await self.socket.send_text(text)
+
+
+def _parsed(message: Any) -> _Told:
+    try:
+        told = json.loads(message.get("text") or "")
+    except (ValueError, RecursionError):
+        return _Told(wrong=f"expected JSON: {_WORDS}; got something else")
+    if isinstance(told, dict) and "samples" in told:
+        try:
+            return _Told(samples=parsed_samples(told["samples"]))
+        except TrajectoryError as error:
+            return _Told(wrong=str(error))
+    for command in ("finish", "reset", "watch"):
+        if isinstance(told, dict) and told.get(command) is True:
+            return _Told(command=command)
+    return _Told(wrong=f"expected {_WORDS}; got something else")

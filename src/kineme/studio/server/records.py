@@ -1,0 +1,218 @@
+"""What requests hold and what is answered, as the description of the interface shows them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Name = Annotated[str, Field(min_length=1, max_length=10_000)]
+Ids = Annotated[list[int], Field(min_length=1, max_length=1_000_000)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]
+Points = list[list[float | None]]
+
+
+class _Request(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Change(_Request):
+    version: int | None = Field(None, description="The version that the client has seen; 409 if what is named is gone.")
+
+
+class NewMovement(_Change):
+    """A movement to be stored."""
+
+    times: Point
+    positions: list[Point]
+    label: Name | None = Field(None, description="Name of its symbol, which is made if needed.")
+    group: Name | None = Field(None, description="Who showed it.")
+
+
+class Rename(_Change):
+    """A new name of a symbol."""
+
+    name: Name
+
+
+class Describe(_Change):
+    """A description of a symbol."""
+
+    text: str = Field(max_length=1_000_000)
+
+
+class Split(_Change):
+    """Members of a symbol that become a new one."""
+
+    ids: Ids
+    name: Name
+
+
+class Merge(_Change):
+    """Symbols that become one."""
+
+    ids: list[str] = Field(min_length=1, max_length=10_000)
+    into: Name
+
+
+class Assign(_Change):
+    """Movements, and the symbol that they belong to from now on; none if null."""
+
+    ids: Ids
+    symbol: Name | None
+
+
+class Chosen(_Change):
+    """Movements."""
+
+    ids: Ids
+
+
+class AsOf(_Change):
+    """The version that the client has seen, if it matters."""
+
+
+class Asked(_Request):
+    """A movement to be recognized."""
+
+    times: Point
+    positions: list[Point]
+    error_rate: Number = Field(0.05, gt=0, lt=1)
+
+
+class Version(BaseModel):
+    """The version of the library after a change."""
+
+    version: int
+
+
+class Learned(Version):
+    """Ids of the movements; of one that was stored before, the id it had."""
+
+    ids: list[int]
+
+
+class ChannelOut(BaseModel):
+    """What some columns of the recordings are."""
+
+    name: str
+    kind: str
+    columns: list[str]
+    unit: str | None
+
+
+class SymbolOut(BaseModel):
+    """A symbol, with the path of its prototype or first movement, at most 64 points."""
+
+    id: str
+    name: str
+    description: str
+    n_members: int
+    prototype: int | None
+    path: Points | None
+    duration: float | None
+
+
+class LibraryOut(BaseModel):
+    """The library as it is now."""
+
+    folder: str
+    version: int
+    n_movements: int
+    n_dims: int | None
+    channels: list[ChannelOut] | None
+    read_only: bool
+    can_undo: bool
+    symbols: list[SymbolOut]
+    unlabeled: int
+    formats: list[str]
+    formulations: list[str]
+
+
+class MovementOut(BaseModel):
+    """A movement in a list: at most 64 points of its path."""
+
+    id: int
+    name: str | None
+    symbol: str | None
+    group: str | None
+    duration: float
+    path: Points
+
+
+class MovementsOut(BaseModel):
+    """Some of `total` movements."""
+
+    total: int
+    movements: list[MovementOut]
+
+
+class RecordingOut(BaseModel):
+    """A whole movement."""
+
+    id: int
+    name: str | None
+    symbol: str | None
+    times: list[float]
+    positions: Points
+
+
+class MapPoint(BaseModel):
+    """Where a movement lies among others: near those that it is like."""
+
+    id: int
+    symbol: str | None
+    x: float
+    y: float
+
+
+class MapOut(BaseModel):
+    """At most 2,000 movements in the plane."""
+
+    points: list[MapPoint]
+
+
+class VersionOut(BaseModel):
+    """One change."""
+
+    number: int
+    time: str
+    what: str
+    detail: dict[str, Any]
+
+
+class HistoryOut(BaseModel):
+    """All changes, the last one first."""
+
+    versions: list[VersionOut]
+    total: int
+
+
+class RankedOut(BaseModel):
+    """A class, and its p-value."""
+
+    name: str
+    p_value: float | None
+
+
+class NearestOut(BaseModel):
+    """A stored movement that is like the one asked for."""
+
+    id: int
+    name: str | None
+    similarity: float | None
+
+
+class AnswerOut(BaseModel):
+    """What a movement is; label null is unknown."""
+
+    label: str | None
+    confidence: float | None
+    p_known: float | None
+    p_values: dict[str, float | None]
+    ranked: list[RankedOut]
+    nearest: list[NearestOut]
+    calibrated: bool
+    rule: str
+    promise: str

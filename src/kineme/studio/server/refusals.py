@@ -1,0 +1,85 @@
+"""What is answered where a request is refused: a status and one sentence, as JSON."""
+
+from __future__ import annotations
+
+import json
+import logging
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse
+from starlette.types import Scope, Send
+
+from kineme.errors import DataError, KinemeError
+
+_LOG = logging.getLogger("kineme.studio")
+
+
+class MissingError(Exception):
+    """What is asked for is not there; 404."""
+
+
+class ConflictError(Exception):
+    """The library has changed meanwhile; 409."""
+
+
+async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
+    """Refuse a request, or a websocket before it is opened, without reading more of it."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": text[:100]})
+        return
+    body = json.dumps({"error": text}).encode()
+    headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+    if status in {408, 413}:  # the rest of the body is not read
+        headers.append((b"connection", b"close"))
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})
+
+
+def answer_errors(app: FastAPI) -> None:
+    """Answer to errors with {"error": what was expected, what came, what to do}."""
+
+    def answer(status: int, text: str) -> JSONResponse:
+        return JSONResponse({"error": text}, status)
+
+    async def refused(_: Request, error: Any) -> JSONResponse:
+        return answer(503 if isinstance(error, DataError) and "another process" in str(error) else 400, str(error))
+
+    async def missing(_: Request, error: Any) -> JSONResponse:
+        return answer(404, str(error))
+
+    async def conflict(_: Request, error: Any) -> JSONResponse:
+        return answer(409, str(error))
+
+    async def forbidden(_: Request, error: Any) -> JSONResponse:
+        return answer(403, str(error))
+
+    async def invalid(_: Request, error: Any) -> JSONResponse:
+        return answer(422, _first(error))
+
+    async def other(_: Request, error: Any) -> JSONResponse:
+        return answer(error.status_code, str(error.detail))
+
+    async def broken(request: Request, error: Any) -> JSONResponse:
+        _LOG.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        return answer(500, "the server failed at this, and goes on; what it was is in its window")
+
+    for kind, handler in (
+        (KinemeError, refused),
+        (MissingError, missing),
+        (ConflictError, conflict),
+        (PermissionError, forbidden),
+        (RequestValidationError, invalid),
+        (HTTPException, other),
+        (Exception, broken),
+    ):
+        app.add_exception_handler(kind, handler)
+
+
+def _first(error: RequestValidationError) -> str:
+    """The first thing that is wrong with a request, in one sentence."""
+    one = error.errors()[0]
+    where = ".".join(str(part) for part in one["loc"] if part not in {"body", "query", "path"})
+    return f"expected another value of {where or 'the request'}: {one['msg']}"

@@ -1,0 +1,138 @@
+"""Run the studio until it is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import ipaddress
+import logging
+import os
+import secrets
+import socket
+from collections.abc import Callable
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from kineme.errors import DataError, SpecificationError
+
+LOOPBACK = "127.0.0.1"
+PORT = 8420  # unless it is taken
+TOKEN = "KINEME_STUDIO_TOKEN"  # in the environment: one that stays when the studio is started again
+_LEAST_TOKEN = 16
+_MESSAGE = 2**20  # bytes of one message of a websocket
+_GRACE = 2.0  # seconds for what runs when it is stopped
+
+
+class Options(NamedTuple):
+    """How the studio is served; port None is 8420, or any that is free."""
+
+    folder: Path
+    host: str = LOOPBACK
+    port: int | None = None
+    read_only: bool = False
+
+
+def serve(options: Options, ready: Callable[[str], object]) -> None:
+    """Serve a library until interrupted; `ready` is called with the address once it can be opened.
+
+    Raises
+    ------
+    DataError
+        The library cannot be opened, the address is taken, or the extra `studio` is not installed.
+    SpecificationError
+        A token in the environment that is too short.
+    """
+    try:
+        import uvicorn
+
+        from kineme.studio.server.app import create_app
+    except ImportError as error:
+        raise DataError(
+            f"expected the packages of the studio ({error}); install them with: pip install 'kineme[studio]'"
+        ) from error
+    from kineme.studio.server.access import own_names
+
+    token = _token()
+    with closing(_listening(options)) as listening:
+        hosts = () if is_loopback(options.host) else own_names(options.host)
+        app = create_app(options.folder, token, read_only=options.read_only, hosts=hosts)
+        config = uvicorn.Config(
+            app,
+            log_level=logging.WARNING,
+            access_log=False,
+            ws="websockets-sansio",
+            ws_max_size=_MESSAGE,
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=1,
+        )
+        address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/?token={token}"
+        with suppress(KeyboardInterrupt):
+            _server(config, lambda: ready(address)).run(sockets=[listening])
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches a host."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _server(config: Any, ready: Callable[[], object]) -> Any:
+    """A server that tells when it serves, and ends soon when it is stopped."""
+    import uvicorn
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            ready()
+
+        async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+            try:
+                async with asyncio.timeout(_GRACE):
+                    await super().shutdown(sockets)
+            except TimeoutError:
+                os._exit(0)  # a thread that computes cannot be ended otherwise; the library loses nothing
+
+    return Server(config)
+
+
+def _token() -> str:
+    token = os.environ.get(TOKEN)
+    if token is None:
+        return secrets.token_urlsafe(24)
+    if len(token) < _LEAST_TOKEN or not token.isascii() or not token.replace("-", "").replace("_", "").isalnum():
+        raise SpecificationError(
+            f"expected {TOKEN} to be at least {_LEAST_TOKEN} letters, digits, - and _, got another one of "
+            f"{len(token)}; choose a longer one, or leave it out"
+        )
+    return token
+
+
+def _listening(options: Options) -> socket.socket:
+    """A socket that listens; on the usual port if that is free."""
+    if options.port is None:
+        with suppress(OSError):
+            return _bound(options.host, PORT)
+    try:
+        return _bound(options.host, options.port or 0)
+    except OSError as error:
+        taken = error.errno == errno.EADDRINUSE
+        remedy = "choose another --port, or leave it out" if taken else "correct --host and --port"
+        raise DataError(
+            f"expected to serve at {options.host}:{options.port or 0}, got: {error.strerror or error}; {remedy}"
+        ) from error
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family)
+
+
+def _name(host: str) -> str:
+    """How the host is written in an address that a browser on this machine opens."""
+    if host in {"0.0.0.0", "::"}:
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,132 @@
+"""What the routes share: the library, what of it is shown at a version, and threads for movements under way."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock, Thread
+from typing import Annotated, NamedTuple, TypeVar
+
+from fastapi import Depends, Request
+
+from kineme.errors import KinemeError
+from kineme.library.library import ActionLibrary
+from kineme.library.storage.symbols import Symbol
+from kineme.studio.server.refusals import ConflictError, MissingError
+
+Made = TypeVar("Made")
+
+
+class Shown(NamedTuple):
+    """The symbols of one version, by id, and the symbol's id of each member."""
+
+    version: int
+    symbols: dict[str, Symbol]
+    symbol_of: dict[int, str]
+
+
+class Studio:
+    """An open library and what its clients share; any thread may use it.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the library, which is made where there is none.
+    read_only : bool
+        Refuse every change.
+    """
+
+    def __init__(self, folder: Path, read_only: bool = False) -> None:
+        self.read_only = read_only
+        self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
+        self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
+        self._kept: dict[str, tuple[int, object]] = {}
+        self._turns: dict[str, Lock] = {}
+        self._turn = Lock()
+
+    def close(self) -> None:
+        """Close the library, once what runs has ended."""
+        self.live.shutdown(wait=False, cancel_futures=True)
+        self.library.close()
+
+    def shown(self) -> Shown:
+        """The symbols as they are now."""
+        return self.kept("shown", self._show)
+
+    def _show(self) -> Shown:
+        version, symbols = self.library.version, self.library.symbols()
+        symbol_of = {int(i): one.id for one in symbols for i in one.members}
+        return Shown(version, {one.id: one for one in symbols}, symbol_of)
+
+    def kept(self, name: str, make: Callable[[], Made]) -> Made:
+        """What was made at this version of the library, else made now; one thread makes it, others wait."""
+        with self._turn:
+            turn = self._turns.setdefault(name, Lock())
+        with turn:
+            version = self.library.version
+            if self._kept.get(name, (None, None))[0] != version:
+                self._kept[name] = version, make()
+            return self._kept[name][1]  # type: ignore[return-value]
+
+    def symbol(self, key: str, expected: int | None = None) -> Symbol:
+        """The symbol of an id.
+
+        Raises
+        ------
+        ConflictError
+            It is gone since the version that the client has seen.
+        MissingError
+            There is none.
+        """
+        shown = self.shown()
+        if key not in shown.symbols:
+            raise self._gone(f"the symbol {key!r}", expected)
+        return shown.symbols[key]
+
+    def check_movements(self, ids: list[int], expected: int | None = None) -> None:
+        """Refuse ids of movements that are not in the library, in the same way."""
+        there = set(self.kept("ids", lambda: set(self.library.ids().tolist())))
+        if lost := [one for one in ids if one not in there]:
+            raise self._gone(f"the movement {lost[0]}", expected)
+
+    def _gone(self, what: str, expected: int | None) -> ConflictError | MissingError:
+        if expected is not None and expected < self.library.version:
+            return ConflictError(f"{what} is gone: the library was changed meanwhile; look at it again")
+        return MissingError(f"expected something of this library, it does not hold {what}")
+
+    def warm_up(self) -> None:
+        """Prepare recognition for the library as it is now, beside all else: the next drawing is answered at once."""
+        Thread(target=self._prepare, name="kineme-warm-up", daemon=True).start()  # nobody waits for it at the end
+
+    def _prepare(self) -> None:
+        with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
+            self.library.stream()
+
+
+def studio_of(request: Request) -> Studio:
+    """The studio that a request is for."""
+    studio: Studio = request.app.state.studio
+    return studio
+
+
+def writable_studio_of(request: Request) -> Studio:
+    """The same for a change.
+
+    Raises
+    ------
+    PermissionError
+        The studio is open for reading only.
+    """
+    studio = studio_of(request)
+    if studio.read_only:
+        raise PermissionError(
+            "this studio shows the library for reading only; start it without --read-only to change it"
+        )
+    return studio
+
+
+Reads = Annotated[Studio, Depends(studio_of)]
+Writes = Annotated[Studio, Depends(writable_studio_of)]

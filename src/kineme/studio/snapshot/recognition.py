@@ -1,0 +1,161 @@
+"""What recognizes movements, as plain data and arrays: comparison, references, classifier and calibration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.comparison.comparison import Comparison
+from kineme.comparison.describe import N_POINTS, even_paths
+from kineme.comparison.representation import PAIR_QUANTITIES, Representation, forcing_operator, rotating
+from kineme.errors import SpecificationError
+from kineme.kernels.procrustes import Procrustes
+from kineme.kernels.shapes import Shapes
+from kineme.movements.preparation.spline import spline_matrix
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
+from kineme.recognition.conformal import Calibration
+from kineme.recognition.known_classes import KnownClasses
+from kineme.studio.snapshot.snapshot import Snapshot
+from kineme.validation import Array
+
+
+def recognition_parts(known: KnownClasses) -> Snapshot:
+    """Header and arrays of what recognizes movements.
+
+    Raises
+    ------
+    SpecificationError
+        A classifier, or a limit of rotations in space, that the runtime does not have.
+    """
+    demos = known.references.all_movements()
+    comparison, comparison_arrays = _comparison(known.comparison, known.references.described.pairs)
+    calibration, calibration_arrays = _calibration(known.calibration)
+    header = {
+        "n_movements": len(known.references),
+        "classes": [str(name) for name in known.references.classes.tolist()],
+        "first": known.references.first.tolist(),
+        "comparison": comparison,
+        "calibration": calibration,
+        **_classifier(known.classifier),
+    }
+    paths = even_paths(demos, 0, len(demos), known.comparison.cutoff)
+    arrays: dict[str, NDArray[Any]] = {
+        "paths": paths.astype(np.float32),
+        "starts": _starts(demos),
+        "durations": np.asarray(demos.durations, dtype=np.float64),
+        **comparison_arrays,
+        **calibration_arrays,
+    }
+    return Snapshot(header, arrays)
+
+
+def _starts(demos: Demonstrations) -> Array:
+    return np.asarray(demos.positions[demos.offsets[:-1]], dtype=np.float64)
+
+
+def _comparison(how: Comparison, pairs: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    representations, similarity = how.representations, how.similarity
+    by_rows = [one for one in representations if not one.in_pairs]
+    rows = []
+    arrays: dict[str, NDArray[Any]] = {}
+    for r, one in enumerate(by_rows):
+        row, more = _row_representation(one, r)
+        rows.append(row)
+        arrays |= more
+    n = len(representations)
+    weights = np.full(n, 1.0 / n) if similarity.weights is None else similarity.weights
+    header = {
+        "n_dims": how.n_dims,
+        "cutoff": how.cutoff,
+        "translation": how.normalization.translation,
+        "scale": how.normalization.scale,
+        "mean": how.mean,
+        "rule": rotation_rule(how.procrustes),
+        "by_rows": rows,
+        "by_pairs": [PAIR_QUANTITIES.index(one.quantity) for one in representations[len(by_rows) :]],
+        "rotating": rotating(representations) if pairs is not None else -1,
+        "shapes": None if pairs is None else pair_rule(pairs.shapes),
+        "widths": [float(width) if np.isfinite(width) else None for width in similarity.widths],
+        "weights": weights.tolist(),
+        "names": [one.name for one in representations],
+    }
+    return header, arrays
+
+
+def _row_representation(one: Representation, r: int) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """What is compared sample by sample: its parameters, and the matrices that describing needs."""
+    row: dict[str, Any] = {"quantity": one.quantity, "arc_share": one.arc_share, "n_points": one.n_points}
+    arrays: dict[str, NDArray[Any]] = {}
+    if one.quantity == "forcing":
+        row["operator"] = f"operator {r}"
+        arrays[row["operator"]] = forcing_operator(one, np.dtype(np.float32))
+    if one.arc_share == 0 and (N_POINTS - 1) % (one.n_points - 1):
+        row["resample"] = f"resample {r}"
+        arrays[row["resample"]] = spline_matrix(N_POINTS, one.n_points)
+    return row, arrays
+
+
+def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
+    """How movements are rotated.
+
+    Raises
+    ------
+    SpecificationError
+        By at most an angle, in space.
+    """
+    d, prior = procrustes.n_dims, procrustes.prior
+    if d == 3 and prior is None and procrustes.max_angle > 0:
+        raise SpecificationError(
+            "expected movements in space to be compared under a rotation prior, with max_angle=0 or with max_angle=pi, "
+            f"got max_angle={procrustes.max_angle:.3g}: the page has no limit in between; make a library with one of "
+            "these"
+        )
+    matrix = None if prior is None else prior.matrix(d).ravel().tolist()
+    return {"n_dims": d, "max_angle": float(procrustes.max_angle), "prior": matrix}
+
+
+def pair_rule(shapes: Shapes) -> dict[str, Any]:
+    """How segments and points are compared."""
+    elastic, cloud = shapes.elastic, shapes.cloud
+    return {
+        "n_segments": elastic.n_segments,
+        "band": elastic.band,
+        "position_weight": elastic.position_weight,
+        "turning_weight": elastic.turning_weight,
+        "n_points": cloud.n_points,
+        "cloud_turning_weight": cloud.turning_weight,
+        "line_weight": cloud.line_weight,
+    }
+
+
+def _classifier(classifier: Classifier) -> dict[str, Any]:
+    if isinstance(classifier, Prototype):
+        return {"classifier": "prototype", "medoids": classifier.medoids.tolist()}
+    for kind, name in ((NearestEach, "nearest-each"), (Nearest, "nearest")):
+        if isinstance(classifier, kind):
+            return {"classifier": name}
+    raise SpecificationError(
+        "expected the classifier to be one of auto, nearest-each, nearest and prototype, got svm, which the page does "
+        "not have; make a library with one of the others"
+    )
+
+
+def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Scores in rising order; classes that share the pooled ones name the same number."""
+    shared = [(id(a), id(b)) for a, b in zip(calibration.pooled, calibration.pooled_novelties, strict=True)]
+    numbers = {pair: k for k, pair in enumerate(dict.fromkeys(shared))}
+    first = [shared.index(pair) for pair in numbers]
+    parts = {
+        "own scores": calibration.own,
+        "own novelties": calibration.own_novelties,
+        "pooled scores": [calibration.pooled[c] for c in first],
+        "pooled novelties": [calibration.pooled_novelties[c] for c in first],
+    }
+    arrays: dict[str, NDArray[Any]] = {"scales": np.asarray(calibration.scales, dtype=np.float64)}
+    for name, several in parts.items():
+        arrays[name] = np.concatenate([np.sort(one) for one in several])
+        arrays[f"{name} ends"] = np.cumsum([len(one) for one in several]).astype(np.int32)
+    return {"pooled": [numbers[pair] for pair in shared]}, arrays

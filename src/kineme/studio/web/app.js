@@ -1,0 +1,46 @@
+// The start: what is heard from the server goes to the views.
+import { startDraw } from "./draw/view.js";
+import { startLibrary } from "./library/view.js";
+import { startMove } from "./move/view.js";
+import { byId, counted, fill, make } from "./parts/elements.js";
+import { library, onLibrary, refresh } from "./parts/library_state.js";
+import { Live } from "./parts/live.js";
+import { startShortcuts } from "./parts/shortcuts.js";
+import { say, tried } from "./parts/toasts.js";
+import { startViews } from "./parts/views.js";
+import { startRecordings } from "./recordings/view.js";
+import { startRobot } from "./robot/view.js";
+
+/** The last part of a folder's path. @param {string} folder */
+const lastPart = (folder) => folder.replace(/[/\\]+$/, "").split(/[/\\]/).pop() || folder;
+
+onLibrary((known) => {
+  byId("library-name").textContent = lastPart(known.folder);
+  byId("library-name").title = known.folder;
+  byId("library-count").textContent = `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}${known.read_only ? ", read only" : ""}`;
+  byId("undo").disabled = !known.can_undo || known.read_only;
+  document.body.classList.toggle("read-only", known.read_only);
+  fill(byId("names"), ...known.symbols.map((/** @type {any} */ one) => make("option", { value: one.name })));
+});
+
+/** @param {boolean} here */
+function connected(here) {
+  byId("status").dataset.state = here ? "here" : "away";
+  byId("away-note").hidden = here;
+}
+
+const draw = startDraw((message) => live.send(message));
+const live = new Live({
+  state: draw.state,
+  answer: draw.answer,
+  error: (text) => draw.error(text) || say(text, { failed: true }),
+  changed: (version) => version !== library().version && tried(refresh),
+  here: () => (connected(true), draw.renewed(), tried(refresh)),
+  away: () => connected(false),
+});
+startLibrary();
+startMove();
+startRecordings();
+startRobot();
+startShortcuts();
+startViews();

@@ -1,0 +1,59 @@
+// The drawing on its canvas: ink, the predicted rest, the arrival, the pen of the keyboard.
+import { Board, color } from "../parts/canvas.js";
+import { line, mark } from "../parts/lines.js";
+
+const FINGER = 10; // radius of the replayed point [px]
+
+export class Picture {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.ink = [];
+    this.rest = [];
+    this.pen = null;
+    this.replayed = null;
+    this.board = new Board(canvas, () => this.paint());
+  }
+
+  /** @param {number[]} sample Of [t, x, y] or [x, y], the last two. */
+  pixel(sample) {
+    const [x, y] = sample.slice(-2);
+    return [x * this.board.height, (1 - y) * this.board.height];
+  }
+
+  paint() {
+    const { context } = this.board;
+    const ink = this.ink.map((one) => this.pixel(one));
+    const rest = this.rest.map(([x, y]) => this.pixel([x, y]));
+    if (rest.length && ink.length) line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
+    line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });
+    if (ink.length) mark(context, ink[0], "dot", 6, color("--ink"));
+    if (rest.length) mark(context, rest[rest.length - 1], "diamond", 8, color("--goal"));
+    if (this.replayed !== null) this.paintReplayed(ink);
+    if (this.pen) mark(context, this.pixel(this.pen), "ring", 9, color("--text"));
+  }
+
+  /** @param {number[][]} ink */
+  paintReplayed(ink) {
+    const upTo = this.ink.findIndex(([t]) => t > this.replayed);
+    const done = upTo < 0 ? ink : ink.slice(0, Math.max(upTo, 1));
+    line(this.board.context, done, { color: color("--ink"), width: 5 });
+    mark(this.board.context, done[done.length - 1], "dot", FINGER, color("--predicted"));
+  }
+
+  /** Show the drawing again, as fast as it was. @param {() => void} ended */
+  replay(ended) {
+    const began = performance.now();
+    const duration = this.ink[this.ink.length - 1][0];
+    const step = (/** @type {number} */ now) => {
+      if (this.replayed === null) return;
+      this.replayed = (now - began) / 1000;
+      if (this.replayed > duration) {
+        this.replayed = null;
+        ended();
+      } else requestAnimationFrame(step);
+      this.board.now();
+    };
+    this.replayed = 0;
+    requestAnimationFrame(step);
+  }
+}

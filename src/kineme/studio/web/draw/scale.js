@@ -1,0 +1,15 @@
+// How large a drawing is: the canvas is as high as a movement of the library, in round numbers.
+import { library } from "../parts/library_state.js";
+
+const USUAL = 0.55; // of the canvas's height, what people draw
+
+/** The larger side of a path. @param {number[][]} path */
+const side = (path) => Math.max(...[0, 1].map((k) => Math.max(...path.map((point) => point[k] ?? 0)) - Math.min(...path.map((point) => point[k] ?? 0))));
+
+/** @returns {number} Height of the canvas in the units of the library: a power of ten, so that it stays as the library grows. */
+export function canvasHeight() {
+  const sides = library().symbols.filter((/** @type {any} */ one) => one.path?.length).map((/** @type {any} */ one) => side(one.path)).filter((/** @type {number} */ size) => size > 0);
+  if (!sides.length) return 1;
+  const middle = sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1];
+  return 10 ** Math.round(Math.log10(middle / USUAL));
+}

@@ -1,0 +1,51 @@
+// From a mouse, a pen or a finger to samples with the times at which they happened.
+
+/** @typedef {number[]} Sample [time in s, x, y]; the canvas is 1 high, y points up. */
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {{begins: (kind: string) => boolean, goes: (samples: Sample[]) => void, ends: () => void}} hear `begins` says whether one may draw.
+ */
+export function followPointer(canvas, hear) {
+  let pointer = null;
+  let last = -Infinity;
+  let first = 0;
+
+  /** @param {PointerEvent} event @returns {Sample[]} */
+  const samplesOf = (event) => {
+    const events = event.getCoalescedEvents?.() ?? [];
+    return (events.length ? events : [event]).map((one) => sampleOf(one)).filter(later);
+  };
+  /** @param {PointerEvent} event @returns {Sample} */
+  const sampleOf = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return [(event.timeStamp - first) / 1000, (event.clientX - box.left) / box.height, 1 - (event.clientY - box.top) / box.height];
+  };
+  /** @param {Sample} sample */
+  const later = (sample) => {
+    if (sample[0] <= last) return false;
+    last = sample[0];
+    return true;
+  };
+  const end = (/** @type {PointerEvent} */ event) => {
+    if (event.pointerId !== pointer) return;
+    pointer = null;
+    hear.ends();
+  };
+
+  canvas.addEventListener("pointerdown", (event) => {
+    if (pointer !== null || event.button !== 0 || !hear.begins(event.pointerType)) return;
+    pointer = event.pointerId;
+    canvas.setPointerCapture(pointer);
+    first = event.timeStamp;
+    last = -Infinity;
+    hear.goes([sampleOf(event)].filter(later));
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (event.pointerId !== pointer) return;
+    const samples = samplesOf(event);
+    if (samples.length) hear.goes(samples);
+  });
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", end);
+}

@@ -1,0 +1,204 @@
+// Draw: a movement is recognized while it is drawn, and learned from one drawing.
+import { post } from "../parts/api.js";
+import { byId } from "../parts/elements.js";
+import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+import { currentView, show } from "../parts/views.js";
+import { chooseToMove } from "../move/chosen.js";
+import { AnswerPanel } from "./answer_panel.js";
+import { followKeys } from "./keyboard_pen.js";
+import { describeLiveSource } from "./live_source.js";
+import { startNaming } from "./naming.js";
+import { Picture } from "./picture.js";
+import { canvasHeight } from "./scale.js";
+import { Sending } from "./sending.js";
+import { followPointer } from "./stroke.js";
+
+const LEAST = 4; // samples that make a movement
+
+/** Whether drawings fit the library: in the plane, or in space where all movements are plane. */
+function takesDrawings() {
+  const { n_dims: dims, symbols } = library();
+  if (dims === null || dims === 2) return true;
+  return dims === 3 && symbols.every((/** @type {any} */ one) => !one.path || one.path.every((/** @type {number[]} */ point) => Math.abs(point[2] - one.path[0][2]) < 1e-9));
+}
+
+/** @param {number[]} point Of the canvas. @param {number} height Of the canvas, in the units of the library. @returns {number[]} In the library's dimensions. */
+const inLibrary = (point, height) => [...point.map((value) => value * height), ...(library().n_dims === 3 ? [0] : [])];
+
+class Draw {
+  /** @param {(message: any) => boolean} send */
+  constructor(send) {
+    this.sending = new Sending(send);
+    this.picture = new Picture(byId("draw-canvas"));
+    this.panel = new AnswerPanel();
+    this.drawing = false;
+    this.whole = null;
+    this.kind = "";
+    this.height = 1;
+    this.label = null;
+    this.waits = false;
+    this.naming = startNaming({ drawn: () => this.whole, learned: (name) => this.learned(name) });
+    this.listen();
+  }
+
+  listen() {
+    const hear = {
+      begins: (/** @type {string} */ kind) => this.begins(kind),
+      goes: (/** @type {number[][]} */ samples) => this.goes(samples),
+      ends: () => this.ends(),
+      pen: (/** @type {number[]|null} */ at) => ((this.picture.pen = at), this.picture.board.draw()),
+    };
+    followPointer(byId("draw-canvas"), hear);
+    followKeys(byId("draw-canvas"), hear);
+    byId("draw-clear").addEventListener("click", () => this.clear());
+    byId("draw-replay").addEventListener("click", () => this.picture.replay(() => {}));
+    byId("draw-move").addEventListener("click", () => this.move());
+    document.addEventListener("keydown", (event) => event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear());
+    onLibrary(() => this.invite());
+    describeLiveSource(byId("live-source-text"));
+  }
+
+  /** What the empty canvas says. */
+  invite() {
+    const { symbols, read_only: readOnly } = library();
+    const takes = takesDrawings();
+    byId("draw-empty").hidden = this.picture.ink.length > 0;
+    byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
+    byId("draw-empty-text").textContent = !takes
+      ? "This library holds movements that a mouse cannot draw. Send samples from a program instead: see below the answer."
+      : symbols.length || readOnly
+        ? "In one stroke, with mouse, pen or finger. What it is appears while you draw."
+        : "Draw a movement in one stroke, then give it a name. One drawing is enough to be recognized again.";
+    if (!takes) byId("live-source").open = true;
+  }
+
+  /** @param {string} kind */
+  begins(kind) {
+    if (!takesDrawings()) return false;
+    this.clear();
+    this.drawing = true;
+    this.kind = kind;
+    this.sending.reset();
+    this.height = canvasHeight();
+    byId("draw-empty").hidden = true;
+    this.panel.words("Drawing", "…", "", "open");
+    return true;
+  }
+
+  /** @param {number[][]} samples */
+  goes(samples) {
+    this.picture.ink.push(...samples);
+    this.picture.board.draw();
+    if (library().symbols.length) this.sending.push(samples.map(([t, ...point]) => [t, ...inLibrary(point, this.height)]));
+  }
+
+  ends() {
+    this.drawing = false;
+    this.picture.rest = [];
+    this.picture.board.draw();
+    const { ink } = this.picture;
+    byId("draw-clear").disabled = byId("draw-replay").disabled = ink.length === 0;
+    if (ink.length < LEAST) return this.panel.words("Too short", "–", "Press, draw, and let go at the end.", "open");
+    this.whole = { times: ink.map(([t]) => t), positions: ink.map(([, ...point]) => inLibrary(point, this.height)) };
+    this.naming.allow(true);
+    if (!library().symbols.length) return this.isNew();
+    this.waits = true;
+    if (!this.sending.finish()) this.askOnce();
+  }
+
+  /** There is nothing to compare with. */
+  isNew() {
+    this.panel.words("The first of its kind", "?", "Give it a name.", "unknown");
+    this.panel.progress(1);
+    this.panel.speak("Give it a name.");
+    this.focusName();
+  }
+
+  /** Without a websocket the whole movement is asked for at once. */
+  async askOnce() {
+    const asked = this.whole;
+    const answer = await tried(() => post("/api/recognize", asked));
+    if (answer && asked === this.whole) this.show(answer);
+  }
+
+  /** @param {any} state Of the server, while drawing. */
+  state(state) {
+    if (!this.sending.heard() || !this.drawing) return;
+    const { ink, rest } = this.picture;
+    this.panel.drawing(state, ink[ink.length - 1]?.[0] ?? 0);
+    this.picture.rest = state.path?.map((/** @type {number[]} */ point) => point.map((value) => value / this.height)) ?? rest;
+    this.picture.board.draw();
+  }
+
+  /** @param {any} answer Of the websocket, to the whole movement. */
+  answer(answer) {
+    if (this.sending.answered() && this.waits) this.show(answer);
+  }
+
+  /** @param {any} answer */
+  show(answer) {
+    this.waits = false;
+    if (answer === null) return this.isNew();
+    this.panel.final(answer);
+    this.label = answer.label;
+    byId("draw-move").disabled = answer.label === null;
+    this.naming.allow(true, answer.ranked.slice(0, 3).map((/** @type {any} */ one) => one.name));
+    this.focusName();
+  }
+
+  /** @param {string} text What the server could not do. @returns {boolean} Whether it was about this drawing. */
+  error(text) {
+    const about = this.drawing || this.waits;
+    if (this.drawing) this.sending.heard();
+    if (this.waits) {
+      this.sending.answered();
+      this.waits = false;
+      this.panel.words("No answer", "?", text, "unknown");
+      this.focusName();
+    }
+    return about;
+  }
+
+  /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched. */
+  focusName() {
+    if (this.kind !== "touch" && currentView() === "draw") this.naming.focus();
+  }
+
+  /** @param {string|null} name */
+  learned(name) {
+    this.label = name;
+    this.whole = null;
+    this.naming.empty();
+    this.naming.allow(false);
+    byId("draw-move").disabled = name === null;
+    if (name !== null) this.panel.words("Learned", name, "Draw it again, anywhere and in any size.", "known");
+    byId("draw-canvas").focus({ preventScroll: true });
+  }
+
+  move() {
+    const symbol = this.label === null ? null : symbolNamed(this.label);
+    if (symbol) chooseToMove(symbol.id);
+    show("move", true);
+  }
+
+  clear() {
+    Object.assign(this.picture, { ink: [], rest: [], replayed: null });
+    this.picture.board.draw();
+    this.whole = null;
+    this.label = null;
+    this.waits = false;
+    this.drawing = false;
+    this.panel.idle();
+    this.naming.allow(false);
+    this.naming.empty();
+    for (const id of ["draw-clear", "draw-replay", "draw-move"]) byId(id).disabled = true;
+    if (isLoaded()) this.invite();
+  }
+}
+
+/** @param {(message: any) => boolean} send @returns {any} What hears the server. */
+export function startDraw(send) {
+  const draw = new Draw(send);
+  return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), renewed: () => draw.sending.renewed() };
+}

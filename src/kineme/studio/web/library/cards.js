@@ -1,0 +1,29 @@
+// The symbols as cards: a picture, a name, how many movements; a box to choose several.
+import { byId, counted, fill, make } from "../parts/elements.js";
+import { keepingFocus } from "../parts/keep_focus.js";
+import { library } from "../parts/library_state.js";
+import { thumbnail } from "../parts/thumbnails.js";
+
+/** @type {Set<string>} Ids of the symbols that are chosen to be merged. */
+export const chosen = new Set();
+
+/** @param {any} symbol @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
+function card(symbol, page) {
+  const box = make("input", { type: "checkbox", class: "choose", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
+  box.addEventListener("change", () => (box.checked ? chosen.add(symbol.id) : chosen.delete(symbol.id), page.chose()));
+  const open = make(
+    "button",
+    { class: "card-open", type: "button", "aria-current": symbol.id === page.opened ? "true" : null, "data-key": `open ${symbol.id}`, on: { click: () => page.open(symbol.id) } },
+    thumbnail(symbol.path),
+    make("span", { class: "card-name" }, symbol.name),
+    make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
+  );
+  return make("li", { class: "card" }, open, box);
+}
+
+/** @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
+export function showCards(page) {
+  const { symbols } = library();
+  for (const id of chosen) if (!symbols.some((/** @type {any} */ one) => one.id === id)) chosen.delete(id);
+  keepingFocus(() => fill(byId("cards"), ...symbols.map((/** @type {any} */ one) => card(one, page))));
+}

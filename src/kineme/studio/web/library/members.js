@@ -1,0 +1,48 @@
+// Movements as pictures that can be chosen, sixty at a time.
+import { get } from "../parts/api.js";
+import { counted, fill, make } from "../parts/elements.js";
+import { thumbnail } from "../parts/thumbnails.js";
+import { tried } from "../parts/toasts.js";
+
+const PAGE = 60;
+
+/** @param {any} movement @param {Set<number>} chosen @param {() => void} changed */
+export function memberButton(movement, chosen, changed) {
+  const about = `${movement.name ?? `Movement ${movement.id}`}, ${Number(movement.duration ?? 0).toFixed(1)} s`;
+  const button = make("button", { class: "member", type: "button", "aria-pressed": String(chosen.has(movement.id)), "aria-label": about, title: about, "data-key": `movement ${movement.id}` }, thumbnail(movement.path));
+  button.addEventListener("click", () => {
+    chosen.has(movement.id) ? chosen.delete(movement.id) : chosen.add(movement.id);
+    button.setAttribute("aria-pressed", String(chosen.has(movement.id)));
+    changed();
+  });
+  return button;
+}
+
+/** The members of a symbol, or the movements without one, with a button for more. */
+export class Members {
+  /** @param {string} query As `symbol=ID` or `unlabeled=1`. @param {() => void} changed When others are chosen. */
+  constructor(query, changed) {
+    this.query = query;
+    this.changed = changed;
+    this.chosen = new Set();
+    this.grid = make("div", { class: "members", role: "group", "aria-label": "Movements; choose some" });
+    this.more = make("button", { class: "button quiet", type: "button", hidden: true, on: { click: () => this.load() } }, "Show more");
+    this.element = make("div", { class: "members-part" }, this.grid, this.more);
+    this.shown = 0;
+    this.load();
+  }
+
+  async load() {
+    const answer = await tried(() => get(`/api/library/movements?${this.query}&offset=${this.shown}&limit=${PAGE}`));
+    if (!answer) return;
+    if (this.shown === 0) fill(this.grid);
+    this.grid.append(...answer.movements.map((/** @type {any} */ one) => memberButton(one, this.chosen, this.changed)));
+    this.shown += answer.movements.length;
+    this.more.hidden = this.shown >= answer.total;
+    this.more.textContent = `Show more of ${counted(answer.total, "movement")}`;
+  }
+
+  ids() {
+    return [...this.chosen];
+  }
+}

@@ -1,0 +1,54 @@
+// Proposals: groups of movements without a name. All or some of them get one, or they are not a symbol.
+import { get } from "../parts/api.js";
+import { accept, assign, reject } from "../parts/changes.js";
+import { byId, counted, fill, make } from "../parts/elements.js";
+import { keepingFocus } from "../parts/keep_focus.js";
+import { library } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+import { memberButton } from "./members.js";
+
+const FETCHED = 500; // movements without a name whose pictures are asked for
+const SHOWN = 12; // of one proposal
+
+/** @returns {Promise<Map<number, any>>} Movements without a name, by id. */
+async function unlabeled() {
+  const all = new Map();
+  while (all.size < Math.min(library().unlabeled, FETCHED)) {
+    const { movements } = await get(`/api/library/movements?unlabeled=1&offset=${all.size}&limit=60`);
+    if (!movements.length) break;
+    for (const one of movements) all.set(one.id, one);
+  }
+  return all;
+}
+
+/** @param {any} proposal @param {Map<number, any>} movements */
+function card(proposal, movements) {
+  const chosen = new Set();
+  const field = make("input", { type: "text", list: "names", maxlength: "200", placeholder: "Name", "aria-label": "Name of these movements", "data-key": `proposal ${proposal.medoid}` });
+  field.value = proposal.suggested ?? "";
+  const yes = make("button", { class: "button main", type: "submit" });
+  const label = () => (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
+  label();
+  const shown = [proposal.medoid, ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid)].slice(0, SHOWN);
+  const grid = make("div", { class: "members", role: "group", "aria-label": "Its movements; choose some to name those alone" }, ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)));
+  const form = make("form", { class: "naming" }, field, yes, make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "No symbol"));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const name = field.value.trim();
+    if (!name) return field.focus();
+    return chosen.size ? assign([...chosen], name) : accept(proposal.id, name);
+  });
+  return make("li", { class: "card proposal" }, make("p", { class: "soft small" }, counted(proposal.members.length, "alike movement")), grid, library().read_only ? null : form);
+}
+
+export async function showProposals() {
+  const { unlabeled: count } = library();
+  byId("proposals").hidden = count === 0;
+  if (!count) return;
+  const answer = await tried(() => get("/api/proposals"));
+  const movements = await tried(unlabeled);
+  if (!answer || !movements) return;
+  const { proposals } = answer;
+  byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${proposals.length ? `${counted(proposals.length, "group")} of them may be a symbol each.` : "They form no clear groups yet."}`;
+  keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));
+}

@@ -1,0 +1,103 @@
+// One symbol: its name, its description, its movements, and what can be done with them.
+import * as changes from "../parts/changes.js";
+import { ask } from "../parts/dialogs.js";
+import { byId, counted, fill, make } from "../parts/elements.js";
+import { library, symbolOf } from "../parts/library_state.js";
+import { thumbnail } from "../parts/thumbnails.js";
+import { show } from "../parts/views.js";
+import { chooseToMove } from "../move/chosen.js";
+import { Members } from "./members.js";
+
+const UNLABELED = "";
+
+/** @param {string} text @param {() => any} act @param {string} kind */
+const button = (text, act, kind = "") => make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, disabled: library().read_only && !["Move it"].includes(text), on: { click: act } }, text);
+
+/** @param {any} symbol */
+async function rename(symbol) {
+  const name = await ask({ title: `Rename ${symbol.name}`, yes: "Rename", name: symbol.name });
+  if (name && name !== symbol.name) await changes.rename(symbol.id, name);
+}
+
+/** @param {any} symbol */
+async function forget(symbol) {
+  const text = "Its movements stay in the library without a name. This can be undone.";
+  if (await ask({ title: `Delete ${symbol.name}?`, text, yes: "Delete", danger: true })) await changes.forget(symbol.id, symbol.name);
+}
+
+/** @param {any} symbol */
+function description(symbol) {
+  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder: "What it means, for people and planners", readOnly: library().read_only });
+  field.value = symbol.description ?? "";
+  field.addEventListener("change", () => changes.describe(symbol.id, field.value));
+  return make("label", { class: "field" }, make("span", {}, "Description"), field);
+}
+
+/** What can be done with chosen movements. @param {any} symbol Or null of those without one. @param {Members} members */
+function actions(symbol, members) {
+  const ids = () => members.ids();
+  const name = (/** @type {string} */ title) => ask({ title, text: `${counted(ids().length, "movement")} chosen. A name that exists is that symbol, another one is a new symbol.`, yes: "Give the name", name: "" });
+  const give = async () => {
+    const to = await name("Which name?");
+    if (to) await changes.assign(ids(), to);
+  };
+  const split = async () => {
+    const to = await ask({ title: `Split ${symbol.name}`, text: `${counted(ids().length, "movement")} become a symbol of their own.`, yes: "Split", name: "" });
+    if (to) await changes.split(symbol.id, ids(), to);
+  };
+  const drop = async () => {
+    if (await ask({ title: `Delete ${counted(ids().length, "movement")}?`, text: "This can be undone.", yes: "Delete", danger: true })) await changes.deleteMovements(ids());
+  };
+  const made = symbol ? [button("Split off", split), button("Give another name", give), button("Remove the name", () => changes.assign(ids(), null))] : [button("Give a name", give, "main")];
+  return [...made, button("Delete", drop, "danger")];
+}
+
+/** The side panel of a symbol, or of the movements without one. */
+export class SymbolPanel {
+  constructor() {
+    /** @type {string|null} Id; "" for the movements without a symbol. */
+    this.opened = null;
+    this.version = -1;
+  }
+
+  /** @param {string|null} id @param {boolean} focus */
+  open(id, focus = false) {
+    this.opened = id;
+    this.version = -1;
+    this.show();
+    if (focus && matchMedia("(max-width: 60rem)").matches) byId("symbol").scrollIntoView({ block: "start" });
+    if (focus) byId("symbol").focus({ preventScroll: true });
+  }
+
+  show() {
+    const panel = byId("symbol");
+    const symbol = this.opened ? symbolOf(this.opened) : null;
+    if (this.opened === null || (this.opened !== UNLABELED && !symbol) || (this.opened === UNLABELED && !library().unlabeled)) return this.hint(panel);
+    if (this.version === library().version) return;
+    this.version = library().version;
+    const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" });
+    const count = make("p", { class: "soft small", role: "status" }, "Choose movements to split, rename or delete them.");
+    const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
+      fill(bar, ...(members.ids().length ? actions(symbol, members) : []));
+      count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : "Choose movements to split, rename or delete them.";
+    });
+    fill(panel, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), count, bar, members.element);
+  }
+
+  /** @param {any} symbol */
+  head(symbol) {
+    const moveIt = () => (chooseToMove(symbol.id), show("move", true));
+    const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
+    return [
+      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, symbol.name), make("p", { class: "soft" }, facts))),
+      make("div", { class: "row" }, button("Move it", moveIt, "main"), button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")),
+      description(symbol),
+    ];
+  }
+
+  /** @param {Element} panel */
+  hint(panel) {
+    this.opened = null;
+    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, "Its movements are shown here; they can be renamed, split, moved to another symbol or deleted, and everything can be undone.")));
+  }
+}

@@ -1,0 +1,61 @@
+// Library: symbols, those that are proposed, the map, the history.
+import { get } from "../parts/api.js";
+import { merge } from "../parts/changes.js";
+import { ask } from "../parts/dialogs.js";
+import { byId, counted, fill, make } from "../parts/elements.js";
+import { library, onLibrary, symbolOf } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+import { currentView, onShow } from "../parts/views.js";
+import { chosen, showCards } from "./cards.js";
+import { MovementMap } from "./map.js";
+import { showProposals } from "./proposals.js";
+import { SymbolPanel } from "./symbol.js";
+
+let shown = -1; // version
+
+async function mergeChosen() {
+  const ids = [...chosen];
+  const names = ids.map((id) => symbolOf(id).name);
+  const into = await ask({ title: `Merge ${counted(ids.length, "symbol")}`, text: names.join(", "), yes: "Merge", name: names[0] });
+  if (!into) return;
+  chosen.clear();
+  await merge(ids, into);
+}
+
+async function showHistory() {
+  if (!byId("history").open) return;
+  const answer = await tried(() => get("/api/library/history"));
+  if (!answer) return;
+  const rows = [...answer.versions].reverse().slice(0, 200);
+  fill(byId("versions"), ...rows.map((one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
+}
+
+export function startLibrary() {
+  const panel = new SymbolPanel();
+  const map = new MovementMap((id) => open(id));
+  const chose = () => {
+    byId("chosen-count").textContent = chosen.size ? `${chosen.size} chosen` : "";
+    byId("merge").disabled = chosen.size < 2 || library().read_only;
+  };
+  const cards = () => showCards({ open, opened: panel.opened, chose });
+  function open(/** @type {string} */ id) {
+    panel.open(id, true);
+    for (const one of document.querySelectorAll(".card-open")) one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
+  }
+  const all = () => {
+    if (currentView() !== "library" || shown === library().version) return;
+    shown = library().version;
+    byId("library-empty").hidden = library().symbols.length > 0;
+    panel.show();
+    cards();
+    chose();
+    map.load();
+    showProposals();
+    showHistory();
+  };
+  byId("merge").addEventListener("click", mergeChosen);
+  byId("show-unlabeled").addEventListener("click", () => open(""));
+  byId("history").addEventListener("toggle", showHistory);
+  onShow("library", all);
+  onLibrary(all);
+}

@@ -1,0 +1,30 @@
+// What the movement shall do: where from, where to, past what, how fast.
+
+/**
+ * @typedef {{symbol: string, start: number[], goal: number[], path: number[][], usual: number, share: number,
+ *   via: {at: number, point: number[]}[], obstacles: {center: number[], radius: number}[]}} Plan
+ *   `usual` is the demonstrated duration [s]; `share` stretches it.
+ */
+
+/** The movement as it was shown. @param {any} symbol @param {any} rollout @returns {Plan} */
+export function asShown(symbol, rollout) {
+  const usual = rollout.times[rollout.times.length - 1] - rollout.times[0];
+  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: symbol.path ?? rollout.positions, usual, share: 1, via: [], obstacles: [] };
+}
+
+/** The size of the movement, for distances that fit it. @param {number[][]} path */
+export function extent(path) {
+  const spans = path[0].map((_, k) => Math.max(...path.map((point) => point[k])) - Math.min(...path.map((point) => point[k])));
+  return Math.hypot(...spans) || 1;
+}
+
+/** @param {Plan} plan @param {string} formulation @returns {any} A question to the server. */
+export function question(plan, formulation) {
+  const body = { what: { symbol: plan.symbol }, formulation, start: plan.start, goal: plan.goal, duration: plan.usual * plan.share };
+  if (plan.via.length) body.via = [...plan.via].sort((a, b) => a.at - b.at).map(({ at, point }) => [at, point]);
+  if (plan.obstacles.length) body.obstacles = plan.obstacles;
+  return body;
+}
+
+/** Whether a matrix in the page gives the path: no via points and obstacles. @param {Plan} plan */
+export const isPlain = (plan) => !plan.via.length && !plan.obstacles.length;

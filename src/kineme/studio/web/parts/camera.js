@@ -1,0 +1,55 @@
+// From coordinates to pixels: straight from above in the plane; in space orthographic, turned by dragging.
+
+const MARGIN = 0.14; // of the smaller side
+
+export class Camera {
+  constructor() {
+    this.flat = true;
+    this.around = -0.6;
+    this.above = 0.5;
+    this.scale = 1;
+    this.middle = [0, 0, 0];
+    this.size = [1, 1];
+  }
+
+  /** Directions on the screen: right and up. */
+  axes() {
+    const [a, e] = this.flat ? [0, Math.PI / 2] : [this.around, this.above];
+    const [c, s] = [Math.cos(a), Math.sin(a)];
+    return { right: [c, s, 0], up: [-s * Math.sin(e), c * Math.sin(e), Math.cos(e)] };
+  }
+
+  /** Show all of the points. @param {number[][]} points @param {number} width @param {number} height */
+  fit(points, width, height) {
+    this.size = [width, height];
+    if (!points.length || !width) return;
+    this.flat = points[0].length < 3;
+    const low = [0, 1, 2].map((k) => Math.min(...points.map((point) => point[k] ?? 0)));
+    const high = [0, 1, 2].map((k) => Math.max(...points.map((point) => point[k] ?? 0)));
+    this.middle = low.map((value, k) => (value + high[k]) / 2);
+    const room = 1 - 2 * MARGIN;
+    const spans = high.map((value, k) => value - low[k]);
+    const across = this.flat ? [spans[0], spans[1]] : [Math.hypot(...spans), Math.hypot(...spans)];
+    this.scale = Math.min((room * width) / Math.max(across[0], 1e-9), (room * height) / Math.max(across[1], 1e-9));
+  }
+
+  /** @param {number[]} point @returns {number[]} Pixels. */
+  toScreen(point) {
+    const { right, up } = this.axes();
+    const away = [0, 1, 2].map((k) => (point[k] ?? 0) - this.middle[k]);
+    const dot = (/** @type {number[]} */ axis) => axis[0] * away[0] + axis[1] * away[1] + axis[2] * away[2];
+    return [this.size[0] / 2 + this.scale * dot(right), this.size[1] / 2 - this.scale * dot(up)];
+  }
+
+  /** A point moved by pixels, in the plane of the screen. @param {number[]} point @param {number} dx @param {number} dy */
+  moved(point, dx, dy) {
+    const { right, up } = this.axes();
+    return point.map((value, k) => (k < 3 ? value + (right[k] * dx - up[k] * dy) / this.scale : value));
+  }
+
+  /** @param {number} dx Pixels. @param {number} dy */
+  turn(dx, dy) {
+    this.around -= 0.008 * dx;
+    this.above = Math.min(Math.max(this.above + 0.008 * dy, -1.5), 1.5);
+  }
+}

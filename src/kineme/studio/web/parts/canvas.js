@@ -1,0 +1,65 @@
+// A canvas as sharp as the screen, drawn once per frame and only when something changed.
+
+/** @type {Set<Board>} */
+const boards = new Set();
+
+export class Board {
+  /** @param {HTMLCanvasElement} canvas @param {(board: Board) => void} paint */
+  constructor(canvas, paint) {
+    this.canvas = canvas;
+    this.paint = paint;
+    this.context = canvas.getContext("2d");
+    this.width = 0;
+    this.height = 0;
+    this.asked = 0;
+    boards.add(this);
+    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.fit();
+  }
+
+  fit() {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!clientWidth || !clientHeight) return;
+    const sharp = Math.min(window.devicePixelRatio || 1, 3);
+    this.width = clientWidth;
+    this.height = clientHeight;
+    this.canvas.width = Math.round(clientWidth * sharp);
+    this.canvas.height = Math.round(clientHeight * sharp);
+    this.context.setTransform(sharp, 0, 0, sharp, 0, 0);
+    this.resized?.();
+    this.draw();
+  }
+
+  /** Paint in the next frame. */
+  draw() {
+    if (this.asked) return;
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0;
+      this.now();
+    });
+  }
+
+  /** Paint at once. */
+  now() {
+    if (!this.width) return;
+    this.context.clearRect(0, 0, this.width, this.height);
+    this.paint(this);
+  }
+}
+
+/** @type {Map<string, string>} */
+const colors = new Map();
+
+/** The color that a token has now. @param {string} token @returns {string} */
+export function color(token) {
+  if (!colors.has(token)) colors.set(token, getComputedStyle(document.documentElement).getPropertyValue(token).trim());
+  return /** @type {string} */ (colors.get(token));
+}
+
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  colors.clear();
+  for (const board of boards) board.draw();
+});
+
+/** Whether the person wants no movement that was not asked for. */
+export const calm = () => window.matchMedia("(prefers-reduced-motion: reduce)").matches;

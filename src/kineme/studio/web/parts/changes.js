@@ -1,0 +1,52 @@
+// Changes of the library: each is asked for, said, and can be taken back.
+import { post, remove } from "./api.js";
+import { library, refresh } from "./library_state.js";
+import { say, tried } from "./toasts.js";
+
+/** @param {() => Promise<any>} ask @param {string} done What to say then. @returns {Promise<any>} */
+async function change(ask, done) {
+  return tried(async () => {
+    const answer = await ask();
+    await refresh();
+    say(done, library().can_undo ? { act: undo, action: "Undo" } : {});
+    return answer ?? {};
+  });
+}
+
+/** Back to the state before the last change. */
+export async function undo() {
+  if (!library().can_undo || library().read_only) return;
+  await tried(async () => {
+    await post("/api/library/undo");
+    await refresh();
+    say("The last change is taken back.");
+  });
+}
+
+const of = (/** @type {string} */ id) => `/api/library/symbols/${encodeURIComponent(id)}`;
+
+/** @param {{times: number[], positions: number[][]}} drawn @param {string|null} label */
+export const learn = (drawn, label) =>
+  change(() => post("/api/library/movements", { ...drawn, label, group: null }), label === null ? "Saved without a name." : `Learned as ${label}.`);
+/** @param {string} id @param {string} name */
+export const rename = (id, name) => change(() => post(`${of(id)}/rename`, { name }), `Renamed to ${name}.`);
+/** @param {string} id @param {string} text */
+export const describe = (id, text) => change(() => post(`${of(id)}/describe`, { text }), "Description saved.");
+/** @param {string} id @param {number[]} ids @param {string} name */
+export const split = (id, ids, name) => change(() => post(`${of(id)}/split`, { ids, name }), `${name} is a symbol of its own.`);
+/** @param {string[]} ids @param {string} into */
+export const merge = (ids, into) => change(() => post("/api/library/symbols/merge", { ids, into }), `Merged into ${into}.`);
+/** @param {string} id @param {string} name */
+export const forget = (id, name) => change(() => remove(of(id)), `${name} is deleted; its movements have no name.`);
+/** @param {number[]} ids @param {string|null} symbol */
+export const assign = (ids, symbol) =>
+  change(() => post("/api/library/movements/assign", { ids, symbol }), symbol === null ? "The name is removed." : `Assigned to ${symbol}.`);
+/** @param {number[]} ids */
+export const deleteMovements = (ids) => change(() => post("/api/library/movements/delete", { ids }), ids.length === 1 ? "1 movement is deleted." : `${ids.length} movements are deleted.`);
+/** @param {string} id @param {string} name */
+export const accept = (id, name) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/accept`, { name }), `${name} is a symbol now.`);
+/** @param {string} id */
+export const reject = (id) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/reject`), "Not proposed again.");
+/** @param {string} recording @param {any} body */
+export const learnSpans = (recording, body) =>
+  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), "Learned from the recording.");

@@ -1,0 +1,58 @@
+// What the page knows of the library; views are told when it changes, whoever changed it.
+import { get } from "./api.js";
+
+const EMPTY = { folder: "", version: 0, n_movements: 0, n_dims: null, channels: null, read_only: false, can_undo: false, symbols: [], unlabeled: 0 };
+
+/** @type {any} */
+let known = EMPTY;
+let loaded = false;
+/** @type {Promise<any>|null} */
+let loading = null;
+let again = false;
+/** @type {((library: any) => void)[]} */
+const told = [];
+
+/** The library as of the last answer. */
+export const library = () => known;
+
+/** Whether an answer came at all. */
+export const isLoaded = () => loaded;
+
+/** @param {(library: any) => void} act Called after every change. */
+export const onLibrary = (act) => told.push(act);
+
+/** Ask anew; questions that come meanwhile are answered by one more. */
+export async function refresh() {
+  if (loading) {
+    again = true;
+    return loading;
+  }
+  loading = get("/api/library");
+  try {
+    known = await loading;
+    loaded = true;
+  } finally {
+    loading = null;
+  }
+  for (const act of told) act(known);
+  if (again) {
+    again = false;
+    await refresh();
+  }
+  return known;
+}
+
+/** @param {string} id @returns {any} The symbol of that id, or undefined. */
+export const symbolOf = (id) => known.symbols.find((/** @type {any} */ one) => one.id === id);
+
+/** @param {string} name @returns {any} */
+export const symbolNamed = (name) => known.symbols.find((/** @type {any} */ one) => one.name === name);
+
+const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
+
+/** The color and the mark of a symbol, by its position in the list. @param {string|null} id */
+export function lookOf(id) {
+  const at = known.symbols.findIndex((/** @type {any} */ one) => one.id === id);
+  if (at < 0) return { color: "--gray", mark: "ring" };
+  return { color: COLORS[at % COLORS.length], mark: ["dot", "square", "diamond", "triangle"][Math.floor(at / COLORS.length) % 4] };
+}

@@ -1,0 +1,42 @@
+// Lines and marks on a canvas.
+
+/**
+ * @param {CanvasRenderingContext2D} context @param {number[][]} points In pixels.
+ * @param {{color: string, width?: number, dash?: number[], alpha?: number}} options
+ */
+export function line(context, points, { color, width = 3, dash = [], alpha = 1 }) {
+  if (points.length < 2) return;
+  context.save();
+  Object.assign(context, { strokeStyle: color, lineWidth: width, lineCap: "round", lineJoin: "round", globalAlpha: alpha });
+  context.setLineDash(dash);
+  context.beginPath();
+  context.moveTo(points[0][0], points[0][1]);
+  for (let i = 1; i < points.length; i += 1) context.lineTo(points[i][0], points[i][1]);
+  context.stroke();
+  context.restore();
+}
+
+/** @type {Record<string, (context: CanvasRenderingContext2D, r: number) => void>} */
+const MARKS = {
+  dot: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
+  ring: (context, r) => context.arc(0, 0, r, 0, 2 * Math.PI),
+  square: (context, r) => context.rect(-r, -r, 2 * r, 2 * r),
+  diamond: (context, r) => corners(context, [[0, -1.3 * r], [1.3 * r, 0], [0, 1.3 * r], [-1.3 * r, 0]]),
+  triangle: (context, r) => corners(context, [[0, -1.3 * r], [1.2 * r, r], [-1.2 * r, r]]),
+};
+
+function corners(/** @type {CanvasRenderingContext2D} */ context, /** @type {number[][]} */ points) {
+  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.closePath();
+}
+
+/** @param {CanvasRenderingContext2D} context @param {number[]} at @param {string} kind @param {number} r @param {string} color */
+export function mark(context, [x, y], kind, r, color) {
+  context.save();
+  context.translate(x, y);
+  context.beginPath();
+  MARKS[kind](context, r);
+  if (kind === "ring") Object.assign(context, { strokeStyle: color, lineWidth: 2 }).stroke();
+  else Object.assign(context, { fillStyle: color }).fill();
+  context.restore();
+}

@@ -1,0 +1,42 @@
+// Small plots over time: a line for each formulation, the highest value, the duration.
+import { Board, color } from "./canvas.js";
+import { line } from "./lines.js";
+
+const EDGE = { left: 8, right: 8, top: 18, bottom: 20 };
+
+/** @typedef {{times: number[], values: number[], look: {color: string, dash: number[]}}} Curve */
+
+export class Plot {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    /** @type {Curve[]} */
+    this.curves = [];
+    this.cursor = null;
+    this.board = new Board(canvas, () => this.paint());
+  }
+
+  /** @param {Curve[]} curves */
+  show(curves) {
+    this.curves = curves;
+    this.board.draw();
+  }
+
+  paint() {
+    const { context, width, height } = this.board;
+    const end = Math.max(...this.curves.map((one) => one.times[one.times.length - 1]), 1e-9);
+    const high = Math.max(...this.curves.flatMap((one) => one.values), 1e-9);
+    const [w, h] = [width - EDGE.left - EDGE.right, height - EDGE.top - EDGE.bottom];
+    const at = (/** @type {number} */ t, /** @type {number} */ v) => [EDGE.left + (w * t) / end, EDGE.top + h * (1 - v / high)];
+    line(context, [at(0, 0), at(end, 0)], { color: color("--line"), width: 1 });
+    for (const one of this.curves) line(context, one.times.map((t, k) => at(t - one.times[0], one.values[k])), { color: color(one.look.color), width: 2.2, dash: one.look.dash });
+    if (this.cursor !== null && this.cursor <= end) line(context, [at(this.cursor, 0), at(this.cursor, high)], { color: color("--text"), width: 1.5 });
+    Object.assign(context, { font: `12px ${color("--font")}`, fillStyle: color("--soft"), textAlign: "left" });
+    context.fillText(`at most ${Number(high.toPrecision(3))}`, EDGE.left, 12);
+    context.fillText("0 s", EDGE.left, height - 5);
+    context.textAlign = "right";
+    context.fillText(`${end.toFixed(2)} s`, width - EDGE.right, height - 5);
+  }
+}
+
+/** @param {number[][]} rows @returns {number[]} Length of each. */
+export const lengths = (rows) => rows.map((row) => Math.hypot(...row));

@@ -1,0 +1,44 @@
+// Keys that work everywhere, and the list of all keys under "?".
+import { undo } from "./changes.js";
+import { byId, fill, make } from "./elements.js";
+import { show, VIEWS } from "./views.js";
+
+const KEYS = [
+  ["1 … 5", "Draw, Library, Move, Recordings, Robot"],
+  ["← →", "from view to view, where a view's name has the focus"],
+  ["Ctrl Z", "undo the last change of the library"],
+  ["Esc", "clear the drawing"],
+  ["Enter", "learn the drawing under the name in the field"],
+  ["Space", "in the drawing area: pen down, pen up; in Move: play; in Robot: play and pause"],
+  ["← ↑ → ↓", "move the pen, the point or the boundary in focus; turn a view in space"],
+  ["Shift ← ↑ → ↓", "the same, ten times as far"],
+  ["Delete", "remove the via point or obstacle in focus"],
+  ["?", "this list"],
+];
+
+/** Whether a key is for a field in which one writes. @param {any} target */
+const writes = (target) => target.closest?.("input:not([type=range],[type=checkbox],[type=radio]), textarea, select, [contenteditable]");
+
+function list() {
+  fill(byId("keys-list"), ...KEYS.flatMap(([keys, text]) => [make("dt", {}, ...keys.split(" ").map((key) => make("kbd", {}, key))), make("dd", {}, text)]));
+  byId("keys").showModal();
+}
+
+/** @param {KeyboardEvent} event */
+function pressed(event) {
+  if (writes(event.target) || document.querySelector("dialog[open]")) return;
+  if ((event.ctrlKey || event.metaKey) && !event.shiftKey && event.key.toLowerCase() === "z") {
+    event.preventDefault();
+    undo();
+  }
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "?") list();
+  const view = VIEWS[Number(event.key) - 1];
+  if (view && event.key.trim()) show(view, true);
+}
+
+export function startShortcuts() {
+  document.addEventListener("keydown", pressed);
+  byId("help").addEventListener("click", list);
+  byId("undo").addEventListener("click", undo);
+}

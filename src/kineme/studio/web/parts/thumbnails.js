@@ -1,0 +1,15 @@
+// A movement as a small picture that scales: its path and where it starts.
+import { Camera } from "./camera.js";
+import { svg } from "./elements.js";
+
+const SIDE = 100;
+
+/** @param {number[][]|null} path @returns {SVGElement} */
+export function thumbnail(path) {
+  const camera = new Camera();
+  const points = path ?? [];
+  camera.fit(points, SIDE, SIDE);
+  const drawn = points.map((point) => camera.toScreen(point).map((value) => value.toFixed(1)));
+  const parts = drawn.length ? [svg("path", { d: `M${drawn.map((pair) => pair.join(" ")).join("L")}` }), svg("circle", { cx: drawn[0][0], cy: drawn[0][1], r: 4 })] : [];
+  return svg("svg", { class: "thumb", viewBox: `0 0 ${SIDE} ${SIDE}`, "aria-hidden": "true" }, ...parts);
+}

@@ -1,0 +1,28 @@
+// Short messages at the edge: what was done, how to take it back, what went wrong.
+import { byId, make } from "./elements.js";
+
+const STAYS = 7000; // [ms]
+
+/** @param {string} text @param {{act?: () => void, action?: string, failed?: boolean}} options */
+export function say(text, { act, action, failed = false } = {}) {
+  const toast = make("div", { class: failed ? "toast failed" : "toast", role: failed ? "alert" : null }, make("p", {}, text));
+  const close = () => toast.remove();
+  if (act) toast.append(make("button", { class: "button", type: "button", on: { click: () => (close(), act()) } }, action ?? "Undo"));
+  else toast.append(make("button", { class: "button", type: "button", on: { click: close } }, "Close"));
+  byId("toasts").append(toast);
+  while (byId("toasts").children.length > 3) byId("toasts").firstChild.remove();
+  let timer = setTimeout(close, failed ? 2 * STAYS : STAYS);
+  toast.addEventListener("pointerenter", () => clearTimeout(timer));
+  toast.addEventListener("focusin", () => clearTimeout(timer));
+  toast.addEventListener("pointerleave", () => (timer = setTimeout(close, STAYS)));
+}
+
+/** Run something and show what goes wrong. @template T @param {() => Promise<T>} act @returns {Promise<T|undefined>} */
+export async function tried(act) {
+  try {
+    return await act();
+  } catch (error) {
+    if (error.name !== "AbortError") say(error.message, { failed: true });
+    return undefined;
+  }
+}

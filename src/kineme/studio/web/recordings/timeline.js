@@ -1,0 +1,182 @@
+// The recording over time: its columns, what was found, and the edges of the span that is chosen.
+import { Board, color } from "../parts/canvas.js";
+import { byId, make } from "../parts/elements.js";
+import { line } from "../parts/lines.js";
+import { lookOf, symbolNamed } from "../parts/library_state.js";
+
+const BAND = 40; // height of the spans [px]
+const SIDE = 12;
+const AXIS = 22;
+const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
+
+/** @typedef {{begin: number, end: number, label: string|null, p: number|null}} Span */
+
+export class Timeline {
+  /** @param {{choose: (k: number) => void, changed: () => void}} page */
+  constructor(page) {
+    this.page = page;
+    this.plot = { times: [0, 1], columns: [] };
+    /** @type {Span[]} */
+    this.spans = [];
+    this.chosen = -1;
+    this.range = [0, 1];
+    this.board = new Board(byId("timeline-canvas"), () => this.paint());
+    this.edges = ["begin", "end"].map((which) => this.edge(/** @type {"begin"|"end"} */ (which)));
+    this.board.canvas.addEventListener("pointerdown", (event) => this.grab(event));
+    this.board.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    this.board.canvas.addEventListener("keydown", (event) => this.key(event));
+    this.board.canvas.tabIndex = 0;
+  }
+
+  /** @param {any} plot */
+  show(plot) {
+    this.plot = plot;
+    this.whole = [plot.times[0] ?? 0, plot.times[plot.times.length - 1] ?? 1];
+    this.range = [...this.whole];
+    this.chosen = -1;
+    this.board.fit();
+    this.board.draw();
+  }
+
+  x(/** @type {number} */ time) {
+    return SIDE + ((time - this.range[0]) / (this.range[1] - this.range[0])) * (this.board.width - 2 * SIDE);
+  }
+
+  time(/** @type {number} */ x) {
+    return this.range[0] + ((x - SIDE) / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]);
+  }
+
+  paint() {
+    const { context, height } = this.board;
+    const lane = height - BAND - AXIS - 12;
+    this.spans.forEach((span, k) => this.paintSpan(span, k));
+    this.plot.columns.forEach((/** @type {any} */ column, /** @type {number} */ k) => {
+      const low = Math.min(...column.values);
+      const span = Math.max(...column.values) - low || 1;
+      const points = this.plot.times.map((/** @type {number} */ t, /** @type {number} */ i) => [this.x(t), 8 + lane * (1 - (column.values[i] - low) / span)]);
+      line(context, points.filter(([x]) => x > -50 && x < this.board.width + 50), { color: color(COLORS[k % COLORS.length]), width: 1.7 });
+    });
+    this.paintAxis();
+    this.placeEdges();
+  }
+
+  /** @param {Span} span @param {number} k */
+  paintSpan(span, k) {
+    const { context, height } = this.board;
+    const [x, w] = [this.x(span.begin), Math.max(this.x(span.end) - this.x(span.begin), 2)];
+    const symbol = span.label === null ? null : symbolNamed(span.label);
+    const paint = color(symbol ? lookOf(symbol.id).color : "--gray");
+    const top = height - BAND - AXIS;
+    Object.assign(context, { fillStyle: paint, strokeStyle: paint, globalAlpha: k === this.chosen ? 0.2 : 0.09 });
+    context.fillRect(x, 0, w, top);
+    context.globalAlpha = span.label === null ? 0.25 : 0.9;
+    context.beginPath();
+    context.roundRect(x + 1, top + 4, Math.max(w - 2, 1), BAND - 8, 6);
+    context.fill();
+    context.globalAlpha = 1;
+    if (k === this.chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
+    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", fillStyle: span.label === null ? color("--text") : "#fff" });
+    const text = span.label ?? "unknown";
+    if (context.measureText(text).width < w - 10) context.fillText(text, x + w / 2, top + BAND / 2 + 5);
+  }
+
+  paintAxis() {
+    const { context, width, height } = this.board;
+    const raw = (this.range[1] - this.range[0]) / Math.max(width / 90, 2);
+    const ten = 10 ** Math.floor(Math.log10(raw));
+    const step = [1, 2, 5, 10].map((m) => m * ten).find((s) => s >= raw) ?? raw;
+    Object.assign(context, { font: `12px ${color("--font")}`, textAlign: "center", fillStyle: color("--soft") });
+    for (let t = Math.ceil(this.range[0] / step) * step; t <= this.range[1]; t += step) {
+      if (this.x(t) < SIDE || this.x(t) > width - SIDE - 8) continue;
+      context.fillText(`${Number(t.toPrecision(6))}`, this.x(t), height - 6);
+    }
+    context.textAlign = "right";
+    context.fillText("s", width - 4, height - 6);
+  }
+
+  /** @param {"begin"|"end"} which */
+  edge(which) {
+    const button = make("button", { class: "edge", type: "button", role: "slider", hidden: true, "data-key": `edge ${which}` });
+    button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      event.preventDefault();
+      button.focus({ preventScroll: true });
+      button.setPointerCapture(event.pointerId);
+    });
+    button.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+      if (button.hasPointerCapture(event.pointerId)) this.moveEdge(which, this.time(event.clientX - this.board.canvas.getBoundingClientRect().left));
+    });
+    button.addEventListener("lostpointercapture", () => this.page.changed());
+    button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      this.moveEdge(which, this.spans[this.chosen][which] + (step * (event.shiftKey ? 10 : 1) * (this.range[1] - this.range[0])) / 500);
+      this.page.changed();
+    });
+    byId("edges").append(button);
+    return { which, button };
+  }
+
+  /** @param {"begin"|"end"} which @param {number} time */
+  moveEdge(which, time) {
+    const span = this.spans[this.chosen];
+    const least = 0.02;
+    span[which] = which === "begin" ? Math.min(Math.max(time, this.whole[0]), span.end - least) : Math.max(Math.min(time, this.whole[1]), span.begin + least);
+    this.board.now();
+  }
+
+  placeEdges() {
+    const span = this.spans[this.chosen];
+    for (const { which, button } of this.edges) {
+      button.hidden = !span || this.x(span[which]) < 0 || this.x(span[which]) > this.board.width;
+      if (!span) continue;
+      button.style.setProperty("--x", `${this.x(span[which])}px`);
+      const values = { "aria-label": `${which === "begin" ? "Begin" : "End"} of ${span.label ?? "unknown"}`, "aria-valuenow": span[which].toFixed(2), "aria-valuemin": this.whole[0].toFixed(2), "aria-valuemax": this.whole[1].toFixed(2), "aria-valuetext": `${span[which].toFixed(2)} seconds` };
+      for (const [name, value] of Object.entries(values)) button.setAttribute(name, value);
+    }
+  }
+
+  /** A click chooses a span, dragging moves along a recording that is longer than the picture. @param {PointerEvent} event */
+  grab(event) {
+    const at = this.time(event.offsetX);
+    const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
+    this.page.choose(hit);
+    this.board.canvas.setPointerCapture(event.pointerId);
+    const go = (/** @type {PointerEvent} */ now) => this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
+    this.board.canvas.addEventListener("pointermove", go);
+    this.board.canvas.addEventListener("lostpointercapture", () => this.board.canvas.removeEventListener("pointermove", go), { once: true });
+  }
+
+  pan(/** @type {number} */ by) {
+    const length = this.range[1] - this.range[0];
+    const from = Math.min(Math.max(this.range[0] + by, this.whole[0]), this.whole[1] - length);
+    this.range = [from, from + length];
+    this.board.draw();
+  }
+
+  zoom(/** @type {number} */ factor, /** @type {number} */ around) {
+    const [low, high] = this.whole;
+    const length = Math.min(Math.max((this.range[1] - this.range[0]) * factor, (high - low) / 2000), high - low);
+    const share = (around - this.range[0]) / (this.range[1] - this.range[0]);
+    const from = Math.min(Math.max(around - share * length, low), high - length);
+    this.range = [from, from + length];
+    this.board.draw();
+  }
+
+  /** @param {WheelEvent} event */
+  wheel(event) {
+    if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
+    else this.zoom(1.0015 ** event.deltaY, this.time(event.offsetX));
+    event.preventDefault();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const middle = (this.range[0] + this.range[1]) / 2;
+    if (event.key === "+" || event.key === "=") this.zoom(0.7, middle);
+    else if (event.key === "-") this.zoom(1 / 0.7, middle);
+    else if (event.key === "ArrowLeft" || event.key === "ArrowRight") this.page.choose(Math.min(Math.max(this.chosen + (event.key === "ArrowRight" ? 1 : -1), 0), this.spans.length - 1));
+    else return;
+    event.preventDefault();
+  }
+}

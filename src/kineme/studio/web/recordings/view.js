@@ -1,0 +1,125 @@
+// Recordings: a file, its channels, what was found in it, corrected and learned.
+import { post } from "../parts/api.js";
+import { learnSpans } from "../parts/changes.js";
+import { byId, counted, fill, make } from "../parts/elements.js";
+import { library, onLibrary } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+import { startDropping } from "./dropping.js";
+import { markRow, showSpans } from "./spans.js";
+import { Timeline } from "./timeline.js";
+
+class Recordings {
+  constructor() {
+    this.read = null;
+    const page = { choose: (/** @type {number} */ k) => this.choose(k), changed: () => this.changed() };
+    this.page = page;
+    this.timeline = new Timeline(page);
+    startDropping((recording, name) => this.open(recording, name));
+    byId("spot").addEventListener("click", () => this.spot());
+    byId("add-span").addEventListener("click", () => this.add());
+    byId("learn-spans").addEventListener("click", () => this.learn());
+    byId("tables").addEventListener("change", () => this.table());
+    byId("channels").addEventListener("change", () => this.columns());
+    onLibrary(() => (this.allow(), this.timeline.board.draw()));
+  }
+
+  /** @param {any} recording @param {string} name */
+  open(recording, name) {
+    this.read = recording;
+    byId("recording").hidden = false;
+    byId("drop").classList.add("small-drop");
+    byId("recording-name").textContent = name;
+    fill(byId("tables"), ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) => make("option", { value: String(k) }, one.name)));
+    fill(byId("problems"), ...(recording.problems ?? []).map((/** @type {any} */ one) => make("p", { class: "small" }, typeof one === "string" ? one : one.text)));
+    this.table();
+    byId("spot").focus({ preventScroll: true });
+  }
+
+  /** Another table of the file. */
+  table() {
+    const k = Number(byId("tables").value);
+    const table = this.read.tables[k];
+    const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
+    byId("recording-facts").textContent = `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
+    const box = (/** @type {any} */ channel) => make("label", { class: "check" }, make("input", { type: "checkbox", checked: true, value: channel.name }), make("span", {}, channel.name, make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", "))));
+    fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
+    this.timeline.spans = [];
+    this.columns();
+    this.timeline.show(this.shownPlot());
+    this.changed();
+    byId("spans-state").textContent = "";
+  }
+
+  chosenChannels() {
+    return [...byId("channels").querySelectorAll("input:checked")].map((one) => one.value);
+  }
+
+  /** The plot with the columns of the chosen channels. */
+  shownPlot() {
+    const k = Number(byId("tables").value);
+    const plot = this.read.plots?.[k] ?? (k === 0 ? this.read.plot : { times: [0, this.read.tables[k].duration], columns: [] });
+    const names = new Set(this.chosenChannels());
+    const wanted = new Set(this.read.tables[k].channels.filter((/** @type {any} */ one) => names.has(one.name)).flatMap((/** @type {any} */ one) => one.columns ?? [one.name]));
+    const columns = plot.columns.filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
+    return { ...plot, columns };
+  }
+
+  columns() {
+    this.timeline.plot = this.shownPlot();
+    this.timeline.board.draw();
+  }
+
+  body() {
+    return { table: this.read.tables[Number(byId("tables").value)].name, channels: this.chosenChannels() };
+  }
+
+  async spot() {
+    byId("spot").disabled = true;
+    byId("spans-state").textContent = "Looking …";
+    const answer = await tried(() => post(`/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`, this.body()));
+    byId("spot").disabled = false;
+    byId("spans-state").textContent = "";
+    if (!answer) return;
+    this.timeline.spans = answer.spans;
+    this.choose(-1);
+    this.changed();
+    const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
+    byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown`;
+  }
+
+  /** A span in the middle of what is shown. */
+  add() {
+    const [from, to] = this.timeline.range;
+    this.timeline.spans.push({ begin: from + 0.4 * (to - from), end: from + 0.6 * (to - from), label: null, p: null });
+    this.changed();
+    this.choose(this.timeline.spans.length - 1);
+    byId("spans").querySelector("tr:last-child input[type=text]").focus();
+  }
+
+  /** @param {number} k -1 for none. */
+  choose(k) {
+    if (this.timeline.chosen === k) return;
+    this.timeline.chosen = k;
+    this.timeline.board.now();
+    markRow(k);
+  }
+
+  changed() {
+    showSpans(this.timeline.spans, this.timeline.chosen, this.page);
+    this.timeline.board.draw();
+    this.allow();
+  }
+
+  allow() {
+    byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((one) => one.label !== null);
+  }
+
+  async learn() {
+    const spans = this.timeline.spans.filter((one) => one.label !== null).map(({ begin, end, label }) => ({ begin, end, label }));
+    await learnSpans(this.read.recording, { ...this.body(), spans });
+  }
+}
+
+export function startRecordings() {
+  new Recordings();
+}

@@ -1,0 +1,76 @@
+// Robot: an arm executes a movement, and everything that is checked before is shown.
+import { get, post } from "../parts/api.js";
+import { byId, fill, make } from "../parts/elements.js";
+import { library, onLibrary } from "../parts/library_state.js";
+import { tried } from "../parts/toasts.js";
+import { currentView, onShow } from "../parts/views.js";
+import { chooseToMove, toMove } from "../move/chosen.js";
+
+/** @param {any} scene Show the arm in a frame of its own: each movement gets a new one. */
+function showArm(scene) {
+  const frame = make("iframe", { src: "/arm.html", title: "The arm moves", class: "arm-frame" });
+  const ready = (/** @type {MessageEvent} */ event) => {
+    if (event.source !== frame.contentWindow || event.data !== "ready") return;
+    window.removeEventListener("message", ready);
+    frame.contentWindow.postMessage({ scene }, location.origin);
+  };
+  window.addEventListener("message", ready);
+  fill(byId("arm"), frame);
+}
+
+const number = (/** @type {number|null} */ value, /** @type {string} */ unit) => (value === null || value === undefined ? "–" : `${Number(Number(value).toPrecision(4))} ${unit ?? ""}`);
+
+/** @param {any} check */
+function row(check) {
+  const worst = `${number(check.worst, check.unit)}${check.time === null || check.time === undefined ? "" : ` at ${Number(check.time).toFixed(2)} s`}`;
+  return make("tr", { class: check.passed ? null : "failed" }, make("th", { scope: "row" }, check.where ? `${check.what}: ${check.where}` : check.what), make("td", {}, worst), make("td", {}, number(check.limit, check.unit)), make("td", {}, check.passed ? "passed" : "FAILED"));
+}
+
+/** @param {any} answer */
+function showPreflight(answer) {
+  const checks = [...(answer.checks ?? [])].sort((a, b) => Number(a.passed) - Number(b.passed));
+  const failed = checks.filter((one) => !one.passed).length;
+  byId("robot-preflight").hidden = !checks.length;
+  byId("robot-preflight").open = failed > 0;
+  fill(byId("robot-checks"), ...checks.map(row));
+  byId("robot-verdict").dataset.state = answer.passed ? "passed" : "failed";
+  byId("robot-verdict").textContent = answer.refusal ?? (answer.passed ? `All ${checks.length} checks passed.` : `${failed} of ${checks.length} checks failed: the arm must not execute this.`);
+}
+
+/** @param {Event} event */
+async function move(event) {
+  event.preventDefault();
+  const symbol = byId("robot-what").value;
+  if (!symbol) return;
+  chooseToMove(symbol);
+  byId("robot-go").disabled = true;
+  byId("robot-verdict").dataset.state = "";
+  byId("robot-verdict").textContent = "Planning and checking …";
+  const body = { what: { symbol }, robot: byId("robot-arm").value, size: byId("robot-size").valueAsNumber || 0.3, slow_down: byId("robot-slow").checked };
+  const answer = await tried(() => post("/api/robots/move", body));
+  byId("robot-go").disabled = false;
+  if (!answer) byId("robot-verdict").textContent = "";
+  if (!answer) return;
+  showPreflight(answer);
+  if (answer.scene) showArm(answer.scene);
+}
+
+async function shown() {
+  if (currentView() !== "robot") return;
+  const { symbols } = library();
+  const id = toMove(symbols);
+  fill(byId("robot-what"), ...symbols.filter((/** @type {any} */ one) => one.path).map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
+  if (byId("robot-arm").children.length) return;
+  const robots = await tried(() => get("/api/robots"));
+  if (!robots) return;
+  byId("robot-empty").hidden = robots.available;
+  byId("robot-main").hidden = !robots.available;
+  byId("robot-why").textContent = robots.why ?? "";
+  fill(byId("robot-arm"), ...robots.robots.map((/** @type {string} */ name) => make("option", { value: name }, name)));
+}
+
+export function startRobot() {
+  byId("robot-form").addEventListener("submit", move);
+  onShow("robot", shown);
+  onLibrary(shown);
+}

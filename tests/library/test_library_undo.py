@@ -1,0 +1,133 @@
+"""Changes taken back: the state before, as a new version."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from library_samples import draw_movements
+
+from kineme import ActionLibrary, Demonstrations, SpecificationError
+from kineme.library.storage.undo import can_undo
+
+
+@pytest.fixture
+def library(tmp_path):
+    demos = draw_movements(12, 2, 3)
+    labels = [["wave", "push", None][i % 3] for i in range(12)]
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(demos, labels, groups=["Ann"] * 6 + [None] * 6)
+        yield library
+
+
+def _state(library):
+    """What a user sees, movements by their samples: names, descriptions, members, prototypes, people."""
+    ids = library.ids()
+    if not len(ids):
+        return {}
+    first = {int(i): tuple(one.positions[:3].ravel().round(6)) for i, one in zip(ids, library.movements(), strict=True)}
+    symbols = {
+        one.id: (one.name, one.description, sorted(first[i] for i in one.members.tolist()), first.get(one.prototype))
+        for one in library.symbols()
+    }
+    people = sorted(zip(first.values(), library.groups().astype(str), strict=True))
+    rows = {first[int(i)]: row for i, row in zip(ids, library.features(), strict=True)}
+    return {"symbols": symbols, "people": people, "rows": [rows[key].tobytes() for key in sorted(rows)]}
+
+
+CHANGES = {
+    "rename": lambda one: one.rename("wave", "hello"),
+    "annotate": lambda one: one.annotate("wave", "a greeting", prototype=1),
+    "delete a symbol": lambda one: one.delete("wave"),
+    "delete movements": lambda one: one.delete([1, 2, 3]),
+    "delete all": lambda one: one.delete(one.ids()),
+    "merge": lambda one: one.merge(["wave", "push"], "both"),
+    "merge into one": lambda one: one.merge(["wave"], "push"),
+    "split": lambda one: one.split("wave", [1, 4], "half"),
+    "assign": lambda one: one.assign([1, 2, 3], "push"),
+    "assign to a new one": lambda one: one.assign([1, 2, 3], "new"),
+    "release": lambda one: one.release([1, 2]),
+    "learn": lambda one: one.learn(draw_movements(3, 2, 9), ["wave", "other", None]),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_an_undo_brings_back_what_was(library, change):
+    library.annotate("wave", "of a hand", prototype=4)
+    before, version = _state(library), library.version
+    CHANGES[change](library)
+    assert _state(library) != before
+    undone = library.undo()
+    assert undone == (library.version, version, library.at(version + 1).history()[-1].action)
+    assert _state(library) == before
+    assert library.verify() == []
+
+
+def test_all_changes_are_taken_back_one_by_one_and_new_ones_after_an_undo_too(library):
+    states = [_state(library)]
+    for name in ("annotate", "delete movements", "merge", "learn"):
+        CHANGES[name](library)
+        states.append(_state(library))
+    library.undo()
+    library.undo()
+    assert _state(library) == states[2]
+    library.rename("push", "shove")
+    library.undo()
+    for state in (states[1], states[0], {}):
+        library.undo()
+        assert _state(library) == state
+    assert not can_undo(library.store)
+    version = library.version
+    with pytest.raises(SpecificationError, match="expected a change to take back, the library has none left"):
+        library.undo()
+    assert library.version == version
+    assert library.verify() == []
+
+
+def test_an_undo_of_another_version_than_the_one_looked_at_is_refused(library):
+    seen = library.version
+    library.rename("wave", "hello")
+    with pytest.raises(SpecificationError, match=f"take back version {seen}, the library is at version {seen + 1}"):
+        library.undo(seen)
+    assert "hello" in library
+
+
+def test_recognition_follows(library):
+    asked = library.movements()[0]
+    library.delete("wave")
+    assert library.recognize(asked).ranked == ("push",)
+    library.undo()
+    assert library.recognize(asked).label == "wave"
+
+
+def test_places_in_files_are_free_for_movements_that_return(library, tmp_path):
+    from kineme.library.storage.source import Source
+
+    source = Source("a.csv", "0" * 64, 10, "table")
+    first, second = draw_movements(2, 2, 21)
+    ids = library.learn(Demonstrations([first]), ["wave"], source, places=["0"]).ids
+    library.delete(ids)
+    before = _state(library.at(library.version - 1))
+    library.learn(Demonstrations([second]), ["wave"], source, places=["0"])
+    library.undo()
+    library.undo()
+    assert _state(library) == before
+    assert library.verify() == []
+
+
+def test_a_proposal_that_was_accepted_is_one_change(library):
+    version = library.version
+    library.release(library.ids())
+    proposal = library.propose(n_clusters=2, min_members=2)[0]
+    library.accept(proposal, "new")
+    assert library["new"].prototype == proposal.medoid
+    library.undo()
+    assert len(library.symbols()) == 2
+    assert not np.concatenate([one.members for one in library.symbols()]).size
+    library.undo()
+    assert _state(library) == _state(library.at(version))
+
+
+def test_the_past_and_libraries_open_for_reading_undo_nothing(library):
+    past = library.at(library.version)
+    assert not can_undo(past.store)
+    past.close()

@@ -1,0 +1,132 @@
+"""What a controller makes of a trajectory between its samples: limits and path are kept there, or it is refused."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BPoly
+
+import kineme
+from arm_samples import simple_arm, stroke
+from kineme.errors import TrajectoryError
+from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
+from kineme.robots.checks.along import along
+from kineme.robots.execution.between import between
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+_robot = lru_cache(load)
+
+
+def interpolated(trajectory, parts):
+    """Times, positions, velocities and accelerations between the samples by SciPy, of the fifth order."""
+    t = trajectory
+    curve = BPoly.from_derivatives(t.times, np.stack((t.positions, t.velocities, t.accelerations), axis=1))
+    fine = np.unique(np.concatenate([t.times[:-1] + np.diff(t.times) * k / parts for k in range(parts)]))
+    fine = np.append(fine, t.duration)
+    return fine, curve(fine), curve(fine, 1), curve(fine, 2)
+
+
+def sent(robot, times, positions, rest=None):
+    """Samples of one joint after another that stand at each of them."""
+    still = np.zeros_like(positions)
+    return JointTrajectory(robot.joints, np.asarray(times, dtype=float), positions, still, still, {})
+
+
+def test_it_is_the_polynomial_of_the_fifth_order():
+    rng = np.random.default_rng(0)
+    times = np.cumsum(rng.uniform(0.1, 1, 6))
+    q, v, a = rng.normal(size=(3, 6, 2))
+    given = JointTrajectory(("a", "b"), times - times[0], q, v, a, {"grip": np.arange(6.0)})
+    fine, positions, velocities, accelerations = interpolated(given, 7)
+    made = between(given, fine)
+    np.testing.assert_allclose(made.positions, positions, atol=1e-9)
+    np.testing.assert_allclose(made.velocities, velocities, atol=1e-8)
+    np.testing.assert_allclose(made.accelerations[:-1], accelerations[:-1], atol=1e-6)
+    np.testing.assert_array_equal(made.steps["grip"], np.searchsorted(given.times, fine, "right") - 1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    name=st.sampled_from(["panda", "ur5e", "wam", "so101"]),
+    rate=st.sampled_from([1.0, 3.0, 10.0, 25.0, 100.0, 1000.0, 10_000.0]),
+    seconds=st.floats(0.05, 8.0),
+    timing=st.sampled_from(["generated", "slowed", "fastest"]),
+)
+def test_at_every_rate_limits_and_path_are_kept_between_samples_or_it_is_refused(name, rate, seconds, timing):
+    robot = _robot(name)
+    try:
+        made = move(stroke(robot, seconds), robot, timing=timing, rate=rate)
+    except TrajectoryError:
+        return
+    times, q, v, _ = interpolated(made.trajectory, 4)
+    assert np.all((q >= robot.lower - 1e-3) & (q <= robot.upper + 1e-3))
+    assert np.all(np.abs(v) <= 1.05 * robot.velocity)
+    assert np.all(np.abs(np.diff(v[::2], axis=0) / np.diff(times[::2])[:, None]) <= 1.15 * robot.acceleration)
+    assert np.abs(made.trajectory.velocities[[0, -1]]).max() < 1e-7  # what controllers of ROS take as standing
+    still = np.zeros_like(q)
+    tips = along(robot, JointTrajectory(robot.joints, times, q, still, still, {})).tip_positions[times >= made.begins]
+    wanted = stroke(robot, n=3000).positions
+    away = [np.linalg.norm(wanted - tip, axis=1).min() for tip in tips[:: max(1, len(tips) // 300)]]
+    assert max(away) < 1.5e-3
+
+
+@pytest.mark.parametrize("step", [0.002, 0.01, 0.049])
+def test_a_joint_that_jumps_between_two_samples_is_refused(step):
+    robot = _robot("panda")
+    times = np.arange(0, 0.4, 1e-4)
+    joints = np.tile(robot.rest, (len(times), 1))
+    joints[times > 0.20503, 0] += step
+    jumping = kineme.Trajectory(times=times, positions=joints)
+    with pytest.raises(InfeasibleError, match=r"acceleration between samples of panda_joint1"):
+        move(jumping, robot, space="joints")
+
+
+def test_a_learned_movement_begins_and_ends_at_a_stand_at_every_rate():
+    robot = _robot("panda")
+    primitive = kineme.DMP().learn([stroke(robot)])
+    for rate in (100.0, 10_000.0):
+        t = move(primitive, robot, rate=rate).trajectory
+        assert np.abs(t.velocities[[0, -1]]).max() < 1e-7
+        accelerations = np.diff(t.velocities, axis=0) / np.diff(t.times)[:, None]
+        assert np.all(np.abs(accelerations) <= robot.acceleration)
+
+
+def test_links_that_pass_through_one_another_between_two_samples_are_seen(tmp_path):
+    robot = simple_arm(tmp_path)
+    low, high = robot.rest.copy(), robot.rest.copy()
+    low[1], high[1] = -1.4, 1.4
+    report = preflight(robot, sent(robot, [0.0, 30.0], np.array([low, high])))
+    assert [check.what for check in report.failed] == ["self-collision", "jump"]
+
+
+def test_a_refusal_for_too_few_samples_says_a_rate_that_works():
+    robot = _robot("panda")
+    with pytest.raises(InfeasibleError, match=r"Choose a higher rate, as of 20 samples per second") as caught:
+        move(stroke(robot, 3.0), robot, rate=2.0)
+    assert all(
+        check.what.endswith("between samples") or check.what == "jump" for check in caught.value.preflight.failed
+    )
+    move(stroke(robot, 3.0), robot, rate=20.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"times": np.array([0.0, 1.0, 1.0, 2.0])}, "times increase"),
+        ({"times": np.array([0.0, 1.0, np.nan, 2.0])}, "finite numbers"),
+        ({"velocities": np.full((4, 6), np.inf)}, "finite numbers"),
+        ({"accelerations": np.zeros((3, 6))}, r"accelerations of shape \(4, 6\)"),
+        ({"positions": np.zeros((4, 7))}, r"positions of shape \(4, 6\)"),
+    ],
+)
+def test_what_is_no_trajectory_of_the_arm_is_not_checked_but_refused(changed, words):
+    robot = _robot("ur5e")
+    zeros = np.zeros((4, 6))
+    arrays = {"times": np.arange(4.0), "positions": zeros, "velocities": zeros, "accelerations": zeros} | changed
+    with pytest.raises(TrajectoryError, match=words):
+        preflight(robot, JointTrajectory(robot.joints, **arrays, steps={}))

@@ -1,0 +1,95 @@
+"""How slow is slow enough: short movements, weak arms, what a refusal says, steps of a gripper."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import kineme
+from arm_samples import simple_arm, stroke
+from kineme.errors import KinemeError
+from kineme.robots import InfeasibleError, load, move
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+TIMINGS = ["generated", "slowed", "fastest"]
+
+
+def swing(robot, seconds, distance=0.8, n=60):
+    """A movement of the first joint that begins and ends at a stand."""
+    u = np.linspace(0, 1, n)
+    joints = np.tile(robot.rest, (n, 1))
+    joints[:, 0] += distance * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    return kineme.Trajectory(times=seconds * u, positions=joints)
+
+
+@pytest.mark.parametrize("seconds", [1e-9, 1e-3, 0.05, 1.0])
+def test_however_short_it_was_it_is_slowed_down_to_the_same_duration(seconds):
+    robot = load("panda")
+    made = move(stroke(robot, seconds), robot, timing="slowed")
+    known = move(stroke(robot, 1.2), robot, timing="slowed")
+    assert made.preflight.passed
+    assert made.trajectory.duration == pytest.approx(known.trajectory.duration, rel=0.01)
+
+
+def test_what_a_refusal_promises_holds():
+    robot = load("ur5e")
+    for movement in (stroke(robot, 0.4), stroke(robot, 0.02), swing(robot, 0.3)):
+        with pytest.raises(InfeasibleError, match="It works in") as caught:
+            move(movement, robot)
+        promised = float(re.search(r"It works in ([\d.]+) s", str(caught.value))[1])
+        made = move(movement, robot, timing="slowed")
+        assert made.trajectory.duration - made.begins == pytest.approx(promised, rel=0.01)
+        assert made.preflight.passed
+
+
+@pytest.mark.parametrize("timing", TIMINGS)
+@pytest.mark.parametrize("limit", ["max_velocity", "max_acceleration"])
+def test_an_approach_of_days_is_refused_before_it_fills_the_memory(timing, limit):
+    robot = load("panda", **{limit: 1e-9})
+    with pytest.raises(KinemeError, match=r"at most 1,000,000 samples|no timing of this path"):
+        move(stroke(robot), robot, timing=timing)
+
+
+def test_a_weak_arm_approaches_as_slowly_as_its_torques_demand(tmp_path):
+    weak = simple_arm(tmp_path, effort=0.03, mass=0.5)
+    start = np.array([-1.5, 1.57])
+    movement = swing(weak, 20.0)
+    joints = movement.positions + np.array([0.0, 1.57])
+    made = move(kineme.Trajectory(times=movement.times, positions=joints), weak, space="joints", start=start)
+    strong = move(
+        kineme.Trajectory(times=movement.times, positions=joints),
+        simple_arm(tmp_path, mass=0.5),
+        space="joints",
+        start=start,
+    )
+    assert made.preflight.passed
+    assert made.begins > 1.05 * strong.begins
+
+
+@pytest.mark.parametrize("timing", TIMINGS)
+@pytest.mark.parametrize("rate", [20.0, 100.0, 1000.0])
+def test_steps_hold_from_the_same_place_of_the_path_on_whatever_the_timing(timing, rate):
+    robot = load("ur5e")
+    movement = swing(robot, 0.6, n=121)
+    grip = np.repeat([0.0, 1.0, 0.5], [30, 41, 50])
+    made = move(
+        movement,
+        robot,
+        space="joints",
+        steps={"grip": grip},
+        timing="slowed" if timing == "generated" else timing,
+        rate=rate,
+    )
+    t = made.trajectory
+    assert t.steps["grip"][0] == 0.0
+    assert t.steps["grip"][-1] == 0.5
+    moving = t.times >= made.begins - 1e-9
+    at = np.flatnonzero(np.diff(t.steps["grip"]))
+    assert len(at) == 2
+    assert moving[at].all()
+    for k, from_here in zip(at, (30, 71), strict=True):
+        before, after = t.positions[k, 0], t.positions[k + 1, 0]
+        assert before <= movement.positions[from_here, 0] <= after + 1e-9

@@ -1,0 +1,34 @@
+// Runs the runtime on questions: node runtime_in_node.mjs RUNTIME QUESTIONS, both files; answers as JSON.
+import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+
+const { open } = await import(pathToFileURL(process.argv[2]).href);
+const { snapshot, questions } = JSON.parse(readFileSync(process.argv[3], "utf8"));
+const runtime = open(snapshot);
+
+const answers = {
+  recognize: ({ times, positions, error_rate }) => runtime.recognize(times, positions, error_rate),
+  follow: ({ times, positions, ends, options }) => {
+    const update = runtime.follow(options);
+    return ends.map((end) => update(times.slice(0, end), positions.slice(0, end)));
+  },
+  encode: ({ times, positions, formulation }) => {
+    const made = runtime.primitive(runtime.encode(times, positions), formulation);
+    return { ...made, weights: [...made.weights] };
+  },
+  rollout: ({ symbol, times, positions, formulation, asked }) => {
+    const made = runtime.primitive(symbol ?? runtime.encode(times, positions), formulation);
+    const moved = runtime.rollout(made, asked);
+    return { times: [...moved.times], positions: moved.positions };
+  },
+};
+
+function answered(one) {
+  try {
+    return { found: answers[one.ask](one) };
+  } catch (error) {
+    return { error: error.message };
+  }
+}
+
+process.stdout.write(JSON.stringify(questions.map(answered)));

@@ -1,0 +1,90 @@
+"""Studios for tests: in this process, and as the command runs it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from kineme import ActionLibrary, Trajectory
+
+TOKEN = "a-token-for-tests-only"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+LIVE = "ws://127.0.0.1:8420/api/live"
+ROOT = Path(__file__).parents[2]
+
+
+def drawing(k, n=60, seed=None):
+    """A smooth movement of its own shape for each k, a little different for each seed."""
+    u = np.linspace(0, 1, n)[:, None]
+    waves = np.random.default_rng(k).normal(size=(4, 2))
+    if seed is not None:
+        waves = waves + 0.05 * np.random.default_rng([k, seed]).normal(size=(4, 2))
+    return u[:, 0] * 1.5, np.sin(np.pi * u * np.arange(1, 5)) @ waves + u * [1.0, 0.3]
+
+
+def make_library(folder, symbols=4, members=3, d=2):
+    """A library of so many symbols, "kind 0" and so on."""
+    shown = [(k, drawing(k, seed=i)) for k in range(symbols) for i in range(members)]
+    with ActionLibrary(folder, create=True) as library:
+        movements = [Trajectory(t, np.pad(x, ((0, 0), (0, d - 2)))) for _, (t, x) in shown]
+        library.learn(movements, [f"kind {k}" for k, _ in shown])
+    return folder
+
+
+def asked(k, seed=99, **more):
+    """A drawing as a request."""
+    times, positions = drawing(k, seed=seed)
+    return {"times": times.tolist(), "positions": positions.tolist(), **more}
+
+
+def samples(k, seed=99):
+    """A drawing as the samples of the websocket."""
+    times, positions = drawing(k, seed=seed)
+    return np.column_stack((times, positions)).tolist()
+
+
+class Running:
+    """A studio in a process of its own, as the command starts it."""
+
+    def __init__(self, folder, *options):
+        environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "KINEME_STUDIO_TOKEN": TOKEN}
+        command = [sys.executable, "-m", "kineme", "studio", "-l", str(folder), "--no-open", *map(str, options)]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+            text=True,
+            start_new_session=True,
+        )
+        guard = threading.Timer(60, self.process.kill)
+        guard.start()
+        self.line = self.process.stdout.readline()
+        guard.cancel()
+        found = re.search(r"(http://\S+?)/\?token=(\S+)", self.line)
+        assert found, self.process.communicate()
+        self.address, self.token = found.groups()
+
+    def end(self, how=signal.SIGINT):
+        """Stop it; the exit code and what it wrote."""
+        self.process.send_signal(how)
+        out, err = self.process.communicate(timeout=20)
+        return self.process.returncode, self.line + out, err
+
+
+@contextmanager
+def running(folder, *options):
+    one = Running(folder, *options)
+    try:
+        yield one
+    finally:
+        one.process.kill()
+        one.process.communicate()

@@ -1,0 +1,289 @@
+"""The runtime in JavaScript says what Python says: on real movements, in every setting that a snapshot can have."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_runtime import NODE, REASON, RUNTIME, ask, question
+
+import kineme
+from kineme.studio.snapshot.make import snapshot_of_recognizer
+from movement_samples import draw_shapes, turn
+
+pytestmark = pytest.mark.skipif(NODE is None, reason=REASON)
+
+FOLDER = RUNTIME.parent
+SIMILAR = 1e-5  # Python compares in single precision
+MOVED = 1e-6  # of the extent
+RECORDINGS = Path(os.environ.get("KINEME_RECORDINGS", "nowhere"))
+
+
+def lifted(demos):
+    """The same movements in space."""
+    arrays = [
+        np.column_stack((one.positions, 0.3 * one.positions[:, 0] + 5 * np.sin(one.positions[:, 1] / 10)))
+        for one in demos
+    ]
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [one.times for one in demos])
+
+
+def perturbed(demos, seed=0):
+    """Turned, elsewhere, in another size, noisy, with other and uneven stamps."""
+    rng, arrays, times = np.random.default_rng(seed), [], []
+    for one in demos:
+        size = np.ptp(one.positions, axis=0).max()
+        angle, seed = rng.uniform(-1, 1), int(rng.integers(100))
+        x = one.positions @ turn(angle, demos.n_dims, seed).T if demos.n_dims in (2, 3) else one.positions
+        x = x * np.exp(0.3 * rng.normal()) + size * rng.normal(size=demos.n_dims)
+        x += 0.005 * size * rng.normal(size=x.shape)
+        inner = rng.choice(np.arange(1, len(x) - 1), max(len(x) // int(rng.integers(2, 15)), 10), replace=False)
+        kept = np.concatenate(([0], np.sort(inner), [len(x) - 1]))
+        arrays.append(x[kept])
+        times.append(one.times[kept])
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, times)
+
+
+def one_in(n, demos, first=0):
+    """A mask of the first demonstrations of each shape of LASA."""
+    return (np.arange(len(demos)) - first) % 7 < n
+
+
+def compare_answers(recognizer, movements, runtime=RUNTIME, error_rate=0.05):
+    """Worst difference of any number in the answers; infinite where a class, a verdict or an order differs."""
+    asked = [question("recognize", one, error_rate=error_rate) for one in movements]
+    worst = 0.0
+    for got, said in zip(
+        ask(snapshot_of_recognizer(recognizer), asked, runtime),
+        recognizer.recognize(movements, error_rate),
+        strict=True,
+    ):
+        same = (got["label"], tuple(got["ranked"]), got["rule"], got["calibrated"])
+        if same != (said.label, said.ranked, said.rule, said.calibrated):
+            return np.inf
+        if [one["index"] for one in got["nearest"]] != [one.index for one in said.nearest]:
+            return np.inf
+        numbers = [got["pKnown"] - said.p_known, got["confidence"] - said.confidence]
+        numbers += [got["pValues"][label] - p for label, p in said.p_values.items()]
+        numbers += [a["similarity"] - b.similarity for a, b in zip(got["nearest"], said.nearest, strict=True)]
+        numbers += [got["responsibilities"][name] - share for name, share in said.responsibilities.items()]
+        worst = max(worst, np.abs(numbers).max())
+    return worst
+
+
+@pytest.mark.parametrize("shots", [1, 3])
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_handwriting_is_recognized_as_in_python(shots, space):
+    """312 to 208 movements each: held out, and perturbed; some of them unknown."""
+    demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
+    shown = one_in(shots, demos)
+    recognizer = kineme.Recognizer().fit(demos[shown])
+    for movements in (demos[~shown], perturbed(demos[~shown])):
+        assert compare_answers(recognizer, movements) <= SIMILAR
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="KINEME_RECORDINGS names no folder with recordings of people")
+@pytest.mark.parametrize("name", ["letters2d.npz", "gestures3d.npz"])
+def test_movements_of_people_are_recognized_as_in_python(name):
+    """Letters and gestures in space, shown by people."""
+    with np.load(RECORDINGS / name) as z:
+        ends, labels = z["offsets"][1:-1], z["labels"].astype(str)
+        arrays = [one.astype(float) for one in np.split(z["positions"], ends)]
+        times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
+    demos = kineme.Demonstrations.from_arrays(arrays, labels, times)
+    rng = np.random.default_rng(0)
+    shown = np.concatenate([rng.permutation(np.flatnonzero(labels == one))[:3] for one in np.unique(labels)])
+    others = rng.permutation(np.setdiff1d(np.arange(len(demos)), shown))[:400]
+    assert compare_answers(kineme.Recognizer().fit(demos[shown]), demos[others]) <= SIMILAR
+
+
+@pytest.mark.parametrize(
+    ("settings", "d"),
+    [
+        ({"mean": "geometric"}, 2),
+        ({"mean": "harmonic"}, 2),
+        ({"mean": "quadratic"}, 3),
+        ({"mean": "min"}, 2),
+        ({"max_angle": 0.0}, 2),
+        ({"max_angle": 0.0}, 3),
+        ({"max_angle": np.pi / 3}, 2),
+        ({"max_angle": np.pi}, 3),
+        ({"rotation_prior": kineme.RotationPrior(vertical=(0, 0, 1))}, 3),
+        ({"translation": False}, 2),
+        ({"scale": "none"}, 2),
+        ({"scale": "per-dimension"}, 3),
+        ({"cutoff": None}, 2),
+        ({"weights": "fitted"}, 2),
+        ({"weights": (0, 1, 1, 0, 2)}, 2),
+        ({"classifier": "nearest"}, 2),
+        ({"classifier": "prototype"}, 2),
+        ({}, 1),
+        ({}, 5),
+        ({"representations": (kineme.Representation("forcing", arc_share=0.0, n_points=70),)}, 2),
+        ({"representations": (kineme.Representation("positions", arc_share=0.4, n_points=50),)}, 2),
+    ],
+    ids=str,
+)
+def test_every_setting_is_that_of_python(settings, d):
+    demos = draw_shapes([1, 3, 2, 4, 2, 1], d, seed=3)
+    fresh = draw_shapes([3] * 7, d, seed=3, spread=0.3, n_samples=45)
+    recognizer = kineme.Recognizer(**settings).fit(demos)
+    others = fresh if settings.get("scale") == "none" else perturbed(fresh)
+    for error_rate in (0.05, 0.3):
+        # In one dimension nothing is rotated, and Python sums products of 100 numbers in single precision.
+        assert compare_answers(recognizer, others, error_rate=error_rate) <= (2 * SIMILAR if d == 1 else SIMILAR)
+
+
+def test_close_and_uneven_stamps_are_treated_as_in_python():
+    demos = draw_shapes([2, 2, 2], seed=1)
+    rng, arrays, times = np.random.default_rng(0), [], []
+    for one in draw_shapes([4, 4, 4], seed=1, spread=0.2):
+        t = one.times + np.where(rng.random(len(one.times)) < 0.2, 0.98 * np.diff(one.times, append=2.0), 0.0)
+        t[-1] = one.times[-1]
+        t = np.maximum.accumulate(t) + 1e-9 * np.arange(len(t))
+        arrays.append(one.positions)
+        times.append(t)
+    close = kineme.Demonstrations.from_arrays(arrays, None, times)
+    for cutoff in (None, 10.0):
+        assert compare_answers(kineme.Recognizer(cutoff=cutoff).fit(demos), close) <= SIMILAR
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize("settings", [{}, {"max_angle": 0.0}, {"translation": False}], ids=str)
+def test_movements_under_way_are_recognized_as_in_python(space, settings):
+    demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
+    recognizer = kineme.Recognizer(**settings).fit(demos[one_in(2, demos)])
+    some = [
+        kineme.Trajectory(one.times[::10], one.positions[::10])
+        for one in demos[one_in(1, demos, 4)][:: 1 if not settings else 4]
+    ]
+    ends = [3, 6, 12, 30, 50, 70, 90, 100]
+    asked = [question("follow", one, ends=ends) for one in some]
+    n_states = 0
+    for one, states in zip(some, ask(snapshot_of_recognizer(recognizer), asked), strict=True):
+        live, begin, size = recognizer.stream(), 0, np.ptp(one.positions, axis=0).max()
+        for end, got in zip(ends, states, strict=True):
+            said = live.update(one.times[begin:end], one.positions[begin:end])
+            begin = end
+            if not said.ranked:
+                assert got is None
+                continue
+            n_states += 1
+            shares = {guess.label: guess.confidence for guess in said.ranked}
+            assert got["decided"] == said.label
+            assert got["ranked"][0]["name"] == said.ranked[0].label
+            for guess in got["ranked"]:
+                assert guess["share"] == pytest.approx(shares[guess["name"]], abs=2e-5)
+            assert got["unknown"] == pytest.approx(said.unknown, abs=2e-5)
+            assert got["progress"] == pytest.approx(said.progress, abs=2e-5)
+            assert got["arrival"] == pytest.approx(said.arrival, abs=1e-4)
+            assert np.abs(np.array(got["path"]) - said.path).max() <= 1e-5 * size
+    assert n_states == 7 * len(some)
+
+
+@pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")  # via points far away are asked for, too
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize("formulation", ["bio-inspired", "original", "amplitude-scaled", "decoupled"])
+def test_movements_to_new_goals_are_those_of_python(space, formulation):
+    """Stored primitives, and movements learned in the runtime; to new starts and goals, and through via points."""
+    demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
+    demos = demos[one_in(1, demos)]
+    snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos))
+    primitives = kineme.DMP(formulation).learn(demos)
+    rng, asked, expected = np.random.default_rng(1), [], []
+    for i, one in enumerate(demos):
+        size = primitives.extents[i].max()
+        start, goal = (x[i] + 0.3 * size * rng.normal(size=demos.n_dims) for x in (primitives.starts, primitives.goals))
+        if formulation == "original" and np.abs(primitives.goals[i] - primitives.starts[i]).min() < 0.01 * size:
+            continue
+        via = [[0.3, (start + 0.1 * size).tolist()], [0.71, (goal - 0.1 * size).tolist()]]
+        for options in (
+            {},
+            {"start": start.tolist(), "goal": goal.tolist()},
+            {"goal": goal.tolist(), "via": via, "samples": 157, "duration": 2.0},
+        ):
+            named = {"n_samples" if name == "samples" else name: value for name, value in options.items()}
+            moved = primitives[i : i + 1].rollout(**named)
+            asked.append({"ask": "rollout", "symbol": one.label, "formulation": formulation, "asked": options})
+            asked.append(question("rollout", one, formulation=formulation, asked=options))
+            expected += [(moved, size)] * 2
+    for got, (moved, size) in zip(ask(snapshot, asked), expected, strict=True):
+        np.testing.assert_allclose(got["times"], moved.times[0], atol=1e-9)
+        assert np.abs(np.array(got["positions"]) - moved.positions[0]).max() <= MOVED * size
+
+
+@pytest.mark.parametrize(
+    "dmp",
+    [kineme.DMP(gating="phase"), kineme.DMP(stiffness=300.0, damping=60.0), kineme.DMP(damping=5.0, n_basis=12)],
+    ids=["gated", "overdamped", "underdamped"],
+)
+def test_primitives_of_other_specifications_move_as_in_python(dmp):
+    demos = kineme.load_lasa(["CShape", "Sine"])[::7]
+    primitives = dmp.learn(demos)
+    snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos), dmp)
+    asked = [{"ask": "rollout", "symbol": one.label, "asked": {"goal": [10.0, 5.0]}} for one in demos]
+    asked += [question("rollout", one, asked={"goal": [10.0, 5.0]}) for one in demos]
+    wanted = primitives.rollout(goal=[10.0, 5.0]).positions
+    for got, positions in zip(ask(snapshot, asked), [*wanted, *wanted], strict=True):
+        assert np.abs(np.array(got["positions"]) - positions).max() <= MOVED * np.ptp(positions, axis=0).max()
+
+
+#: File -> constants, each with a value that is wrong.
+WRONG = {
+    "preparation.js": [("TIME_SHARE = 1e-3", "TIME_SHARE = 2e-3")],
+    "recognition.js": [("EXPONENT = 15", "EXPONENT = 14.9"), ("0.25 * Math.PI", "0.2501 * Math.PI")],
+    "distances.js": [
+        ("how.line_weight ** 0.25", "how.line_weight ** 0.26"),
+        ("how.turning_weight)", "how.turning_weight * 1.001)"),
+    ],
+    "description.js": [("N_POINTS = 199", "N_POINTS = 198"), ("0.5 * (ends", "0.501 * (ends")],
+    "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01")],
+}
+
+
+@pytest.mark.parametrize(("file", "right", "wrong"), [(file, *pair) for file, pairs in WRONG.items() for pair in pairs])
+def test_a_wrong_constant_is_seen(file, right, wrong, tmp_path):
+    shutil.copytree(FOLDER, tmp_path / "javascript")
+    path = tmp_path / "javascript" / file
+    text = path.read_text()
+    assert right in text
+    path.write_text(text.replace(right, wrong))
+    demos = kineme.load_lasa()
+    recognizer = kineme.Recognizer().fit(demos[one_in(1, demos)])
+    movements = perturbed(demos[one_in(1, demos, 3)])
+    try:
+        worst = compare_answers(recognizer, movements, tmp_path / "javascript" / "runtime.js")
+    except AssertionError:  # node refused
+        return
+    assert worst > 2 * SIMILAR
+
+
+def test_the_runtime_is_small_and_every_file_is_correct_javascript():
+    files = sorted(FOLDER.glob("*.js"))
+    lines = [line.strip() for path in files for line in path.read_text().splitlines()]
+    code = [line for line in lines if line and not line.startswith(("//", "/*", "*"))]
+    assert 500 < len(code) < 1500
+    for path in files:
+        subprocess.run([NODE, "--check", path], check=True, timeout=60)
+        imported = re.findall(r'from "([^"]+)"', path.read_text())
+        assert all((FOLDER / name).is_file() and name.startswith("./") for name in imported), path.name
+
+
+def test_a_movement_that_cannot_be_used_is_refused_in_words():
+    snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([1, 1])))
+    movement = draw_shapes([1])[0]
+    backward = replace(movement, times=movement.times)
+    asked = question("recognize", backward)
+    asked["times"] = asked["times"][::-1]
+    with pytest.raises(AssertionError, match="rising times"):
+        ask(snapshot, [asked])
+    asked = question("recognize", movement)
+    asked["times"], asked["positions"] = asked["times"][:3], asked["positions"][:3]
+    with pytest.raises(AssertionError, match="at least 4 samples"):
+        ask(snapshot, [asked])

@@ -1,0 +1,113 @@
+"""Snapshots: what a page holds of a library, how large it is, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode
+
+import numpy as np
+import pytest
+from node_runtime import NODE, REASON, ask, question
+
+import kineme
+from kineme.errors import SpecificationError
+from kineme.studio.snapshot.make import MOST_NUMBERS, snapshot_of_library, snapshot_of_recognizer
+from movement_samples import draw_shapes
+
+HOSTILE = "</script><script>alert(1)</script>"
+
+
+def library_of(folder, demos, names=None, **options):
+    library = kineme.ActionLibrary(folder, create=True, **options)
+    library.learn(demos, [names[label] if names else label for label in demos.labels])
+    return library
+
+
+def test_arrays_are_written_whole_and_in_order():
+    snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(draw_shapes([2, 3])))
+    document = json.loads(snapshot.to_json())
+    block = b64decode(document["data"])
+    for name, (kind, offset, length) in document["arrays"].items():
+        array = np.frombuffer(block, kind, length, offset)
+        np.testing.assert_array_equal(array, snapshot.arrays[name].ravel(), err_msg=name)
+        assert offset % 8 == 0
+
+
+def test_names_cannot_end_the_script_element(tmp_path):
+    demos = draw_shapes([1, 1])
+    names = dict(zip(np.unique(demos.labels), [HOSTILE, "__proto__"], strict=True))
+    with library_of(tmp_path / "actions", demos, names) as library:
+        text = snapshot_of_library(library).to_json()
+    assert "<" not in text
+    assert set(json.loads(text)["classes"]) == {HOSTILE, "__proto__"}
+
+
+@pytest.mark.skipif(NODE is None, reason=REASON)
+def test_a_library_answers_in_the_runtime_as_it_does_in_python(tmp_path):
+    demos = kineme.load_lasa()
+    shown = np.arange(len(demos)) % 7 < 3
+    with library_of(tmp_path / "actions", demos[shown]) as library:
+        snapshot = snapshot_of_library(library)
+        others = demos[~shown]
+        said = library.recognize(others)
+    for got, one in zip(ask(snapshot, [question("recognize", o) for o in others]), said, strict=True):
+        assert got["label"] == one.label
+        assert got["ranked"] == list(one.ranked)
+        assert got["pKnown"] == pytest.approx(one.p_known, abs=1e-5)
+        for near, neighbor in zip(got["nearest"], one.nearest, strict=True):
+            assert snapshot.header["ids"][near["index"]] == neighbor.index
+            assert near["similarity"] == pytest.approx(neighbor.similarity, abs=1e-5)
+
+
+@pytest.mark.skipif(NODE is None, reason=REASON)
+def test_the_prototype_of_a_symbol_moves(tmp_path):
+    demos = draw_shapes([3, 4])
+    with library_of(tmp_path / "actions", demos) as library:
+        library.annotate("kind 01", prototype=int(library.ids("kind 01")[2]))
+        snapshot = snapshot_of_library(library)
+        wanted = library.primitives(ids=library.ids("kind 01")[2:3]).rollout(goal=[3.0, 4.0]).positions[0]
+    (got,) = ask(snapshot, [{"ask": "rollout", "symbol": "kind 01", "asked": {"goal": [3.0, 4.0]}}])
+    np.testing.assert_allclose(got["positions"], wanted, atol=1e-9)
+
+
+def test_a_hundred_symbols_are_below_two_megabytes(tmp_path):
+    """Of 12 movements each as many are taken as fit; the answers are those of a library of these."""
+    demos = draw_shapes([12] * 100, seed=2, n_samples=30)
+    with library_of(tmp_path / "actions", demos) as library:
+        snapshot = snapshot_of_library(library)
+    assert snapshot.header["n_all"] == 1200
+    assert snapshot.header["n_movements"] == 600
+    assert snapshot.arrays["paths"].size <= MOST_NUMBERS
+    assert np.diff(snapshot.header["first"]).tolist() == [6] * 99
+    assert len(snapshot.to_json()) < 1_800_000
+
+
+def test_of_unequal_symbols_the_large_ones_are_cut(tmp_path):
+    demos = draw_shapes([1, 30, 4], seed=2, n_samples=30)
+    with library_of(tmp_path / "actions", demos) as library:
+        taken = snapshot_of_library(library, most_numbers=15 * 199 * 2).header
+        assert taken["first"] == [0, 1, 11]
+        assert taken["ids"][:2] == [1, 2]
+        assert taken["ids"][10] == 31
+        with pytest.raises(SpecificationError, match="at most 2 symbols"):
+            snapshot_of_library(library, most_numbers=2 * 199 * 2)
+
+
+@pytest.mark.parametrize(
+    ("settings", "d", "message"),
+    [
+        ({"classifier": "svm"}, 2, "svm"),
+        ({"max_angle": 0.5}, 3, "rotation prior"),
+        ({"rotation_prior": None}, 3, "rotation prior"),
+    ],
+)
+def test_what_the_runtime_lacks_is_refused(settings, d, message):
+    recognizer = kineme.Recognizer(**settings).fit(draw_shapes([2, 2], d))
+    with pytest.raises(SpecificationError, match=message):
+        snapshot_of_recognizer(recognizer)
+
+
+def test_a_library_without_symbols_is_refused(tmp_path):
+    library = kineme.ActionLibrary(tmp_path / "actions", create=True)
+    with library, pytest.raises(SpecificationError, match="symbol"):
+        snapshot_of_library(library)

@@ -1,0 +1,226 @@
+"""Who may ask the studio what, and what nobody may."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from starlette.websockets import WebSocketDisconnect
+from studio_samples import BEARER, LIVE, TOKEN, asked
+
+from kineme.studio.server import access, bodies
+from kineme.studio.server.studio import Studio
+
+READS = ["/api/library", "/api/library/history", "/", "/index.html", "/api/openapi.json", "/nothing"]
+
+
+@pytest.mark.parametrize("path", READS)
+def test_without_the_token_nothing_is_answered(client, path):
+    for headers in ({}, {"Authorization": "Bearer "}, {"Authorization": f"Basic {TOKEN}"}, {"Cookie": "kineme_=x"}):
+        answer = client.get(path, headers={"Authorization": "", **headers})
+        assert answer.status_code == 401
+        assert "open the address that kineme studio printed" in answer.json()["error"]
+
+
+@pytest.mark.parametrize("token", ["", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "\xe4", "%00"])
+def test_a_wrong_token_opens_nothing(client, token):
+    for path in ("/", "/api/library"):
+        assert client.get(path, params={"token": token}, headers={"Authorization": ""}).status_code == 401
+
+
+def test_the_address_with_the_token_sets_a_cookie_that_scripts_and_other_sites_cannot_use(client):
+    bare = {"Authorization": ""}
+    answer = client.get("/", params={"token": TOKEN}, headers=bare, follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/")
+    cookie = answer.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    assert client.get("/api/library", headers=bare).status_code == 200  # the client kept it
+
+
+def test_tokens_in_addresses_open_nothing_but_the_page(client):
+    assert client.get("/api/library", params={"token": TOKEN}, headers={"Authorization": ""}).status_code == 401
+
+
+NAMES = ["evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example", "", "[", "10.0.0.9"]
+
+
+@pytest.mark.parametrize("host", NAMES)
+def test_a_name_that_was_pointed_here_is_refused(client, host):
+    for path in ("/", "/api/library"):
+        answer = client.get(path, headers={"Host": host})
+        assert answer.status_code == 403
+        assert "expected the address that kineme studio printed" in answer.json()["error"]
+
+
+@pytest.mark.parametrize("host", ["localhost", "localhost:9000", "127.0.0.1", "[::1]:8420", "LOCALHOST:8420"])
+def test_every_name_of_the_loopback_is_ours(client, host):
+    assert client.get("/api/library", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("host", ["192.168.0.9:8420", "[fe80::1]:8420", "robot.local", "127.0.0.1"])
+def test_on_a_network_addresses_are_ours_and_names_that_were_given(folder, open_studio, host):
+    client = open_studio(folder, hosts=("0.0.0.0", "robot.local"))
+    assert client.get("/api/library", headers={"Host": host}).status_code == 200
+    assert client.get("/api/library", headers={"Host": "evil.example"}).status_code == 403
+
+
+def test_the_names_of_this_machine_are_known():
+    assert access.own_names("0.0.0.0")[0] == "0.0.0.0"
+    assert all(access.own_names("0.0.0.0"))
+
+
+ORIGINS = ["http://evil.example", "null", "http://127.0.0.1:3000", "file://", "https://localhost:8420", "http://", ""]
+
+
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_a_page_of_another_site_neither_writes_nor_reads_nor_listens(client, origin):
+    headers = {"Origin": origin}
+    version = client.get("/api/library").json()["version"]
+    assert client.post("/api/library/undo", headers=headers).status_code == 403
+    assert client.get("/api/library", headers=headers).status_code == 403
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect(LIVE, headers=headers):
+        pass
+    assert client.get("/api/library").json()["version"] == version
+
+
+def test_the_own_page_and_programs_may_write(client):
+    for headers in ({}, {"Origin": "http://127.0.0.1:8420"}, {"Sec-Fetch-Site": "same-origin"}):
+        answer = client.post("/api/library/movements", json=asked(7, label="new"), headers=headers)
+        assert answer.status_code == 200
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_forms_and_images_of_other_sites_write_nothing(client, site):
+    headers = {"Sec-Fetch-Site": site, "Content-Type": "text/plain"}
+    assert client.post("/api/library/undo", headers=headers, content="{}").status_code == 403
+
+
+def test_websockets_want_the_token_too(client):
+    with client.websocket_connect(LIVE):
+        pass
+    for headers in ({"Authorization": ""}, {"Authorization": "Bearer x"}):
+        with pytest.raises(WebSocketDisconnect), client.websocket_connect(LIVE, headers=headers):
+            pass
+    with client.websocket_connect(f"{LIVE}?token={TOKEN}", headers={"Authorization": ""}):
+        pass
+
+
+@pytest.mark.parametrize("path", ["/", "/api/library", "/nothing", "/style.css"])
+def test_every_answer_tells_browsers_to_keep_to_this_server(client, path):
+    headers = client.get(path).headers
+    policy = dict(part.strip().partition(" ")[::2] for part in headers["content-security-policy"].split(";"))
+    assert policy["default-src"] == "'none'"
+    assert policy["script-src"] == policy["style-src"] == "'self'"
+    assert policy["frame-ancestors"] == "'none'"
+    assert "unsafe" not in headers["content-security-policy"]
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["x-frame-options"] == "DENY"
+
+
+def test_refusals_tell_it_too(client):
+    assert "content-security-policy" in client.get("/", headers={"Authorization": ""}).headers
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../app.py", "/%2e%2e/app.py", "/..%2fserver/app.py", "//etc/passwd", "/__init__.py", "/web/index.html", "/."],
+)
+def test_no_other_file_is_served(client, path):
+    assert client.get(path).status_code in {400, 404}
+
+
+def _chunks(n):
+    yield b'{"times": ['
+    for _ in range(n):
+        yield b"0," * 2**19
+
+
+@pytest.mark.parametrize("announced", [True, False])
+def test_bodies_that_are_too_large_are_refused_before_they_are_held(client, announced):
+    body = b" " * (bodies.JSON_BYTES + 1) if announced else _chunks(20)
+    answer = client.post("/api/recognize", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 413
+    assert "expected at most 8 MB" in answer.json()["error"]
+
+
+BODIES = {
+    "no JSON": "{",
+    "deep": "[" * 100_000,
+    "another kind": "[1]",
+    "text": json.dumps({"times": "abc", "positions": []}),
+    "NaN": '{"times": [0, 1, 2, 3, NaN], "positions": [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]}',
+    "infinite": '{"times": [0, 1, 2, 3, 1e999], "positions": [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]}',
+    "ragged": json.dumps({"times": [0, 1, 2, 3], "positions": [[0, 0], [1, 1], [2], [3, 3]]}),
+    "short": json.dumps({"times": [0, 1], "positions": [[0, 0], [1, 1]]}),
+    "lengths": json.dumps({"times": [0, 1, 2, 3, 4], "positions": [[0, 0], [1, 1], [2, 2], [3, 3]]}),
+    "backwards": json.dumps({"times": [3, 2, 1, 0], "positions": [[0, 0], [1, 1], [2, 2], [3, 3]]}),
+    "in space": json.dumps({"times": [0, 1, 2, 3], "positions": [[0, 0, 0], [1, 1, 1], [2, 2, 1], [3, 3, 1]]}),
+    "unknown field": json.dumps({**asked(1), "labels": ["x"]}),
+    "name": json.dumps(asked(1, label="a\0b")),
+    "half a character": '{"label": "\\ud800", ' + json.dumps(asked(1))[1:],
+    "huge": json.dumps({"times": [0, 1, 2, 3], "positions": [[0, 0], [1, 10**400], [2, 2], [3, 3]]}),
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("path", ["/api/library/movements", "/api/recognize"])
+def test_nonsense_is_refused_in_a_sentence_and_changes_nothing(client, path, body):
+    version = client.get("/api/library").json()["version"]
+    answer = client.post(path, content=BODIES[body].encode(), headers={"Content-Type": "application/json"})
+    assert 400 <= answer.status_code < 500, answer.text
+    assert "expected" in answer.json()["error"] or "JSON" in answer.json()["error"] or "body" in answer.json()["error"]
+    assert client.get("/api/library").json()["version"] == version
+
+
+WRITES = [
+    ("post", "/api/library/movements", asked(5, label="x")),
+    ("post", "/api/library/movements/assign", {"ids": [1], "symbol": "x"}),
+    ("post", "/api/library/movements/delete", {"ids": [1]}),
+    ("post", "/api/library/symbols/merge", {"ids": ["x"], "into": "y"}),
+    ("post", "/api/library/symbols/x/rename", {"name": "y"}),
+    ("post", "/api/library/symbols/x/describe", {"text": "y"}),
+    ("post", "/api/library/symbols/x/split", {"ids": [1], "name": "y"}),
+    ("delete", "/api/library/symbols/x", None),
+    ("post", "/api/library/undo", {}),
+]
+
+
+def test_for_reading_only_every_change_is_refused(folder, open_studio):
+    client = open_studio(folder, read_only=True)
+    before = client.get("/api/library").json()
+    assert (before["read_only"], before["can_undo"]) == (True, False)
+    for method, path, body in WRITES:
+        answer = client.request(method, path, json=body)
+        assert answer.status_code == 403, path
+        assert "without --read-only" in answer.json()["error"]
+    assert client.post("/api/recognize", json=asked(2)).json()["label"] == "kind 2"
+    assert client.get("/api/library").json() == before
+
+
+def test_every_writing_route_is_among_those(client):
+    writing = set()
+    for path, methods in client.get("/api/openapi.json").json()["paths"].items():
+        writing |= {(method, path) for method in methods if path.startswith("/api/library") and method != "get"}
+    assert len(writing) == len(WRITES)
+
+
+def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch, caplog):
+    def fail(self):
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr(Studio, "shown", fail)
+    answer = client.get("/api/library/movements?symbol=x")
+    assert answer.status_code == 500
+    assert "secret" not in answer.text
+    assert "secret" in caplog.text
+
+
+def test_the_interface_is_described(client):
+    described = client.get("/api/openapi.json").json()
+    for path, methods in described["paths"].items():
+        for method, one in methods.items():
+            assert one.get("summary"), (method, path)
+            assert one.get("description"), (method, path)
+    assert BEARER["Authorization"].split()[1] not in json.dumps(described)

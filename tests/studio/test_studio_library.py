@@ -1,0 +1,186 @@
+"""What the studio shows of a library, and what it changes."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from studio_samples import asked, drawing, make_library
+
+from kineme import ActionLibrary
+
+HOSTILE = [
+    "<img src=x onerror=alert(1)>",
+    "'; DROP TABLE movement",
+    "a/../b",
+    "\u202egnirts",
+    "名前 🤚",
+    " ",
+    "x" * 9000,
+]
+
+
+def _symbols(client):
+    return {one["name"]: one for one in client.get("/api/library").json()["symbols"]}
+
+
+def test_the_library_is_shown(client, folder):
+    shown = client.get("/api/library").json()
+    assert (shown["n_movements"], shown["n_dims"], shown["unlabeled"], shown["version"]) == (12, 2, 0, 1)
+    assert (shown["read_only"], shown["can_undo"], shown["folder"]) == (False, True, str(folder))
+    assert [one["name"] for one in shown["symbols"]] == [f"kind {k}" for k in range(4)]
+    assert all(one["n_members"] == 3 and 2 <= len(one["path"]) <= 64 for one in shown["symbols"])
+    with ActionLibrary(folder, read_only=True) as library:
+        first = library.movements(ids=[1])[0].positions
+    assert shown["symbols"][0]["path"][0] == pytest.approx(first[0].tolist(), abs=1e-4)
+    assert shown["symbols"][0]["path"][-1] == pytest.approx(first[-1].tolist(), abs=1e-4)
+
+
+def test_a_new_library_is_made_and_learns_its_first_movement(tmp_path, open_studio):
+    client = open_studio(tmp_path / "new")
+    shown = client.get("/api/library").json()
+    assert (shown["n_movements"], shown["n_dims"], shown["symbols"], shown["can_undo"]) == (0, None, [], False)
+    assert client.get("/api/library/map").json() == {"points": []}
+    answer = client.post("/api/library/movements", json=asked(1, label="first", group="Ann")).json()
+    assert answer == {"ids": [1], "version": 1}
+    assert _symbols(client)["first"]["n_members"] == 1
+    assert client.get("/api/library/movements").json()["movements"][0]["group"] == "Ann"
+
+
+def test_no_library_to_read_only_is_refused(tmp_path, open_studio):
+    with pytest.raises(OSError, match="expected a library in"):
+        open_studio(tmp_path / "none", read_only=True)
+
+
+def test_movements_are_listed_some_at_a_time(client):
+    key = _symbols(client)["kind 2"]["id"]
+    own = client.get("/api/library/movements", params={"symbol": key}).json()
+    assert (own["total"], [one["id"] for one in own["movements"]]) == (3, [7, 8, 9])
+    assert {one["symbol"] for one in own["movements"]} == {key}
+    some = client.get("/api/library/movements", params={"offset": 10, "limit": 5}).json()
+    assert (some["total"], [one["id"] for one in some["movements"]]) == (12, [11, 12])
+    assert client.get("/api/library/movements", params={"unlabeled": 1}).json() == {"total": 0, "movements": []}
+    assert client.get("/api/library/movements", params={"symbol": "sym-none"}).status_code == 404
+    assert client.get("/api/library/movements", params={"offset": -1}).status_code == 422
+
+
+def test_a_whole_movement_is_as_it_was_learned(client):
+    one = client.get("/api/library/movements/8").json()
+    times, positions = drawing(2, seed=1)
+    assert one["times"] == pytest.approx(times.tolist(), abs=1e-6)
+    assert [x for x, _ in one["positions"]] == pytest.approx(positions[:, 0].tolist(), abs=1e-5)
+    assert client.get("/api/library/movements/99").status_code == 404
+    assert client.get("/api/library/movements/x").status_code == 422
+
+
+def test_on_the_map_members_of_a_symbol_are_nearest_to_each_other(client):
+    points = client.get("/api/library/map").json()["points"]
+    assert len(points) == 12
+    for one in points:
+        others = [other for other in points if other is not one]
+        near = min(others, key=lambda other: (one["x"] - other["x"]) ** 2 + (one["y"] - other["y"]) ** 2)
+        assert near["symbol"] == one["symbol"]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_any_name_is_text(client, folder, name):
+    assert client.post("/api/library/movements", json=asked(6, label=name)).status_code == 200
+    assert name in _symbols(client)
+    assert client.post("/api/recognize", json=asked(6, seed=98)).json()["label"] == name
+    with ActionLibrary(folder, read_only=True) as library:
+        assert name in library
+
+
+def test_symbols_are_renamed_described_split_merged_and_deleted(client):
+    key = _symbols(client)["kind 0"]["id"]
+
+    def change(path, **body):
+        answer = client.post(f"/api/library/{path}", json=body)
+        assert answer.status_code == 200, answer.text
+
+    change(f"symbols/{key}/rename", name="wave")
+    change(f"symbols/{key}/describe", text="a hand")
+    assert (_symbols(client)["wave"]["id"], _symbols(client)["wave"]["description"]) == (key, "a hand")
+    change(f"symbols/{key}/split", ids=[1], name="half")
+    assert (_symbols(client)["wave"]["n_members"], _symbols(client)["half"]["n_members"]) == (2, 1)
+    both = [one["id"] for name, one in _symbols(client).items() if name in {"wave", "half"}]
+    change("symbols/merge", ids=both, into="whole")
+    assert _symbols(client)["whole"]["n_members"] == 3
+    change("movements/assign", ids=[4, 5], symbol="whole")
+    change("movements/assign", ids=[1], symbol=None)
+    assert client.get("/api/library").json()["unlabeled"] == 1
+    change("movements/delete", ids=[2])
+    assert (_symbols(client)["whole"]["n_members"], client.get("/api/library").json()["n_movements"]) == (3, 11)
+    assert client.delete(f"/api/library/symbols/{_symbols(client)['whole']['id']}").status_code == 200
+    assert "whole" not in _symbols(client)
+    history = client.get("/api/library/history").json()
+    assert [one["what"] for one in history["versions"]][:4] == ["delete", "delete", "release", "assign"]
+    for _ in range(8):
+        assert client.post("/api/library/undo").status_code == 200
+    assert {name: one["n_members"] for name, one in _symbols(client).items()} == {f"kind {k}": 3 for k in range(4)}
+    assert _symbols(client)["kind 0"]["id"] == key
+
+
+def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
+    seen = client.get("/api/library").json()["version"]
+    with ActionLibrary(folder) as other:
+        other.rename("kind 1", "elsewhere")
+    answer = client.post("/api/library/undo", json={"version": seen})
+    assert answer.status_code == 409
+    assert "look at what has changed" in answer.json()["error"]
+    assert client.post("/api/library/undo", json={"version": seen + 1}).json() == {"version": seen + 2}
+    assert "kind 1" in _symbols(client)
+
+
+def test_what_is_gone_meanwhile_is_a_conflict_and_what_never_was_is_missing(client, folder):
+    shown = client.get("/api/library").json()
+    key, seen = shown["symbols"][0]["id"], shown["version"]
+    with ActionLibrary(folder) as other:
+        other.delete("kind 0")
+        other.delete([12])
+    for path, body in ((f"symbols/{key}/rename", {"name": "x"}), ("movements/delete", {"ids": [12]})):
+        assert client.post(f"/api/library/{path}", json={**body, "version": seen}).status_code == 409
+        assert client.post(f"/api/library/{path}", json=body).status_code == 404
+    name = {"name": "kind 2"}
+    taken = client.post(f"/api/library/symbols/{_symbols(client)['kind 1']['id']}/rename", json=name)
+    assert taken.status_code == 400
+    assert "a name that no symbol has" in taken.json()["error"]
+
+
+def test_a_movement_that_is_there_already_is_named_not_doubled(client):
+    first = client.post("/api/library/movements", json=asked(8)).json()
+    again = client.post("/api/library/movements", json=asked(8, label="named")).json()
+    assert again["ids"] == first["ids"]
+    assert client.get("/api/library").json()["n_movements"] == 13
+
+
+def test_the_answer_is_that_of_the_library(client, folder):
+    given = asked(3, seed=5)
+    answer = client.post("/api/recognize", json=given).json()
+    with ActionLibrary(folder, read_only=True) as library:
+        ours = library.recognize(_array(given))
+    assert (answer["label"], answer["calibrated"]) == (ours.label, ours.calibrated)
+    assert answer["p_values"] == pytest.approx(dict(ours.p_values))
+    assert [one["name"] for one in answer["ranked"]] == list(ours.ranked)
+    assert [one["id"] for one in answer["nearest"]] == [one.index for one in ours.nearest]
+    json.dumps(answer, allow_nan=False)
+
+
+def _array(given):
+    from kineme import Trajectory
+
+    return Trajectory(given["times"], given["positions"])
+
+
+def test_nothing_to_recognize_with_is_said(tmp_path, open_studio):
+    answer = open_studio(tmp_path / "new").post("/api/recognize", json=asked(1))
+    assert answer.status_code == 400
+    assert "expected a library with movements that show a symbol" in answer.json()["error"]
+
+
+def test_a_library_in_space(tmp_path, open_studio):
+    client = open_studio(make_library(tmp_path / "space", d=3))
+    shown = client.get("/api/library").json()
+    assert shown["n_dims"] == 3
+    assert len(shown["symbols"][0]["path"][0]) == 3
+    assert client.post("/api/recognize", json=asked(1)).status_code == 400

@@ -1,0 +1,183 @@
+"""Movements under way, over the websocket."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+import pytest
+from studio_samples import LIVE, asked, samples
+
+from kineme import ActionLibrary
+from kineme.errors import TrajectoryError
+from kineme.studio.server.live_session import parsed_samples
+
+
+def _said(socket, kind):
+    """The next message of a kind, past those of changes."""
+    while kind not in (message := socket.receive_json()):
+        assert set(message) <= {"changed", "state"}, message
+    return message[kind]
+
+
+def _draw(socket, k, seed=99, step=6):
+    rows = samples(k, seed)
+    for start in range(0, len(rows), step):
+        socket.send_json({"samples": rows[start : start + step]})
+        state = _said(socket, "state")
+    return state
+
+
+def test_a_drawing_is_named_while_it_is_drawn_and_at_its_end(client, folder):
+    with client.websocket_connect(LIVE) as socket:
+        state = _draw(socket, 2)
+        assert state["ranked"][0]["name"] == state["decided"] == "kind 2"
+        assert state["progress"] > 0.8
+        assert 0 <= state["unknown"] < 0.5
+        assert state["arrival"] == pytest.approx(1.5, abs=0.3)
+        assert np.shape(state["path"]) == (20, 2)
+        socket.send_json({"finish": True})
+        answer = _said(socket, "answer")
+        assert answer["label"] == "kind 2"
+        assert answer["nearest"][0]["id"] in {7, 8, 9}
+        assert _draw(socket, 1)["decided"] == "kind 1"  # after the end another one begins
+        socket.send_json({"reset": True})
+        assert _draw(socket, 3)["decided"] == "kind 3"
+
+
+def test_states_are_those_of_a_stream_of_the_library(client, folder):
+    rows = np.array(samples(1))
+    with ActionLibrary(folder, read_only=True) as library:
+        ours = library.stream().update(rows[:30, 0], rows[:30, 1:])
+    with client.websocket_connect(LIVE) as socket:
+        socket.send_json({"samples": rows[:30].tolist()})
+        state = _said(socket, "state")
+    assert [one["name"] for one in state["ranked"]] == [one.label for one in ours.ranked]
+    assert state["ranked"][0]["share"] == pytest.approx(ours.ranked[0].confidence)
+    assert state["progress"] == pytest.approx(ours.progress)
+    assert np.array(state["path"]) == pytest.approx(ours.path)
+
+
+NONSENSE = [
+    "",
+    "{",
+    "[]",
+    "null",
+    "7",
+    '"samples"',
+    "{}",
+    '{"samples": null}',
+    '{"samples": []}',
+    '{"samples": [1, 2]}',
+    '{"samples": [[]]}',
+    '{"samples": [[0]]}',
+    '{"samples": [["0", 1, 2]]}',
+    '{"samples": [[0, true, 2]]}',
+    '{"samples": [[0, null, 2]]}',
+    '{"samples": [[0, NaN, 2]]}',
+    '{"samples": [[0, 1e999, 2]]}',
+    '{"samples": [[0, 1e200, 2]]}',
+    '{"samples": [[0, 1, 2], [1, 2]]}',
+    '{"samples": [[0, 1' + "0" * 500 + ", 2]]}",
+    '{"reset": 1}',
+    '{"finish": "yes"}',
+    '{"__proto__": 1}',
+    "[" * 50_000,
+    '{"samples": ' + json.dumps([[0, 1, 2]] * 10_001) + "}",
+]
+
+
+def test_nonsense_is_answered_in_a_sentence_and_the_stream_goes_on(client):
+    with client.websocket_connect(LIVE) as socket:
+        _draw(socket, 0)
+        for text in NONSENSE:
+            socket.send_text(text)
+            assert "expected" in _said(socket, "error"), text
+        socket.send_bytes(b"\xff\x00")
+        assert "expected" in _said(socket, "error")
+        socket.send_json({"finish": True})
+        assert _said(socket, "answer")["label"] == "kind 0"
+
+
+def test_samples_that_do_not_fit_are_skipped_and_counted(client):
+    with client.websocket_connect(LIVE) as socket:
+        _draw(socket, 0)
+        socket.send_json({"samples": [[0.1, 5, 5], [1.7, 1, 2]]})
+        state = _said(socket, "state")
+        assert state["skipped"] >= 1
+        socket.send_json({"samples": [[2.0, 1, 2, 3]]})
+        state = _said(socket, "state")
+        assert any("skipped" in one for one in state["status"])
+        socket.send_json({"finish": True})
+        assert _said(socket, "answer")["ranked"]
+
+
+def test_too_little_to_answer_is_said(client):
+    with client.websocket_connect(LIVE) as socket:
+        socket.send_json({"samples": [[0, 0, 0], [0.1, 1, 1]]})
+        state = _said(socket, "state")
+        assert (state["ranked"], state["progress"], state["arrival"], state["path"]) == ([], 0.0, None, [])
+        socket.send_json({"finish": True})
+        assert "at least 4" in _said(socket, "error")
+        socket.send_json({"finish": True})
+        assert _said(socket, "answer") is None
+
+
+def test_what_was_named_is_known_to_the_next_drawing(client):
+    with client.websocket_connect(LIVE) as socket:
+        before = _draw(socket, 9)
+        assert "new" not in {one["name"] for one in before["ranked"]}
+        client.post("/api/library/movements", json=asked(9, label="new"))
+        assert _said(socket, "changed") == 2
+        socket.send_json({"reset": True})
+        assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
+
+
+def test_in_an_empty_library_drawings_are_taken_and_nothing_is_said(tmp_path, open_studio):
+    client = open_studio(tmp_path / "new")
+    with client.websocket_connect(LIVE) as socket:
+        state = _draw(socket, 1)
+        assert (state["ranked"], state["decided"], state["unknown"]) == ([], None, None)
+        socket.send_json({"finish": True})
+        assert _said(socket, "answer") is None
+
+
+def test_changes_of_others_are_told_to_everyone(client, folder):
+    with client.websocket_connect(LIVE) as one, client.websocket_connect(LIVE) as two:
+        for socket in (one, two):
+            socket.send_json({"watch": True})
+        start = time.perf_counter()
+        with ActionLibrary(folder) as other:
+            other.rename("kind 1", "elsewhere")
+        assert _said(one, "changed") == _said(two, "changed") == 2
+        assert time.perf_counter() - start < 2.0
+
+
+def test_clients_that_leave_are_forgotten(client):
+    listeners = client.app.state.changes._listeners
+    for _ in range(5):
+        with client.websocket_connect(LIVE) as socket:
+            socket.send_json({"samples": samples(1)})
+    deadline = time.perf_counter() + 5
+    while listeners and time.perf_counter() < deadline:
+        time.sleep(0.01)
+    assert not listeners
+
+
+def test_each_client_has_its_own_stream(client):
+    with client.websocket_connect(LIVE) as one, client.websocket_connect(LIVE) as two:
+        a, b = samples(0), samples(3)
+        for start in range(0, 60, 10):
+            one.send_json({"samples": a[start : start + 10]})
+            two.send_json({"samples": b[start : start + 10]})
+        for socket in (one, two):
+            socket.send_json({"finish": True})
+        best = [_said(socket, "answer")["ranked"][0]["name"] for socket in (one, two)]
+        assert best == ["kind 0", "kind 3"]
+
+
+def test_samples_are_numbers_in_rows():
+    assert parsed_samples([[0, 1.5, 2]]).tolist() == [[0.0, 1.5, 2.0]]
+    with pytest.raises(TrajectoryError, match="rows of different lengths"):
+        parsed_samples([[0, 1], [0, 1, 2]])
