@@ -66,6 +66,22 @@ def test_what_a_module_imports_is_there(path):
             assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{name} is imported and not used"
 
 
+def _reached(path, known):
+    """All modules that one imports, and those that they import."""
+    for source in re.findall(r' from "([^"]+)";', path.read_text()):
+        there = (path.parent / source).resolve()
+        if there not in known:
+            known.add(there)
+            _reached(there, known)
+    return known
+
+
+def test_the_page_loads_all_modules_at_once():
+    """Not one after the other, as each is found in another: the first view comes sooner."""
+    preloaded = re.findall(r'rel="modulepreload" href="/([^"]+)"', (WEB / "index.html").read_text())
+    assert preloaded == sorted(_name(path) for path in _reached(WEB / "app.js", set()))
+
+
 @pytest.mark.parametrize("path", PAGES, ids=_name)
 def test_a_page_has_nothing_inline_that_its_policy_would_forbid(path):
     text = path.read_text()

@@ -38,6 +38,7 @@ const live = new Live({
   here: () => (connected(true), draw.renewed(), tried(refresh)),
   away: () => connected(false),
 });
+tried(refresh); // without waiting for the websocket
 startLibrary();
 startMove();
 startRecordings();

@@ -82,14 +82,14 @@ export class AnswerPanel {
     const ranked = answer.ranked.map((/** @type {any} */ one) => ({ name: one.name, value: one.p_value ?? answer.p_values?.[one.name] ?? one.share ?? 0 }));
     const nearest = answer.nearest?.[0];
     const like = nearest ? `similarity ${nearest.similarity.toFixed(2)}` : "";
-    if (answer.label === null) this.words("The answer", "Unknown", "unlike everything that is known", "unknown");
+    if (answer.label === null) this.words("The answer", "Unknown", `unlike everything that is known${answer.p_known === null || answer.p_known === undefined ? "" : `, p-value ${pValue(answer.p_known)}`}`, "unknown");
     else {
       const p = ranked.find((/** @type {any} */ one) => one.name === answer.label)?.value;
-      const sure = answer.calibrated ? `p-value ${pValue(p ?? 0)}` : "a guess, until there are more drawings";
+      const sure = answer.calibrated ? `p-value ${pValue(p ?? 0)}` : "a guess until more is drawn";
       this.words("This is", answer.label, [sure, like].filter(Boolean).join(", "), "known");
     }
     this.progress(1);
-    this.kind("p-values: share of the known ones that are as unusual");
+    this.kind("p-value of each name");
     this.list(ranked, null, pValue);
     this.speak(answer.label === null ? "Unknown. Give it a name." : `This is ${answer.label}.`);
   }

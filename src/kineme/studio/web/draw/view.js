@@ -55,6 +55,7 @@ class Draw {
     byId("draw-replay").addEventListener("click", () => this.picture.replay(() => {}));
     byId("draw-move").addEventListener("click", () => this.move());
     document.addEventListener("keydown", (event) => event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear());
+    byId("draw-how").addEventListener("click", () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()));
     onLibrary(() => this.invite());
     describeLiveSource(byId("live-source-text"));
   }
@@ -66,10 +67,11 @@ class Draw {
     byId("draw-empty").hidden = this.picture.ink.length > 0;
     byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
-      ? "This library holds movements that a mouse cannot draw. Send samples from a program instead: see below the answer."
+      ? "This library holds movements that a mouse cannot draw. Send samples from a program instead."
       : symbols.length || readOnly
         ? "In one stroke, with mouse, pen or finger. What it is appears while you draw."
         : "Draw a movement in one stroke, then give it a name. One drawing is enough to be recognized again.";
+    byId("draw-how").hidden = takes;
     if (!takes) byId("live-source").open = true;
   }
 
@@ -115,6 +117,16 @@ class Draw {
     this.focusName();
   }
 
+  /** One movement has a name: too few to say what is unlike it. */
+  cannotCompare() {
+    const names = library().symbols.map((/** @type {any} */ one) => one.name);
+    this.panel.words("Too few to compare", "?", names.length ? `Is it ${names[0]}, or something new? Name it.` : "Give it a name.", "unknown");
+    this.panel.progress(1);
+    this.panel.speak("Give it a name.");
+    this.naming.allow(true, names.slice(0, 3));
+    this.focusName();
+  }
+
   /** Without a websocket the whole movement is asked for at once. */
   async askOnce() {
     const asked = this.whole;
@@ -139,7 +151,7 @@ class Draw {
   /** @param {any} answer */
   show(answer) {
     this.waits = false;
-    if (answer === null) return this.isNew();
+    if (answer === null) return this.cannotCompare();
     this.panel.final(answer);
     this.label = answer.label;
     byId("draw-move").disabled = answer.label === null;

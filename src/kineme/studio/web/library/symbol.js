@@ -65,7 +65,7 @@ export class SymbolPanel {
     this.opened = id;
     this.version = -1;
     this.show();
-    if (focus && matchMedia("(max-width: 60rem)").matches) byId("symbol").scrollIntoView({ block: "start" });
+    if (focus && matchMedia("(max-width: 60rem)").matches) byId("symbol").scrollIntoView({ block: "nearest" });
     if (focus) byId("symbol").focus({ preventScroll: true });
   }
 

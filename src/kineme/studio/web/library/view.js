@@ -26,7 +26,7 @@ async function showHistory() {
   if (!byId("history").open) return;
   const answer = await tried(() => get("/api/library/history"));
   if (!answer) return;
-  const rows = [...answer.versions].reverse().slice(0, 200);
+  const rows = [...answer.versions].sort((a, b) => b.number - a.number).slice(0, 200);
   fill(byId("versions"), ...rows.map((one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
 }
 
@@ -45,7 +45,9 @@ export function startLibrary() {
   const all = () => {
     if (currentView() !== "library" || shown === library().version) return;
     shown = library().version;
+    const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
+    for (const id of ["symbol", "history", "library-head"]) byId(id).hidden = nothing;
     panel.show();
     cards();
     chose();

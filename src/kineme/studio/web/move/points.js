@@ -32,6 +32,7 @@ export function showPoints(plan, changed, removed) {
   const extra = via.length || obstacles.length;
   const heads = [...plan.start.map((/** @type {number} */ _, /** @type {number} */ k) => AXES[k] ?? String(k + 1)), ...(extra ? [via.length && obstacles.length ? "%, radius" : via.length ? "when %" : "radius"] : [])];
   const head = make("li", { class: "point head", "aria-hidden": "true" }, make("span", {}), make("span", { class: "point-fields" }, ...heads.map((text) => make("span", {}, text))));
+  byId("points").classList.toggle("deep", plan.start.length + (extra ? 1 : 0) > 3);
   byId("points").style.setProperty("--columns", String(plan.start.length + (extra ? 1 : 0)));
   keepingFocus(() => fill(byId("points"), head, row("Start", plan.start, changed, null), row("Goal", plan.goal, changed, null), ...via, ...obstacles));
 }

@@ -54,6 +54,7 @@ class Move {
     const formats = library().formats?.map((/** @type {string} */ one) => one.replace(/^\./, "")) ?? FORMATS;
     if (!byId("export-format").children.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
     byId("move-empty").hidden = id !== null;
+    byId("pick-part").hidden = id === null;
     for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
     showPick(id, (chosen) => this.choose(chosen));
     if (id === null) this.plan = this.picture.plan = null;

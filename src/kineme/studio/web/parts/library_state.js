@@ -28,13 +28,14 @@ export async function refresh() {
     return loading;
   }
   loading = get("/api/library");
+  const before = loaded ? known.version : -1;
   try {
     known = await loading;
     loaded = true;
   } finally {
     loading = null;
   }
-  for (const act of told) act(known);
+  if (known.version !== before) for (const act of told) act(known);
   if (again) {
     again = false;
     await refresh();

@@ -22,6 +22,7 @@ export class Plot {
   }
 
   paint() {
+    if (!this.curves.length) return;
     const { context, width, height } = this.board;
     const end = Math.max(...this.curves.map((one) => one.times[one.times.length - 1]), 1e-9);
     const high = Math.max(...this.curves.flatMap((one) => one.values), 1e-9);
