@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from kineme.robots.checks.check import Preflight
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.task_path import TaskPath
@@ -37,6 +39,11 @@ class RobotMovement:
     preflight: Preflight
     begins: float
     factor: float
+
+    @property
+    def first(self) -> int:
+        """Number of the sample of `trajectory` at which the movement begins."""
+        return int(np.searchsorted(self.trajectory.times, self.begins - 1e-9))
 
     def __repr__(self) -> str:
         return f"RobotMovement({self.robot.name!r}, {duration_in_words(self)})"
