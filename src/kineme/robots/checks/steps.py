@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kineme.robots.checks.check import Check
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -44,10 +45,10 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     return Check("steps", name, at, float(shares[worst]), _STANDING, "of the velocity limit", passed, slower)
 
 
-def _changes(values: Array) -> Array:
+def _changes(values: Array) -> NDArray[np.intp]:
     """Indices of the samples from which another value holds."""
     return np.flatnonzero(np.diff(values)) + 1
 
 
-def _order(values: Array, changes: Array) -> Array:
+def _order(values: Array, changes: NDArray[np.intp]) -> Array:
     return values[np.concatenate(([0], changes))]
