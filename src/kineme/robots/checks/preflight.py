@@ -168,7 +168,7 @@ def _unchecked(robot: Robot) -> Iterator[str]:
     weightless = [
         name for name, body in zip(robot.joints, list(robot.model.inertias)[1:], strict=True) if body.mass <= 0
     ]
-    if _knows_masses(robot) and weightless:
+    if knows_masses(robot) and weightless:
         yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
