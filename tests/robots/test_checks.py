@@ -8,6 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from arm_samples import simple_arm
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
+from kineme.robots.checks.along import along
+from kineme.robots.execution.approach import approach
+from kineme.robots.kinematics.task_path import TaskPath
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -98,3 +101,45 @@ def test_an_orientation_that_is_not_reached_is_refused_unless_it_is_free(tmp_pat
     about_x = Rotation.from_rotvec([1.5, 0, 0]).as_quat(scalar_first=True)
     with pytest.raises(InfeasibleError, match="turned away"):
         move(line, robot, space="tip", orientation=about_x, timing="slowed", follow="axis")
+
+
+def test_ends_in_motion_fail(tmp_path):
+    robot = simple_arm(tmp_path)
+    for speed, passes in ((0.0, True), (1e-6, False)):
+        report = checked(robot, [0.0, 1.5], velocities=[0.0, speed])
+        assert [one.passed for (what, _), one in report.items() if what == "standing at the ends"] == [passes]
+
+
+def test_a_limit_that_is_passed_between_two_samples_only_fails(tmp_path):
+    robot = simple_arm(tmp_path)
+    q, v = np.array([[0.0, 1.99]] * 4), np.array([[0.0, 0.0], [0.0, 0.5], [0.0, -0.6], [0.0, 0.0]])
+    report = preflight(robot, JointTrajectory(robot.joints, 0.2 * np.arange(4.0), q, v, 0 * v, {}))
+    failed = {check.what: check for check in report.failed}
+    assert "position" not in failed
+    assert failed["position between samples"].where == "j2"
+    assert 0.2 < failed["position between samples"].time < 0.4
+    assert failed["acceleration between samples"].time == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("off", "passes"), [(0.9e-3, True), (1.1e-3, False)])
+def test_a_tip_beside_its_path_fails(tmp_path, off, passes):
+    robot = simple_arm(tmp_path)
+    still, times = np.tile([0.0, 1.5], (3, 1)), np.arange(3.0)
+    trajectory = JointTrajectory(robot.joints, times, still, 0 * still, 0 * still, {})
+    tips = along(robot, trajectory)
+    path = TaskPath(times[1:], tips.tip_positions[1:] + np.array([0.0, off, 0.0]), tips.tip_rotations[1:])
+    found = {check.what: check for check in preflight(robot, trajectory, path).checks}["tracking"]
+    assert found.passed is passes
+    assert found.worst == pytest.approx(1e3 * off)
+
+
+def test_an_approach_takes_half_of_what_the_joints_can(tmp_path):
+    robot = simple_arm(tmp_path)
+    for end in ([1.9, 1.0], [0.01, 0.0], [-0.4, 0.3]):
+        made = approach(robot, np.zeros(2), np.array(end), 1000.0)
+        assert np.abs(made.velocities).max() <= 0.5 * 2.0 * (1 + 1e-9)
+        assert np.abs(made.accelerations).max() <= 0.5 * 5.0 * (1 + 1e-9)
+        np.testing.assert_allclose(
+            np.gradient(made.positions, made.times, axis=0)[1:-1], made.velocities[1:-1], atol=1e-4
+        )
+        np.testing.assert_allclose(made.positions[[0, -1]], [[0, 0], end], atol=1e-12)
