@@ -11,6 +11,8 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 
+_LEAST_CHANGE = 0.005  # of a change of the duration, which is said to three digits
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotMovement:
@@ -49,5 +51,5 @@ class RobotMovement:
 
 def duration_in_words(made: RobotMovement) -> str:
     """How long it takes, with how much of that is approach, and how many times as long as generated, if it is."""
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > 1e-3 else ""
+    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > _LEAST_CHANGE else ""
     return f"{made.trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}"
