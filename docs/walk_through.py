@@ -1,8 +1,8 @@
 """Walk through a page: run its Python blocks and its commands in order, in one folder, and keep what they answer.
 
 A block marked python is executed; all of a page share their names. In a block marked console, a line that begins with
-``$ `` is a command of kineme, and the lines below it are what it answers. No shell takes part. A Python block that begins
-with the import of a package in `OPTIONAL` is left out where that is not installed.
+``$ `` is a command of kineme, and the lines below it are what it answers. No shell takes part. A Python block
+that begins with the import of a package in `OPTIONAL` is left out where that is not installed.
 """
 
 from __future__ import annotations
