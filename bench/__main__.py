@@ -33,6 +33,7 @@ SUBJECTS = (
     "binning",
     "anchoring",
     "annotate",
+    "page",
     "by_person",
     "nested",
 )

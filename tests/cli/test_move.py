@@ -148,3 +148,18 @@ def test_an_arm_at_rest_elsewhere_turns_its_tip_as_there(wave):
     assert result.exit_code == 0, result.output
     first = np.loadtxt(wave / "b.csv", delimiter=",", skiprows=1)[0, 1:7]
     np.testing.assert_allclose(first, [0, -1.2, 1.4, -1.8, -1.5708, 0])
+
+
+def test_a_movement_in_millimeters_is_asked_for_its_unit(wave):
+    columns = np.loadtxt("wave.csv", delimiter=",", skiprows=1) * [1, 1000, 1000, 1000, 1]
+    np.savetxt("mm.csv", columns, delimiter=",", header="time,x,y,z,gripper", comments="")
+    result = run("mm.csv", "--robot", "panda")
+    assert result.exit_code == 1
+    assert "--scale 0.001" in result.output
+    assert run("mm.csv", "--robot", "panda", "--scale", "0.001", "--slow-down").exit_code == 0
+
+
+def test_what_takes_as_long_as_generated_is_not_said_to_take_once_as_long(wave):
+    result = run("wave.csv", "--robot", "panda", "--duration", "3")
+    assert result.exit_code == 0, result.output
+    assert "as long as generated" not in result.output

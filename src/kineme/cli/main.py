@@ -19,6 +19,7 @@ from kineme.cli.library import library
 from kineme.cli.merge_split import COMMANDS as MERGE_SPLIT
 from kineme.cli.move import move
 from kineme.cli.output import write
+from kineme.cli.page import page
 from kineme.cli.recognize import recognize
 from kineme.cli.reproduce import reproduce
 from kineme.cli.segment import segment
@@ -72,6 +73,7 @@ main.add_command(learn)
 main.add_command(library)
 for command in (*MERGE_SPLIT, *MEANING):
     library.add_command(command)
+main.add_command(page)
 main.add_command(recognize)
 main.add_command(reproduce)
 main.add_command(segment)

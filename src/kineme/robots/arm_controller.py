@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,37 +13,27 @@ from kineme.movements.rotations.matrices import matrices_of
 from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
-from kineme.robots.kinematics.inverse import InverseKinematics
+from kineme.robots.arm_state import ArmState, ArmStatus
+from kineme.robots.checks.torques import Torques
+from kineme.robots.checks.tracking import TRACKED, TURNED
+from kineme.robots.kinematics.live import LiveKinematics
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures
 from kineme.robots.models.robot import Robot, check_robot
 from kineme.validation import Array, as_numbers
 
-
-class ArmState(NamedTuple):
-    """An arm after one step of live control.
-
-    Attributes
-    ----------
-    joints, velocities : ndarray of shape (n,)
-        What to send now [rad, m], per second.
-    distance : float
-        Of the tip from where the movement is [m]: above 0 where limits of the joints hold it back.
-    movement : State
-        Of the movement; see `kineme.control.State`.
-    """
-
-    joints: Array
-    velocities: Array
-    distance: float
-    movement: State
+_TURNED = math.radians(TURNED)
+_FOLLOWS = ArmStatus(0)
+_LIMITS = (ArmStatus.POSITION_LIMIT, ArmStatus.VELOCITY_LIMIT, ArmStatus.ACCELERATION_LIMIT)  # as in `Reasons`
 
 
 class ArmController:
-    """Moves an arm step by step as the controller of a primitive says, within its limits of position and velocity.
+    """Moves an arm step by step as the controller of a primitive says, within the limits of its joints.
 
-    In each step the controller moves on, and one step of `InverseKinematics` follows it. With ``feedback="phase"`` the
-    controller is told where the tip is, so that the movement waits for an arm that its limits hold back. Accelerations,
-    torques and self-collision are not looked at.
+    In each step the controller moves on, and inverse kinematics follows it within the limits of position, velocity and
+    acceleration: joints go only as fast as they can brake before their stops, whatever the goal does. An arm that they
+    hold back lags, says so in `ArmState.status`, and closes the gap without overshooting. With ``feedback="phase"`` the
+    controller is told where the tip is, so that the movement waits for it. Torques are reported; self-collision is not
+    looked at.
 
     Parameters
     ----------
@@ -90,7 +81,7 @@ class ArmController:
                 f"expected a controller of three positions, or of poses of seven columns, got {d} columns"
             )
         self.robot, self.controller = robot, controller
-        self._ik = InverseKinematics(robot, follow, controller.dt)
+        self._ik, self._torques = LiveKinematics(robot, follow, controller.dt), Torques(robot)
         self._rotation = self._ik.tip_rotation if orientation is None else _rotation(orientation)
         controller.reset()
         self._start = self._nearest_start() if start is None else as_numbers(start, "start")
@@ -103,8 +94,8 @@ class ArmController:
         """Back to the start, movement and joints; returns the state there."""
         self._ik.reset(self._start)
         movement = self.controller.reset()
-        distance = float(np.linalg.norm(self._ik.tip_position - movement.position[:3]))
-        self.state = ArmState(self._ik.q, np.zeros(self.robot.n_joints), distance, movement)
+        self._ik.start_from(*self._pose(movement))
+        self.state = self._report(movement)
         return self.state
 
     def step(self, **told: Any) -> ArmState:
@@ -126,11 +117,20 @@ class ArmController:
         if self._waits and "position" not in told:
             told["position"] = self._tip()
         movement = self.controller.step(**told)
-        last, (position, rotation) = self.state.joints, self._pose(movement)
-        joints = self._ik.step(position, rotation)
-        velocities = (joints - last) / self.controller.dt
-        self.state = ArmState(joints, velocities, self._ik.error, movement)
+        self._ik.step(*self._pose(movement))
+        self.state = self._report(movement)
         return self.state
+
+    def _report(self, movement: State) -> ArmState:
+        ik = self._ik
+        q, distance = ik.q, ik.error
+        torques = self._torques.of(q, ik.velocities, ik.accelerations)
+        status = ArmStatus.TORQUE_LIMIT if self._torques.exceeded(torques) else _FOLLOWS
+        if distance > TRACKED or ik.turned > _TURNED:
+            status |= ArmStatus.LAGS
+            for limit, bounds in zip(_LIMITS, ik.reasons, strict=True):
+                status |= limit if bounds else _FOLLOWS
+        return ArmState(q, ik.velocities, ik.accelerations, torques, distance, status, movement)
 
     def _pose(self, movement: State) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of the tip that the movement asks for."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
 from kineme.primitives.rollout_figure import set_equal_scales
-from kineme.robots.checks.along import along
+from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement
 
 _ROW = 0.85  # height of one joint [inch]
@@ -38,8 +38,7 @@ def draw_robot_movement(made: RobotMovement) -> Figure:
 
 
 def _draw_path(figure: Any, made: RobotMovement) -> None:
-    executed = along(made.robot, made.trajectory).tip_positions
-    first = int(np.searchsorted(made.trajectory.times, made.begins - 1e-9))
+    executed, first = kinematics(made.robot, made.trajectory.positions)[0], made.first
     axes = figure.add_subplot(projection="3d")
     axes.plot(*executed[: first + 1].T, color=GRAY, linestyle=":", label="approach")
     if made.path is not None:

@@ -127,6 +127,29 @@ def test_a_velocity_is_met_in_units_per_second_whatever_becomes_of_the_duration(
     np.testing.assert_allclose(both.velocities[0, 50], velocity, rtol=1e-6, atol=1e-6 * np.abs(velocity).max())
 
 
+@any_seed
+def test_velocities_far_from_those_that_were_shown_are_met_too(dmp, model, seed):
+    """Up to five times as fast, and not along the path: the plain iteration went back and forth between durations."""
+    rng, known = np.random.default_rng(seed), model(dmp, seed)
+    t = np.sort(rng.choice(np.arange(10, 95), 2, replace=False))
+    v = known.primitive.rollout(n_samples=AT).velocities[0, t]
+    v = v * rng.uniform(0.2, 5.0) + rng.choice([0.1, 1.0]) * np.linalg.norm(v, axis=1).max() * rng.normal(size=v.shape)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "the velocity at .* is outside what was demonstrated")
+        passing = known.condition(t=t / 100, velocity=v)
+    found = passing.primitive.rollout(n_samples=AT).velocities[0, t]
+    np.testing.assert_allclose(found, v, rtol=0, atol=1e-6 * np.abs(v).max())
+
+
+def test_a_duration_that_was_not_found_is_said(dmp, model, monkeypatch):
+    monkeypatch.setattr("kineme.primitives.styles.conditioning._STEPS", 2)
+    known = model(dmp)
+    v = 2.0 * known.primitive.rollout(n_samples=AT).velocities[0, 50]
+    with pytest.warns(ExtrapolationWarning, match=r"after 2 steps .* still changes by [\d.e-]+ % a step.*velocity_std"):
+        known.condition(t=0.5, velocity=v, velocity_std=0.01)
+
+
 def test_the_deviation_of_a_velocity_is_per_second(dmp, model):
     """With one duration for all the formula is linear: the rows of the derivative, over tau."""
     mean = model(dmp)

@@ -168,8 +168,19 @@ def mixed_factor(dmp: Specification, factor: Array) -> Array:
     large: they have the same mean variance of the path.
     """
     r, d, _ = factor.shape
-    Phi, smooth = decoder(dmp, dmp.n_points).Phi[0], smoothness_factor(dmp)
-    size = np.sqrt(np.sum((factor @ Phi.T) ** 2) / d / np.sum((smooth @ Phi.T) ** 2))
     share = _WORTH / (r + _WORTH)
     shown = np.sqrt(1.0 - share) * factor.reshape(r, -1)
-    return np.vstack((shown, np.sqrt(share) * size * np.kron(np.eye(d), smooth)))
+    return np.vstack((shown, np.sqrt(share) * smooth_factor(dmp, d, path_variance(dmp, factor))))
+
+
+def smooth_factor(dmp: Specification, n_dims: int, variance: float) -> Array:
+    """Of the covariance of all weights (d N) under which smooth changes are likely, of a mean variance of the path."""
+    smooth = smoothness_factor(dmp)
+    size = np.sqrt(variance / path_variance(dmp, smooth[:, None]))
+    return np.asarray(size * np.kron(np.eye(n_dims), smooth))
+
+
+def path_variance(dmp: Specification, factor: Array) -> float:
+    """Mean over time and dimensions of the path's variance, of the weights' covariance by its factor (r, d, N)."""
+    paths = factor @ decoder(dmp, dmp.n_points).Phi[0].T
+    return float(np.sum(paths**2)) / (paths.shape[1] * paths.shape[2])

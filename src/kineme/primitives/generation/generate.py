@@ -11,6 +11,7 @@ from kineme.errors import SpecificationError
 from kineme.files.write_movement import ColumnNames, Columns
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE
+from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.generation.learned import Learned
@@ -40,6 +41,10 @@ class MovementOptions:
     meet_goal : bool
         Whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one. Otherwise
         it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
+    via : tuple of (share, ndarray of shape (d,))
+        Points to pass, and when as shares of the duration, between 0 and 1; as start and goal.
+    avoidance : ObstacleAvoidance, optional
+        How strongly it steers around obstacles.
     """
 
     start: Array | None = None
@@ -49,6 +54,8 @@ class MovementOptions:
     settle: float | None = None
     obstacles: Array | None = None
     meet_goal: bool = False
+    via: tuple[tuple[float, Array], ...] = ()
+    avoidance: ObstacleAvoidance | None = None
 
 
 class Generated(NamedTuple):
@@ -72,8 +79,9 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
+        via = tuple((share, _via_point(learned, point)) for share, point in options.via)
         move = _undisturbed if options.obstacles is None else _around_obstacles
-        made = move(learned.primitive, replace(options, start=start, goal=goal))
+        made = move(learned.primitive, replace(options, start=start, goal=goal, via=via))
     for name, column in made.items():
         if not np.isfinite(column).all():
             raise SpecificationError(
@@ -122,6 +130,12 @@ def checked_point(learned: Learned, point: Array | None, name: str) -> Array | N
     return point if about is None else in_primitive(point, about)
 
 
+def _via_point(learned: Learned, point: Array) -> Array:
+    checked = checked_point(learned, point, "a via point")
+    assert checked is not None
+    return checked
+
+
 def _signed(columns: Array, learned: Learned) -> Array:
     """Columns of a primitive, with orientations of the recorded sign: q and -q are one, but not in one column."""
     if not isinstance(learned.primitive, PosePrimitives):
@@ -138,7 +152,13 @@ def _undisturbed(primitive: Primitives | PosePrimitives, options: MovementOption
     if options.meet_goal:
         end = primitive.rollout(duration=options.duration, rate=options.rate).velocities[:, -1]
     made = primitive.rollout(
-        options.start, options.goal, options.duration, end_velocity=end, rate=options.rate, settle=options.settle
+        options.start,
+        options.goal,
+        options.duration,
+        via=options.via or None,
+        end_velocity=end,
+        rate=options.rate,
+        settle=options.settle,
     )
     return {
         "times": made.times[0],
@@ -158,7 +178,13 @@ def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementO
     duration = float(primitive.durations[0]) if options.duration is None else options.duration
     steps = primitive.rollout(duration=duration, rate=options.rate).times.shape[1] - 1
     control = primitive.controller(
-        duration / steps, start=options.start, goal=options.goal, duration=duration, settle=options.settle
+        duration / steps,
+        start=options.start,
+        goal=options.goal,
+        duration=duration,
+        via=options.via or None,
+        avoidance=options.avoidance,
+        settle=options.settle,
     )
     states = [control.state]
     while not _arrived(states[-1], options) and len(states) <= _LONGEST * steps:

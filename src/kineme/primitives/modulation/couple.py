@@ -5,7 +5,8 @@ With the changes of both weights in one vector, what is asked for is linear in i
     Phi_right(u) dW_right - Phi_left(u) dW_left = offset - (x_right - x_left)        for u in the stretch,
 
 and goals and end velocities stay. Both give: the most probable change of both together, under the covariances of
-`kineme.primitives.discrete.modulate`, so that the sum of both mean square accelerations of the change is least.
+`kineme.primitives.discrete.modulate`: of single demonstrations, so that the sum of both mean square accelerations of
+the change is least; of averages, as their demonstrations differ.
 """
 
 from __future__ import annotations
@@ -19,34 +20,36 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
 from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
-from kineme.primitives.discrete.changes import changes
+from kineme.primitives.discrete.changes import SLACK, changes
 from kineme.primitives.discrete.dmp import DMP, Primitives
+from kineme.primitives.discrete.modulate import mixed_factor, path_variance, smooth_factor
 from kineme.primitives.discrete.operators import decoder_at, smoothness_factor
 from kineme.primitives.discrete.per_movement import per_movement
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.modulation.parts import moving, within
+from kineme.primitives.styles.average import AveragePrimitive
 from kineme.validation import Array, as_numbers
 
 _PER_BASIS = 2  # points of the stretch for each basis function in it
-_SLACK = 1e-6  # of a row's own deviation, as of via stretches
 _LOOSE = 1e-3  # of the extent: a difference that is kept less closely is said
 
 
 def couple(
-    left: Primitives | Rollout,
-    right: Primitives | Rollout,
+    left: Primitives | Rollout | AveragePrimitive,
+    right: Primitives | Rollout | AveragePrimitive,
     during: tuple[float, float],
     offset: ArrayLike | None = None,
 ) -> tuple[Primitives, Primitives]:
     """Two movements that keep ``x_right - x_left`` as it is asked for, over a stretch of one common phase.
 
-    Both are changed, as little as possible: the sum of the mean square accelerations of their changes is least. Starts,
-    goals and the velocities there stay.
+    Both are changed, as little as possible: the sum of the mean square accelerations of their changes is least, and of
+    averages they change as their demonstrations differ. Starts, goals and the velocities there stay.
 
     Parameters
     ----------
-    left, right : Primitives or Rollout
-        Of one movement or of n, of d dimensions, in one frame.
+    left, right : Primitives, Rollout or AveragePrimitive
+        Of one movement or of n, of d dimensions, in one frame. Of an average the mean moves, as its covariance makes
+        likely; one that hardly varies lets the other one give.
     during : (begin, end)
         The stretch, above 0 and below 1 as shares of the duration.
     offset : array_like of shape (d,) or (n, d), optional
@@ -77,7 +80,8 @@ def couple(
     >>> learned = kineme.DMP().learn(kineme.load_lasa(["Line", "Angle"]))
     >>> left, right = kineme.couple(learned[0], learned[7], during=(0.3, 0.7))
     """
-    arms = moving([left, right])
+    spread = [_spread(one) for one in (left, right)]
+    arms = moving([one.primitive if isinstance(one, AveragePrimitive) else one for one in (left, right)])
     begin, end = within(during, "during")
     if begin == 0.0 or end == 1.0:
         raise SpecificationError(
@@ -90,7 +94,7 @@ def couple(
     wanted = _offset(offset, paths[1] - paths[0])
     made = [
         replace(one, scaled_weights=one.scaled_weights + change)
-        for one, change in zip(arms, _shared(arms, times, wanted - (paths[1] - paths[0])), strict=True)
+        for one, change in zip(arms, _shared(arms, spread, times, wanted - (paths[1] - paths[0])), strict=True)
     ]
     _warn_loose(made, times, wanted)
     return made[0], made[1]
@@ -124,16 +128,39 @@ def _offset(offset: ArrayLike | None, difference: Array) -> Array:
     return np.asarray(np.broadcast_to(value, difference.shape[:2])[:, :, None])
 
 
-def _shared(arms: list[Primitives], times: tuple[float, ...], errors: Array) -> list[Array]:
+def _spread(one: Primitives | Rollout | AveragePrimitive) -> Array | None:
+    """Factor (r, d, N) of the covariance of the demonstrations' weights, where there are several."""
+    shown = one.factor[:, :, :-3] if isinstance(one, AveragePrimitive) else np.zeros(0)
+    return shown if shown.any() else None
+
+
+def _shared(arms: list[Primitives], spread: list[Array | None], times: tuple[float, ...], errors: Array) -> list[Array]:
     """The changes of both arms' weights (n, d, N), the most probable ones together."""
     n, d, k = errors.shape
     along = [decoder_at(one.dmp, (*times, 1.0)).Phi for one in arms]
     kept = block_diag(*(np.vstack((Phi[0, -1], Phi[1, -1])) for Phi in along))  # goals and velocities there
     observed = np.vstack((np.hstack((-along[0][0, :-1], along[1][0, :-1])), kept))
-    factor = block_diag(*(smoothness_factor(one.dmp) for one in arms))
-    rows = np.concatenate((errors.reshape(-1, k), np.zeros((n * d, 4))), axis=1)
-    both = changes(factor, observed, rows, np.repeat((_SLACK, 0.0), (k, 4))).reshape(n, d, -1)
-    return np.split(both, [arms[0].dmp.n_basis], axis=2)
+    rows, slack = np.concatenate((errors, np.zeros((n, d, 4))), axis=2), np.repeat((SLACK, 0.0), (k, 4))
+    if all(one is None for one in spread):
+        factor = block_diag(*(smoothness_factor(one.dmp) for one in arms))
+        both = changes(factor, observed, rows.reshape(n * d, -1), slack).reshape(n, d, -1)
+        return np.split(both, [arms[0].dmp.n_basis], axis=2)
+    # All dimensions at once: the numbers of one arm, dimension after dimension, then those of the other.
+    factor = block_diag(*_scaled_factors(arms, spread))
+    every_dim = np.hstack([np.kron(np.eye(d), part) for part in np.split(observed, [arms[0].dmp.n_basis], axis=1)])
+    both = changes(factor, every_dim, rows.reshape(n, -1), np.tile(slack, d))
+    parts = np.split(both, [d * arms[0].dmp.n_basis], axis=1)
+    return [part.reshape(n, d, -1) for part in parts]
+
+
+def _scaled_factors(arms: list[Primitives], spread: list[Array | None]) -> list[Array]:
+    """Of the covariance of each arm's weights (d N); one that was shown once varies as much as the other, smoothly."""
+    known = next((one.dmp, shown) for one, shown in zip(arms, spread, strict=True) if shown is not None)
+    variance, d = path_variance(*known), known[1].shape[1]
+    return [
+        smooth_factor(one.dmp, d, variance) if shown is None else mixed_factor(one.dmp, shown)
+        for one, shown in zip(arms, spread, strict=True)
+    ]
 
 
 def _warn_loose(made: list[Primitives], times: tuple[float, ...], wanted: Array) -> None:

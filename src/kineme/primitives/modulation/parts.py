@@ -11,6 +11,13 @@ from kineme.movements.channels.alike import check_alike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.rollout import Rollout
 
+#: What to do with parts that are none.
+_REMEDIES = {
+    "AveragePrimitive": "; pass its primitive, or what it does: average.rollout(via=...)",
+    "RhythmicPrimitives": "; a rhythm has no end: record or generate as much of it as is to be moved, and learn that",
+    "RhythmicRollout": "; a rhythm has no end: learn what was generated, kineme.DMP().learn(rollout)",
+}
+
 
 def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
     """All parts as primitives of the same number of movements."""
@@ -18,7 +25,8 @@ def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
         raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
     for i, one in enumerate(parts):
         if not isinstance(one, (Primitives, Rollout)):
-            raise TrajectoryError(f"expected Primitives or Rollout as part {i}, got {type(one).__name__}")
+            what, remedy = type(one).__name__, _REMEDIES.get(type(one).__name__, "")
+            raise TrajectoryError(f"expected Primitives or Rollout as part {i}, got {what}{remedy}")
     moving = [one if isinstance(one, Primitives) else Primitives.from_rollout(one) for one in parts]
     n = max(len(one) for one in moving)
     for i, one in enumerate(moving):

@@ -46,7 +46,9 @@ class AveragePrimitive:
     Attributes
     ----------
     primitive : Primitives
-        The mean, a batch of one: roll it out, describe it, control with it as with any other.
+        The mean, a batch of one: roll it out, describe it, control with it as with any other. It knows nothing of the
+        covariance: ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` passes via points as the
+        demonstrations would.
     factor : ndarray of shape (r, d, N + 3)
         Centered, weighted deviations of theta from the mean; r is at most n and at most d (N + 3).
     tempo_factor : ndarray of shape (r,)
@@ -87,7 +89,8 @@ class AveragePrimitive:
         Where one demonstration only lets the path bend smoothly, the covariance of several says how they differ, and
         the path goes through the via points as one of them would; r demonstrations count as r, smoothness as ten.
 
-        Parameters and errors are those of `Primitives.rollout`.
+        Parameters and errors are those of `Primitives.rollout`. `Primitives.from_rollout` keeps the movement, and
+        ``Primitives.from_rollout(average.rollout(via=...)).controller(dt)`` moves so step by step.
         """
         movement = rollout(self.primitive, start, goal, duration, velocity, goal_velocity)
         movement = modulated(movement, via, end_velocity, position_limits, self.factor[:, :, :-3])

@@ -7,7 +7,7 @@ linear function of theta, so conditioning on it is exact (A. Paraschos, C. Danie
     mean += Sigma A' (A Sigma A' + diag(s^2))^-1 e,    Sigma -= Sigma A' (A Sigma A' + diag(s^2))^-1 A Sigma.
 
 A velocity v is met where ``dx/du = v tau``, which is not linear in ln tau: the most probable theta and tau are found by
-a few Gauss-Newton steps, and the covariance is that around them.
+a few Gauss-Newton steps, safeguarded in ln tau, and the covariance is that around them.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ _STEPS = 50
 _RARE = 0.0027  # share of demonstrations beyond three standard deviations, in one dimension
 _NOTHING = 1e-7  # of the extent: deviations below it are rounding, of what was met exactly before
 _MET = 1e-6  # of the extent
+_SETTLED = 1e-13  # of the duration
+_UNSETTLED = 1e-6  # of the duration: what is less is not worth a word
 _TEMPO = float(np.log(1e6))  # larger changes of the duration are no movement
 _KINDS = ("position", "velocity")
 
@@ -69,9 +71,10 @@ def updated(
     theta = to_numbers(primitive).ravel()
     extent = float(primitive.extents.max())
     both = np.column_stack((factor.reshape(len(factor), d * n_numbers), tempo_factor))
-    tau, ln_tau = float(primitive.durations[0]), 0.0  # ln tau from that of the mean
+    tau, root = float(primitive.durations[0]), _Root()
     change, remaining = np.zeros(len(theta) + 1), both
     for step in range(_STEPS):
+        ln_tau = root.at
         now = tau * np.exp(ln_tau)
         speed = np.where(rows.order == 1, rows.values, 0.0) * now
         matrix = np.column_stack((rows.matrix, -speed))
@@ -82,10 +85,10 @@ def updated(
         open_ones = _open(rows, both @ matrix.T, error, deviation, extent)
         found = condition(both, matrix[open_ones], deviation[open_ones])
         change, remaining = error[open_ones] @ found.gain, found.factor
-        settled = abs(change[-1] - ln_tau) <= 1e-14
-        ln_tau = float(change[-1])
-        if settled or not speed.any():
+        if not speed.any() or root.found(float(change[-1]) - ln_tau):
             break
+    else:
+        _warn_unsettled(float(change[-1]) - ln_tau)
     if not abs(change[-1]) <= _TEMPO:
         raise SpecificationError(
             "expected positions and velocities that a movement like the demonstrations could have, got such that its "
@@ -98,6 +101,32 @@ def updated(
         remaining[:, :-1].reshape(factor.shape),
         remaining[:, -1].copy(),
     )
+
+
+class _Root:
+    """The place where a function is 0 that falls through it: by secants, halving where these lead out of the bracket.
+
+    Of ``f(ln tau)``, the change of ln tau that the velocities ask for at ln tau, a plain iteration goes back and forth
+    where they are far from those of the demonstrations.
+    """
+
+    def __init__(self) -> None:
+        self.at = 0.0
+        self._bracket = [-np.inf, np.inf]
+        self._last: tuple[float, float] | None = None
+
+    def found(self, value: float) -> bool:
+        """Whether it is where the function has this value; else `at` is where to look next."""
+        at, self._bracket[int(value < 0.0)] = self.at, self.at
+        step = value
+        if self._last is not None and value != self._last[1]:
+            step = value * (at - self._last[0]) / (self._last[1] - value)
+        low, high = self._bracket
+        if not low < at + step < high:
+            step = 0.5 * (low + high) - at if np.isfinite(low + high) else value
+        self._last = at, value
+        self.at = float(np.clip(at + step, -2.0 * _TEMPO, 2.0 * _TEMPO))
+        return abs(value) <= _SETTLED or abs(self.at - at) <= _SETTLED
 
 
 def _rows(dmp: Specification, d: int, kinds: tuple[Observations | None, Observations | None]) -> _Rows:
@@ -161,6 +190,18 @@ def _warn_outside(rows: _Rows, whitened: Array, error: Array, deviation: Array, 
     if said:
         message = f"{said}; the movement is a guess there: demonstrate such a one, or give a larger std"
         warnings.warn(message, ExtrapolationWarning, stacklevel=4)
+
+
+def _warn_unsettled(change: float) -> None:
+    """Say that the duration which fits the velocities was not found."""
+    if abs(change) > _UNSETTLED:
+        warnings.warn(
+            f"after {_STEPS} steps the duration of the conditioned movement still changes by {100 * abs(change):.2g} % "
+            "a step, so the velocities are met about as closely only; give a larger velocity_std, fewer velocities, or "
+            "such as were demonstrated",
+            ExtrapolationWarning,
+            stacklevel=4,
+        )
 
 
 def mahalanobis(whitened: Array, error: Array, deviation: Array, extent: float) -> float:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from kineme.robots.checks.contacts import Contact, contacts_of
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
-
-_MARGIN = 0.005  # links closer than this count as touching [m]
-_RANDOM_POSTURES = 100
-_ALWAYS = 0.9  # of random postures in which a pair of shapes touches: it touches by design
 
 
 class Along(NamedTuple):
@@ -24,7 +20,7 @@ class Along(NamedTuple):
     smallest_singular_values: Array  # (T,), of the Jacobian of the tip, its translation counted in meters
     holding_torques: Array  # (T, n), at rest in that posture [Nm]
     moving_torques: Array  # (T, n), what the movement adds
-    contacts: tuple[tuple[int, str, str], ...]  # sample and names of two links that touch, the first for each pair
+    contacts: tuple[Contact, ...]  # the first of each pair of links that touch
 
 
 def along(robot: Robot, trajectory: JointTrajectory) -> Along:
@@ -46,58 +42,4 @@ def along(robot: Robot, trajectory: JointTrajectory) -> Along:
         holding[t] = pinocchio.computeGeneralizedGravity(model, data, q)
         whole[t] = pinocchio.rnea(model, data, q, v, a)
     singular = np.asarray(np.linalg.svd(jacobians, compute_uv=False)[:, min(6, n) - 1], dtype=np.float64)
-    return Along(positions, rotations, singular, holding, whole - holding, _contacts(robot, trajectory.positions))
-
-
-def _contacts(robot: Robot, positions: Array) -> tuple[tuple[int, str, str], ...]:
-    import pinocchio
-
-    geometry = pair_geometry(robot)
-    if len(geometry.collisionPairs) == 0:
-        return ()
-    data, shapes = robot.model.createData(), geometry.createData()
-    for request in shapes.collisionRequests:
-        request.security_margin = _MARGIN
-    found: dict[int, int] = {}
-    for t, q in enumerate(positions):
-        if pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False):
-            for k, result in enumerate(shapes.collisionResults):
-                if result.isCollision():
-                    found.setdefault(k, t)
-    pairs = geometry.collisionPairs
-
-    def link(shape: int) -> str:
-        return str(robot.model.frames[geometry.geometryObjects[shape].parentFrame].name)
-
-    return tuple((t, link(pairs[k].first), link(pairs[k].second)) for k, t in found.items())
-
-
-@lru_cache(maxsize=8)
-def pair_geometry(robot: Robot) -> Any:
-    """The arm's shapes with the pairs that can touch.
-
-    None of neighboring links, and none that touch in nearly all postures: those overlap by design, as two links on one
-    axis do.
-    """
-    import pinocchio
-
-    geometry = robot.geometry.copy()
-    geometry.removeAllCollisionPairs()
-    objects = geometry.geometryObjects
-    parents = list(robot.model.parents)
-    for i, first in enumerate(objects):
-        for j in range(i + 1, len(objects)):
-            a, b = first.parentJoint, objects[j].parentJoint
-            if a != b and parents[a] != b and parents[b] != a:
-                geometry.addCollisionPair(pinocchio.CollisionPair(i, j))
-    if len(geometry.collisionPairs) == 0:
-        return geometry
-    data, shapes = robot.model.createData(), geometry.createData()
-    counts = np.zeros(len(geometry.collisionPairs))
-    postures = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_RANDOM_POSTURES, robot.n_joints))
-    for q in postures:
-        pinocchio.computeCollisions(robot.model, data, geometry, shapes, q, False)
-        counts += [result.isCollision() for result in shapes.collisionResults]
-    for k in np.flatnonzero(counts > _ALWAYS * len(postures))[::-1]:
-        geometry.removeCollisionPair(geometry.collisionPairs[int(k)])
-    return geometry
+    return Along(positions, rotations, singular, holding, whole - holding, contacts_of(robot, trajectory.positions))

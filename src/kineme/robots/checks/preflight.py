@@ -11,6 +11,7 @@ from kineme.errors import TrajectoryError
 from kineme.robots.checks.along import Along, along
 from kineme.robots.checks.between_samples import between_samples
 from kineme.robots.checks.check import Check, Preflight, unit_of
+from kineme.robots.checks.torques import knows_masses
 from kineme.robots.checks.tracking import tracking
 from kineme.robots.execution.between import between, dense_times
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -97,7 +98,7 @@ def _rates(robot: Robot, trajectory: JointTrajectory) -> Iterator[Check]:
 
 def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterator[Check]:
     """Of a movement k times as long the torque is ``holding + moving / k^2``."""
-    if not _knows_masses(robot):
+    if not knows_masses(robot):
         return
     for j in np.flatnonzero(~np.isnan(robot.effort)):
         holding, moving, limit = state.holding_torques[:, j], state.moving_torques[:, j], float(robot.effort[j])
@@ -159,17 +160,13 @@ def _collision(trajectory: JointTrajectory, state: Along) -> Check:
 
 
 def _unchecked(robot: Robot) -> Iterator[str]:
-    if not _knows_masses(robot):
+    if not knows_masses(robot):
         yield "torques: the model has no masses"
     elif np.isnan(robot.effort).any():
         named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
         yield f"torques of {named}: the model does not say the largest"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
-
-
-def _knows_masses(robot: Robot) -> bool:
-    return float(sum(inertia.mass for inertia in robot.model.inertias)) > 0
 
 
 def _at(trajectory: JointTrajectory, t: int) -> float:

@@ -18,7 +18,7 @@ from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
 TRACKED = 1e-3  # the tip may be this far from the path [m]
-_TURNED = 1.0  # and turned by so many degrees from it, where the orientation is followed
+TURNED = 1.0  # and turned by so many degrees from it, where the orientation is followed
 
 
 def tracking(
@@ -45,7 +45,7 @@ def tracking(
     passed = worst <= TRACKED
     slower = 1.0 if passed else math.inf
     yield Check("tracking", "tip", float(path.times[t]), 1e3 * worst, 1e3 * TRACKED, "mm", passed, slower)
-    limit = math.nan if follow == "free" or is_partial(robot) else _TURNED
+    limit = math.nan if follow == "free" or is_partial(robot) else TURNED
     passed = not angle > limit
     slower = 1.0 if passed else math.inf
     yield Check("turned away", "tip", float(path.times[r]), angle, limit, "deg", passed, slower)

@@ -15,6 +15,7 @@ from kineme.validation import Array
 _GRID = 200  # intervals of the path at whose ends the limits hold
 _POINTS = 200  # of the path by its length, at most
 _FINE = 5000  # points at which that length is measured
+_SHARE = 0.98  # of the limits of velocity and acceleration: they hold at the grid, and hardly more between
 
 
 def fastest(robot: Robot, path: CubicSpline, rate: float) -> tuple[CubicSpline, Timing]:
@@ -36,38 +37,45 @@ def fastest(robot: Robot, path: CubicSpline, rate: float) -> tuple[CubicSpline, 
     except ImportError as error:
         raise DataError("expected the package toppra to time movements; pip install 'kineme[robot]'") from error
     logging.getLogger("toppra").setLevel(logging.ERROR)
-    shares = 0.98 * robot.velocity, 0.98 * robot.acceleration  # between the points of the grid nothing is looked at
+    velocity, acceleration = _SHARE * robot.velocity, _SHARE * robot.acceleration
     limits = [
-        toppra.constraint.JointVelocityConstraint(np.column_stack((-shares[0], shares[0]))),
-        toppra.constraint.JointAccelerationConstraint(np.column_stack((-shares[1], shares[1]))),
+        toppra.constraint.JointVelocityConstraint(np.column_stack((-velocity, velocity))),
+        toppra.constraint.JointAccelerationConstraint(np.column_stack((-acceleration, acceleration))),
     ]
-    curve, s, length = _by_length(robot, path)
+    curve, generated, length = _by_length(robot, path)
     grid = np.linspace(0.0, float(curve.x[-1]), _GRID + 1)
     spline = toppra.SplineInterpolator(curve.x, curve(curve.x))
     algorithm = toppra.algorithm.TOPPRA(limits, spline, gridpoints=grid, solver_wrapper="seidel")
-    _, speeds, _ = algorithm.compute_parameterization(0.0, 0.0)
-    if speeds is None or not np.isfinite(speeds).all():
+    _, velocities, _ = algorithm.compute_parameterization(0.0, 0.0)  # at standstill at both ends
+    if velocities is None or not np.isfinite(velocities).all():
         raise TrajectoryError(f"{robot.name}: no timing of this path keeps its limits; look at the path for jumps")
-    ends = np.concatenate(([0.0], np.cumsum(2 * np.diff(grid) / (speeds[1:] + speeds[:-1]))))
-    accelerations = np.diff(speeds**2) / (2 * np.diff(grid))
+    return curve, _sampled(grid, velocities, rate, generated, length)
+
+
+def _sampled(grid: Array, velocities: Array, rate: float, generated: Array, length: Array) -> Timing:
+    """Even samples of the lengths s(t), whose velocities at the grid are known and accelerations between constant.
+
+    The movement as it was generated has covered `length` at the times `generated`.
+    """
+    ends = np.concatenate(([0.0], np.cumsum(2 * np.diff(grid) / (velocities[1:] + velocities[:-1]))))
+    accelerations = np.diff(velocities**2) / (2 * np.diff(grid))
     times = np.linspace(0.0, ends[-1], n_samples(float(ends[-1]), rate))
-    k = np.clip(np.searchsorted(ends, times, "right") - 1, 0, _GRID - 1)
-    since = times - ends[k]
-    place = np.clip(grid[k] + speeds[k] * since + accelerations[k] * since**2 / 2, 0.0, grid[-1])
-    timing = Timing(times, place, speeds[k] + accelerations[k] * since, accelerations[k], np.interp(place, length, s))
-    return curve, timing
+    k = np.clip(np.searchsorted(ends, times, "right") - 1, 0, len(grid) - 2)
+    since, v, a = times - ends[k], velocities[k], accelerations[k]
+    s = np.clip(grid[k] + v * since + a * since**2 / 2, 0.0, grid[-1])
+    return Timing(times, s, v + a * since, a, np.interp(s, length, generated))
 
 
 def _by_length(robot: Robot, path: CubicSpline) -> tuple[CubicSpline, Array, Array]:
-    """The path by its length, each joint counted in its limit of velocity; times s of the movement, and lengths there.
+    """The path by its length, each joint counted in its limit of velocity; times of the movement, and lengths there.
 
-    Where the movement stands, q'(s) = 0 and s would have to pass infinitely fast; the length does not.
+    Where the movement stands, its time would have to pass infinitely fast; the length does not.
     """
-    s = np.linspace(0.0, float(path.x[-1]), _FINE)
-    joints = path(s)
+    generated = np.linspace(0.0, float(path.x[-1]), _FINE)
+    joints = path(generated)
     length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(joints, axis=0) / robot.velocity, axis=1))))
     if not length[-1] > 0:
         raise TrajectoryError(f"{robot.name}: expected a movement, the joints stand still")
     kept = np.concatenate(([True], np.diff(np.floor(length / length[-1] * _POINTS)) > 0))
     kept[-1] = True
-    return CubicSpline(length[kept], joints[kept]), s, length
+    return CubicSpline(length[kept], joints[kept]), generated, length

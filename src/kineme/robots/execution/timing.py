@@ -1,4 +1,4 @@
-"""How fast a path is passed: the place along it, s, as a function of the time t of the arm."""
+"""How fast a path q(s) is followed: its parameter s as a function of the time t of the arm."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _LEAST = 4  # samples
 
 
 class Timing(NamedTuple):
-    """The place s along a path at T even times t."""
+    """The parameter s of a path at T even times t."""
 
     times: Array  # (T,), t [s]
-    place: Array  # (T,), s(t), in the unit of the path's parameter
-    speed: Array  # (T,), ds/dt
-    change: Array  # (T,), d2s/dt2
+    s: Array  # (T,), s(t)
+    velocity: Array  # (T,), ds/dt
+    acceleration: Array  # (T,), d2s/dt2
     generated: Array  # (T,), the time of the movement as it was generated [s]
 
 
@@ -54,22 +54,22 @@ def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1
     times as long, ``s(t / factor)``.
     """
     duration = float(path.x[-1])
-    velocities = np.abs(path(np.array([0.0, duration]), 1))
-    first, last = (min(duration, _ramp(robot, velocity / factor) / factor) for velocity in velocities)
+    at_ends = np.abs(path(np.array([0.0, duration]), 1)) / factor  # (2, n)
+    first, last = (min(duration, _ramp(robot, joints) / factor) for joints in at_ends)
     total = duration + (first + last) / 2
     times = np.linspace(0.0, total, n_samples(factor * total, rate))
-    place, speed, change = times - first / 2, np.ones_like(times), np.zeros_like(times)
+    s, velocity, acceleration = times - first / 2, np.ones_like(times), np.zeros_like(times)
     for ramp, at, sign in ((first, times, 1.0), (last, total - times, -1.0)):
         if ramp == 0:
             continue
         x = np.clip(at / ramp, 0.0, 1.0)
         within = x < 1
         covered = ramp * (x**3 - x**4 / 2)
-        place[within] = (covered if sign > 0 else duration - covered)[within]
-        speed[within] = (3 * x**2 - 2 * x**3)[within]
-        change[within] = (sign * 6 * (x - x**2) / ramp)[within]
-    place = np.clip(place, 0.0, duration)
-    return Timing(factor * times, place, speed / factor, change / factor**2, place)
+        s[within] = (covered if sign > 0 else duration - covered)[within]
+        velocity[within] = (3 * x**2 - 2 * x**3)[within]
+        acceleration[within] = (sign * 6 * (x - x**2) / ramp)[within]
+    s = np.clip(s, 0.0, duration)
+    return Timing(factor * times, s, velocity / factor, acceleration / factor**2, s)
 
 
 def _ramp(robot: Robot, velocity: Array) -> float:
@@ -86,8 +86,13 @@ def timed(robot: Robot, path: CubicSpline, timing: Timing) -> JointTrajectory:
 
     ``dq/dt = q'(s) ds/dt`` and ``d2q/dt2 = q''(s) (ds/dt)^2 + q'(s) d2s/dt2``.
     """
-    first, second = path(timing.place, 1), path(timing.place, 2)
-    speed, change = timing.speed[:, None], timing.change[:, None]
+    first, second = path(timing.s, 1), path(timing.s, 2)
+    velocity, acceleration = timing.velocity[:, None], timing.acceleration[:, None]
     return JointTrajectory(
-        robot.joints, timing.times, path(timing.place), first * speed, second * speed**2 + first * change, {}
+        robot.joints,
+        timing.times,
+        path(timing.s),
+        first * velocity,
+        second * velocity**2 + first * acceleration,
+        {},
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.robots.kinematics.descent import POSTURE_COST
 from kineme.robots.models.robot import Robot, check_robot, check_start
-from kineme.validation import Array, check_choice, check_number
+from kineme.validation import Array, check_choice
 
 #: How much of the orientation is followed -> cost of turning about x, y, z of the tip [1/rad], besides 1 per meter.
 ORIENTATIONS = {"full": (1.0, 1.0, 1.0), "axis": (1.0, 1.0, 0.0), "free": (0.0, 0.0, 0.0)}
@@ -26,8 +27,9 @@ class InverseKinematics:
     """The joints of one arm, step by step; the quadratic programs are those of pink, solved by DAQP.
 
     One step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the
-    joints q, subject to the limits of position, and of velocity if a time step is given. p and R are position and
-    orientation of the tip, starred the wanted ones, log the rotation vector of a rotation, c the costs of turning.
+    joints q, subject to the limits of position, less 0.2 % of their range: between samples a path goes a little beyond.
+    p and R are position and orientation of the tip, starred the wanted ones, log the rotation vector of a rotation, c
+    the costs of turning. `LiveKinematics` keeps the limits of velocity and acceleration too.
 
     Parameters
     ----------
@@ -35,9 +37,6 @@ class InverseKinematics:
     orientation : {"full", "axis", "free"}, default "full"
         "axis" follows the z axis of the tip and leaves the turn about it free, "free" follows the position alone. Arms
         of fewer than six joints follow the orientation as far as the position allows.
-    time_step : float, optional
-        Time between two steps [s]: joints then move no faster than their limits of velocity allow, and up to those of
-        position. Without, they stay 0.2 % of their range inside, which leaves room to what lies between samples.
 
     Attributes
     ----------
@@ -51,39 +50,30 @@ class InverseKinematics:
         The extra ``robot`` is not installed.
     """
 
-    def __init__(self, robot: Robot, orientation: str = "full", time_step: float | None = None) -> None:
+    def __init__(self, robot: Robot, orientation: str = "full") -> None:
         check_robot(robot)
         check_choice("orientation", orientation, list(ORIENTATIONS))
         try:
             import pinocchio
-            from pink import Configuration, solve_ik
-            from pink.exceptions import NoSolutionFound
-            from pink.limits import ConfigurationLimit, VelocityLimit
+            from pink import Configuration, build_ik
+            from pink.limits import ConfigurationLimit
             from pink.tasks import FrameTask, PostureTask
+            from qpsolvers import solve_problem
         except ImportError as error:
             raise DataError("expected the package pin-pink for arms; pip install 'kineme[robot]'") from error
-        if time_step is not None:
-            check_number("time_step", time_step, above=0.0)
         self.robot = robot
         self._pose, self._columns = pinocchio.SE3, pinocchio.SE3ToXYZQUAT
-        self._solve, self._configuration_of = solve_ik, Configuration
-        self._unsolved: type[Exception] = NoSolutionFound
+        self._log, self._exp = pinocchio.log3, pinocchio.exp3
+        self._program, self._solve, self._configuration_of = build_ik, solve_problem, Configuration
         self._data = robot.model.createData()
-        self._time_step = 1.0 if time_step is None else time_step
         partial = _PARTIAL if is_partial(robot) else 1.0
         self.costs = partial * np.array(ORIENTATIONS[orientation])
         self._tip = FrameTask(robot.tip, position_cost=1.0, orientation_cost=self.costs.tolist(), gain=1.0)
         self._posture = PostureTask(cost=POSTURE_COST)
         self._posture.set_target(robot.rest)
-        self._fastest: Array | None = None if time_step is None else robot.velocity
-        limited = robot.model.copy()
-        if time_step is None:
-            inside = _INSIDE * (robot.upper - robot.lower)
-            limited.lowerPositionLimit, limited.upperPositionLimit = robot.lower + inside, robot.upper - inside
-        self._limits: list[Any] = [ConfigurationLimit(limited, config_limit_gain=_GAIN)]
-        if time_step is not None:
-            limited.velocityLimit = robot.velocity
-            self._limits.append(VelocityLimit(limited))
+        limited, inside = robot.model.copy(), _INSIDE * (robot.upper - robot.lower)
+        limited.lowerPositionLimit, limited.upperPositionLimit = robot.lower + inside, robot.upper - inside
+        self._limits = (ConfigurationLimit(limited, config_limit_gain=_GAIN),)
         self.reset(robot.rest)
 
     def reset(self, q: Array) -> None:
@@ -157,23 +147,19 @@ class InverseKinematics:
         return path
 
     def _advance(self) -> float:
-        dt = self._time_step
-        try:
-            velocity = self._solve(
-                self._configuration,
-                (self._tip, self._posture),
-                dt,
-                solver="daqp",
-                limits=self._limits,
-                safety_break=False,
-                damping=_DAMPING,
-            )
-        except self._unsolved:  # as of a pose beyond all numbers: the joints stay
+        """One step towards the target of the tip; the largest change of a joint."""
+        change = self._change(self._limits, 0.0)
+        if change is None:
             return 0.0
-        if self._fastest is not None:  # the solver keeps limits to 1e-6 only
-            velocity = np.clip(velocity, -self._fastest, self._fastest)
-        self._configuration.integrate_inplace(velocity, dt)
-        return float(np.abs(velocity).max()) * dt
+        self._configuration.integrate_inplace(change, 1.0)
+        return float(np.abs(change).max())
+
+    def _change(self, limits: Sequence[Any], damping: float) -> Array | None:
+        """The change of the joints (n,) that a step asks for; None without one, as of a pose beyond all numbers."""
+        tasks = (self._tip, self._posture)
+        problem = self._program(self._configuration, tasks, 1.0, _DAMPING + damping, limits)
+        found = self._solve(problem, solver="daqp")
+        return np.asarray(found.x) if found.found and found.x is not None else None
 
 
 def is_partial(robot: Robot) -> bool:

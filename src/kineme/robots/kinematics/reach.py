@@ -13,7 +13,10 @@ from kineme.validation import Array
 
 _REACHED = 1e-3  # farther from its pose than this, a posture does not reach it [m]
 _MOST_CHECKED = 20  # poses whose distance is sought, of those that are missed
-_REMEDY = "choose another place, free the orientation, or make the movement smaller"
+_FAR = 3.0  # from an arm [m]: farther than that, it is rather the unit that is wrong
+_REMEDY = (
+    "choose another place (--at), free the orientation (follow=, --follow axis), or make the movement smaller (--scale)"
+)
 
 
 def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, what: str) -> Array:
@@ -66,4 +69,5 @@ def point_in_words(position: Array) -> str:
 
 
 def _unreachable(robot: Robot, what: str, distance: float) -> str:
-    return f"{robot.name} does not reach {what}: its tip stays {distance:.3f} m away; {_REMEDY}"
+    remedy = "is the movement in millimeters? --scale 0.001 makes it meters" if distance > _FAR else _REMEDY
+    return f"{robot.name} does not reach {what}: its tip stays {distance:.3f} m away; {remedy}"

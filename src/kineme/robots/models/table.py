@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 from typing import NamedTuple
+
+#: Where their URDF files lie.
+FOLDER = Path(__file__).parent
 
 
 class Model(NamedTuple):

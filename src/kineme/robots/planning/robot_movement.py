@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from kineme.robots.checks.check import Preflight
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
+
+_LEAST_CHANGE = 0.005  # of a change of the duration, which is said to three digits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,11 +40,16 @@ class RobotMovement:
     begins: float
     factor: float
 
+    @property
+    def first(self) -> int:
+        """Number of the sample of `trajectory` at which the movement begins."""
+        return int(np.searchsorted(self.trajectory.times, self.begins - 1e-9))
+
     def __repr__(self) -> str:
         return f"RobotMovement({self.robot.name!r}, {duration_in_words(self)})"
 
 
 def duration_in_words(made: RobotMovement) -> str:
     """How long it takes, with how much of that is approach, and how many times as long as generated, if it is."""
-    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > 1e-3 else ""
+    slower = f", {made.factor:.3g} times as long as generated" if abs(made.factor - 1) > _LEAST_CHANGE else ""
     return f"{made.trajectory.duration:.2f} s, of which {made.begins:.2f} s of approach{slower}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE
-from kineme.robots.checks.along import along
+from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.view.shapes import Shapes
 from kineme.sampling import evenly_spaced
@@ -22,7 +22,7 @@ def scene_data(made: RobotMovement, shapes: Shapes) -> dict[str, Any]:
     """Times, joint positions [rad, m] and positions of the tip [m], rounded to a millionth."""
     trajectory = made.trajectory
     kept = evenly_spaced(len(trajectory), MOST_SAMPLES)
-    tip = along(made.robot, trajectory).tip_positions
+    tip = kinematics(made.robot, trajectory.positions)[0]
     wanted = np.empty((0, 3)) if made.path is None else made.path.positions
     return {
         "urdf": shapes.urdf,
@@ -35,7 +35,7 @@ def scene_data(made: RobotMovement, shapes: Shapes) -> dict[str, Any]:
         "executed": _rounded(tip[kept]),
         "wanted": _rounded(wanted[evenly_spaced(len(wanted), MOST_SAMPLES)] if len(wanted) else wanted),
         "begins": round(made.begins, 6),
-        "start": _rounded(tip[np.searchsorted(trajectory.times, made.begins - 1e-9)]),
+        "start": _rounded(tip[made.first]),
         "goal": _rounded(tip[-1]),
         "colors": {"executed": BLUE, "wanted": ORANGE, "approach": GRAY, "goal": GREEN},
     }

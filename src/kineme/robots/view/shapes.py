@@ -8,8 +8,8 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.robots.models.robot import Robot
-from kineme.robots.models.urdf import read_root
 from kineme.robots.view.elements import Element, as_text, numbers, origin_of, set_color
+from kineme.robots.view.installed_meshes import root_with_shapes
 from kineme.robots.view.link_shapes import LinkShapes, Mesh
 
 _GRAYS = ((0.80, 0.82, 0.85, 1.0), (0.58, 0.61, 0.66, 1.0))  # of links one after the other that have no color
@@ -28,12 +28,12 @@ class Shapes(NamedTuple):
 
 
 def shapes_of(robot: Robot) -> Shapes:
-    """The visual shapes of an arm; where a link has none, its collision shapes.
+    """The visual shapes of an arm, by name those that are installed; where a link has none, its collision shapes.
 
     A link whose meshes are not there, of another format than STL and COLLADA, or larger than 16 MB with those before
     them, is drawn as cylinders to the joints that it bears; so is every link of a file without any shape.
     """
-    root = read_root(robot.source)
+    root = root_with_shapes(robot)
     links = {str(link.get("name")): f"l{i}" for i, link in enumerate(root.findall("link"))}
     joints = {str(joint.get("name")): f"j{i}" for i, joint in enumerate(root.findall("joint"))}
     drawer = LinkShapes(root, robot.source)

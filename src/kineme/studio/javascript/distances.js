@@ -82,6 +82,18 @@ function turned(source, from, n, d, second, R, factors, into) {
   }
 }
 
+/** Squared distance of n numbers from i and from j on, two or more; few at a time are compared fastest so. */
+function squaredGap(a, i, b, j, n) {
+  const x = a[i] - b[j];
+  const y = a[i + 1] - b[j + 1];
+  let total = x * x + y * y;
+  for (let k = 2; k < n; k++) {
+    const z = a[i + k] - b[j + k];
+    total += z * z;
+  }
+  return total;
+}
+
 /** Dynamic time warping of segments: the sums of both costs along their best paths, divided by K. */
 function warp(a, b, K, w, band, work, squares) {
   const { elastic, turning } = work;
@@ -100,11 +112,7 @@ function warp(a, b, K, w, band, work, squares) {
     for (let q = first, from = first * w; q < end; q++, from += w) {
       const angle = a[at + w - 1] - b[from + w - 1];
       const square = angle * angle;
-      let cost = square;
-      for (let k = 0; k < w - 1; k++) {
-        const gap = a[at + k] - b[from + k];
-        cost += gap * gap;
-      }
+      const cost = square + squaredGap(a, at, b, from, w - 1);
       const above = elastic[q + 1];
       const aboveTurning = turning[q + 1];
       let least = above < corner ? above : corner;
@@ -142,14 +150,10 @@ function matched(x, y, P, d, room) {
     let smallest = FAR;
     let at = 0;
     for (let q = 0; q < P; q++) {
-      let cost = halves[p] + halves[P + q];
-      let both = 0;
-      for (let k = 0; k <= d; k++) {
-        const gap = x[p * w + k] - y[q * w + k];
-        cost += gap * gap;
-      }
-      for (let k = d + 1; k < w; k++) both += x[p * w + k] * y[q * w + k];
-      cost -= both * both;
+      const [from, to] = [p * w, q * w];
+      let both = x[from + d + 1] * y[to + d + 1];
+      for (let k = d + 2; k < w; k++) both += x[from + k] * y[to + k];
+      const cost = halves[p] + halves[P + q] + squaredGap(x, from, y, to, d + 1) - both * both;
       if (cost < smallest) {
         smallest = cost;
         at = q;

@@ -39,6 +39,7 @@ const SHARES = {
  * @property {number} confidence
  * @property {number} pKnown
  * @property {Object<string, number>} pValues
+ * @property {Object<string, number>} shares probability of each class if it is one of them
  * @property {string} rule class, pooled or guess
  * @property {boolean} calibrated
  * @property {string[]} ranked
@@ -209,6 +210,7 @@ export function recognize(known, one, errorRate = 0.05) {
   const isKnown = p.known > errorRate;
   const ranked = descending(compared.scores);
   const shown = isKnown ? chosen : ranked[0];
+  const odds = probabilities(compared.similar);
   const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
   const nearest = descending(own).slice(0, SHOWN)
     .map((j) => ({ index: first[shown] + j, similarity: Math.exp(own[j]) }));
@@ -218,9 +220,10 @@ export function recognize(known, one, errorRate = 0.05) {
   how.names.forEach((name, r) => (responsibilities[name] = (responsibilities[name] ?? 0) + shares[r]));
   return {
     label: isKnown ? classes[chosen] : null,
-    confidence: isKnown ? probabilities(compared.similar)[shown] : 1 - p.known,
+    confidence: isKnown ? odds[shown] : 1 - p.known,
     pKnown: p.known,
     pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
+    shares: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
     rule: p.rule,
     calibrated: p.calibrated,
     ranked: ranked.map((c) => classes[c]),

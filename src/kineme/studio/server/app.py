@@ -11,7 +11,14 @@ from pathlib import Path
 import anyio.to_thread
 from fastapi import FastAPI
 
-from kineme.studio.server import change_routes, library_routes, live_socket, recognize_routes
+from kineme.studio.server import (
+    change_routes,
+    library_routes,
+    live_socket,
+    proposal_routes,
+    recognize_routes,
+    rollout_routes,
+)
 from kineme.studio.server.access import Guard
 from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
@@ -21,7 +28,14 @@ from kineme.studio.server.studio import Studio
 
 _THREADS = 8  # requests that are worked on at once, beside movements under way
 
-ROUTERS = (library_routes.router, change_routes.router, recognize_routes.router, live_socket.router)
+ROUTERS = (
+    library_routes.router,
+    change_routes.router,
+    recognize_routes.router,
+    rollout_routes.router,
+    proposal_routes.router,
+    live_socket.router,
+)
 
 
 def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts: tuple[str, ...] = ()) -> FastAPI:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Name = Annotated[str, Field(min_length=1, max_length=10_000)]
 Ids = Annotated[list[int], Field(min_length=1, max_length=1_000_000)]
@@ -79,6 +79,114 @@ class Asked(_Request):
     times: Point
     positions: list[Point]
     error_rate: Number = Field(0.05, gt=0, lt=1)
+
+
+class Style(_Request):
+    """A symbol with values of the directions in which its members differ."""
+
+    symbol: str
+    values: list[Number] = Field(min_length=1, max_length=100)
+
+
+class What(_Request):
+    """What moves: the prototype of a symbol, a stored movement, or a style of a symbol; one of the three."""
+
+    symbol: str | None = None
+    movement: int | None = None
+    style: Style | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if sum(one is not None for one in (self.symbol, self.movement, self.style)) != 1:
+            raise ValueError("expected one of symbol, movement and style")
+        return self
+
+
+class Obstacle(_Request):
+    """A ball to pass by."""
+
+    center: Point
+    radius: Number = Field(0.0, ge=0)
+
+
+class Operated(_Request):
+    """A movement as a sum over start and goal."""
+
+    what: What
+    formulation: str | None = None
+
+
+class Wanted(Operated):
+    """A new movement; what is left out is as demonstrated. Via points are pairs: share of the duration, point."""
+
+    start: Point | None = None
+    goal: Point | None = None
+    via: list[tuple[Number, Point]] = Field([], max_length=100)
+    obstacles: list[Obstacle] = Field([], max_length=100)
+    duration: Number | None = Field(None, gt=0)
+    rate: Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
+
+
+class Exported(Wanted):
+    """The same as a file."""
+
+    format: str = Field(description="csv, npz, json, parquet")
+
+
+class Moved(BaseModel):
+    """A new movement, and what is to be said of it."""
+
+    times: list[float]
+    positions: Points
+    velocities: Points
+    accelerations: Points
+    columns: list[str]
+    start: list[float]
+    goal: list[float]
+    warnings: list[str]
+
+
+class OperatorsOut(BaseModel):
+    """``positions = of_start * start + of_goal * goal + constant``, at shares of the demonstrated duration."""
+
+    times: list[float]
+    of_start: list[float]
+    of_goal: list[float]
+    constant: Points
+
+
+class StylesOut(BaseModel):
+    """How far the members of a symbol go in each direction of their styles, and where its prototype lies."""
+
+    lowest: list[float]
+    highest: list[float]
+    explained: list[float]
+
+
+class ProposalOut(BaseModel):
+    """Alike movements without a name."""
+
+    id: str
+    members: list[int]
+    medoid: int
+    suggested: str | None
+    cohesion: float
+    stability: float | None
+    path: Points
+
+
+class ProposalsOut(BaseModel):
+    """The largest first."""
+
+    proposals: list[ProposalOut]
+    left_over: int
+
+
+class Named(_Change):
+    """A name for a proposal."""
+
+    name: Name
+    description: str | None = None
 
 
 class Version(BaseModel):

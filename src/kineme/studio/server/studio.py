@@ -19,6 +19,8 @@ from kineme.studio.server.refusals import ConflictError, MissingError
 
 Made = TypeVar("Made")
 
+_KEPT = 200  # things of one kind
+
 
 class Shown(NamedTuple):
     """The symbols of one version, by id, and the symbol's id of each member."""
@@ -70,6 +72,17 @@ class Studio:
             if self._kept.get(name, (None, None))[0] != version:
                 self._kept[name] = version, make()
             return self._kept[name][1]  # type: ignore[return-value]
+
+    def kept_some(self, name: str, key: str, make: Callable[[], Made]) -> Made:
+        """As `kept`, of many things of one kind; of too many the first ones are forgotten."""
+        made: dict[str, Made] = self.kept(name, dict)
+        if key not in made:
+            one = make()
+            if len(made) >= _KEPT:
+                made.pop(next(iter(made)), None)
+            made[key] = one
+            return one
+        return made[key]
 
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
         """The symbol of an id.

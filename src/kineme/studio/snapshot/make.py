@@ -15,6 +15,7 @@ from kineme.library.storage.symbols import symbol
 from kineme.library.symbols.grounding import prototype_of
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.recognition.classifiers import fit_prototype
+from kineme.recognition.early.hypotheses import Early
 from kineme.recognition.known_classes import FittedRecognizer, KnownClasses, known_classes
 from kineme.sampling import evenly_spaced
 from kineme.studio.snapshot.early import early_part
@@ -27,11 +28,14 @@ MOST_NUMBERS = 240_000
 _PER_PATH = 199
 
 
-def snapshot_of_library(library: ActionLibrary, most_numbers: int = MOST_NUMBERS) -> Snapshot:
+def snapshot_of_library(
+    library: ActionLibrary, most_numbers: int = MOST_NUMBERS, early: Early | None = None
+) -> Snapshot:
     """The symbols of a library with their movements.
 
     Of symbols with many movements some are taken, evenly spaced, as many of each as fit; widths and calibration are
-    those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how many.
+    those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how
+    movements are recognized under way; by default as `kineme.Recognizer.stream` does.
 
     Raises
     ------
@@ -45,7 +49,7 @@ def snapshot_of_library(library: ActionLibrary, most_numbers: int = MOST_NUMBERS
     known = known_members(store, taken)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
-    made = _snapshot(known, primitives)
+    made = _snapshot(known, primitives, early)
     made.header["n_all"] = len(members.ids)
     made.header["ids"] = taken.ids.tolist()
     made.header["channels"] = None if store.channels is None else [one.name for one in store.channels]
@@ -78,7 +82,7 @@ def some_members(members: Members, most: int) -> Members:
     return Members(members.ids[chosen], members.names, first, groups)
 
 
-def _snapshot(known: KnownClasses, primitives: Primitives) -> Snapshot:
+def _snapshot(known: KnownClasses, primitives: Primitives, early: Early | None = None) -> Snapshot:
     recognition, movements = recognition_parts(known), movement_parts(primitives)
-    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(known)}
+    header: dict[str, Any] = {**recognition.header, **movements.header, "early": early_part(known, early)}
     return Snapshot(header, recognition.arrays | movements.arrays)

@@ -1,0 +1,43 @@
+"""``kineme page``: a library as one HTML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from kineme.cli.library import opened
+from kineme.cli.options import force_option, json_option, library_option
+from kineme.cli.output import check_new, say
+from kineme.output.text import counted, printable
+
+
+@click.command(short_help="A library as one HTML page: draw, recognize, drag.")
+@library_option
+@click.option("--output", "-o", type=click.Path(path_type=Path, dir_okay=False), required=True, help="An .html file.")
+@click.option("--title", help="Of the page.  [default: the name of the library's folder]")
+@json_option
+@force_option
+def page(folder: Path, output: Path, title: str | None, as_json: bool, force: bool) -> None:
+    """Write one HTML file in which a library recognizes drawings and moves again, without server and network.
+
+    The file holds the movements of the library: whoever has it can read them. Of large libraries some movements of each
+    symbol are taken, so that it stays below 2 MB.
+    """
+    from kineme.studio.page.write_page import write_page
+
+    check_new(output, force)
+    with opened(folder) as library:
+        made = write_page(output, library, title, replace=force)
+    header, size = made.header, output.stat().st_size
+    held, known = header["n_movements"], header["n_all"]
+    data = {"file": str(output), "bytes": size, "symbols": len(header["classes"]), "movements": held, "of": known}
+
+    def text() -> str:
+        of_all = "" if held == known else f" of {known:,}"
+        return (
+            f"{printable(output)}: {counted(len(header['classes']), 'symbol')}, {held:,}{of_all} movements, "
+            f"{size / 1e6:.2f} MB; open it in a browser, it needs no server and no network"
+        )
+
+    say(as_json, data, text)

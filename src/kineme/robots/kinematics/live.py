@@ -1,0 +1,145 @@
+"""Inverse kinematics of an arm that moves: one step of time each, within limits of velocity and acceleration."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kineme.robots.kinematics.braking import Braking, Range, Reasons, brakeable
+from kineme.robots.kinematics.descent import POSTURE_COST
+from kineme.robots.kinematics.inverse import InverseKinematics, is_partial
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array
+
+_SHARE = 0.5  # of the acceleration with which a gap is closed; the movement itself needs the rest
+_CURVED = 0.3  # damping of a step, per distance from the pose: at a stretched arm this is how much the reach bends
+_NEAR = 0.01  # gaps far below this are closed without damping [m]
+_CLOSED = 1e-6  # gaps below this are closed in one step [m]
+_TINY = 1e-300  # no change at all, and no division by it
+_LONGEST = 1.0  # farther than this nothing is asked of one step [m]
+
+
+class LiveKinematics(InverseKinematics):
+    """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
+
+    A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
+    still brake at its end. The quadratic program of `InverseKinematics` is solved within the velocities of `Braking`.
+    Far from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of
+    reach comes to rest.
+
+    Parameters
+    ----------
+    robot : Robot
+    orientation : {"full", "axis", "free"}
+        See `InverseKinematics`.
+    time_step : float
+        Of a step [s].
+
+    Attributes
+    ----------
+    velocities, accelerations : ndarray of shape (n,)
+        Of the joints in the last step; 0 at first.
+    """
+
+    def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:
+        self._braking, self._dt = Braking(robot, time_step), time_step
+        self._box = _Box(robot.n_joints)
+        super().__init__(robot, orientation)
+        self._weights = np.concatenate((np.ones(3), self.costs))
+        self._still = np.zeros(robot.n_joints)
+        self._turns = np.zeros(3) if is_partial(robot) else self.costs
+
+    def reset(self, q: Array) -> None:
+        """Start from joint positions q (n,), at rest; the pose to follow is that of the tip."""
+        super().reset(q)
+        self.velocities = self.accelerations = self._before = np.zeros(self.robot.n_joints)
+        self._allowed = self._braking.range(self._configuration.q, self.velocities)
+        self._at = self._wanted = self._configuration.get_transform_frame_to_world(self.robot.tip)
+
+    def start_from(self, position: Array, rotation: Array) -> None:
+        """The pose to follow is there now."""
+        self._wanted = self._pose(rotation, position)
+
+    @property
+    def error(self) -> float:
+        """Distance of the tip from where it was asked to be at the last step [m]."""
+        return math.dist(self._at.translation, self._wanted.translation)
+
+    @property
+    def turned(self) -> float:
+        """Angle of the tip from how it was asked to be turned [rad], of what is followed."""
+        return math.hypot(*(self._turns * self._log(self._at.rotation.T @ self._wanted.rotation)))
+
+    @property
+    def reasons(self) -> Reasons:
+        """Which limits bound the last step."""
+        return self._braking.reasons(self._allowed, self._before, self.velocities)
+
+    def step(self, position: Array, rotation: Array) -> Array:
+        """Follow the pose to where it is after one more step of time; joint positions (n,) then."""
+        last, self._wanted, self._before = self._wanted, self._pose(rotation, position), self.velocities
+        damping = self._set_targets(last)
+        self._allowed = self._braking.range(self._configuration.q, self._before)
+        self._box.bound(self._allowed, self._dt)
+        change = self._change((self._box,), damping)
+        # The solver keeps limits to 1e-6 only; where it finds nothing, the joints brake.
+        self.velocities = self._allowed.nearest(self._still if change is None else change / self._dt)
+        self.accelerations = (self.velocities - self._before) / self._dt
+        q = self._configuration.q + self.velocities * self._dt
+        self._configuration.update(np.minimum(np.maximum(q, self.robot.lower), self.robot.upper))
+        self._at = self._configuration.get_transform_frame_to_world(self.robot.tip)
+        return self.q
+
+    def _set_targets(self, last: Any) -> float:
+        """What this step asks of tip and posture; the damping it needs."""
+        at, wanted, q = self._at, self._wanted, self._configuration.q
+        back = at.rotation.T
+        away, turn = _bounded(last.translation - at.translation), self._log(back @ last.rotation)
+        gap = self._weights * np.concatenate((back @ away, turn))
+        distance = math.hypot(*gap)
+        damping = _CURVED * distance * distance / (distance + _NEAR)
+        to_rest = self.robot.rest - q
+        closing = self._closing(gap, damping) if distance > _CLOSED else self._still
+        share, share_to_rest = self._shares(np.array((closing, to_rest)))
+        moved = _bounded(wanted.translation - last.translation)
+        rotation = at.rotation @ self._exp(share * turn) @ (last.rotation.T @ wanted.rotation)
+        self._tip.set_target(self._pose(rotation, at.translation + share * away + moved))
+        self._posture.set_target(q + share_to_rest * to_rest)
+        return damping
+
+    def _closing(self, gap: Array, damping: float) -> Array:
+        """The change of the joints (n,) that closes a weighted gap (6,) to first order."""
+        J = self._weights[:, None] * self._configuration.get_frame_jacobian(self.robot.tip)
+        curvature = J.T @ J
+        curvature.flat[:: len(curvature) + 1] += damping + POSTURE_COST**2
+        return np.asarray(np.linalg.solve(curvature, J.T @ gap))
+
+    def _shares(self, changes: Array) -> Array:
+        """How much of changes of the joints (m, n) one step may take so that it can be braked where they end."""
+        sizes = np.abs(changes)
+        fastest = brakeable(sizes, _SHARE * self._braking.change, self._dt)
+        ways = np.minimum(fastest, self.robot.velocity) * self._dt
+        return np.minimum((ways / np.maximum(sizes, _TINY)).min(axis=1), 1.0)
+
+
+class _Box:
+    """Bounds of a step, as pink asks for them."""
+
+    def __init__(self, n_joints: int) -> None:
+        self._sides = np.vstack((np.eye(n_joints), -np.eye(n_joints)))
+        self._ends = np.zeros(2 * n_joints)
+
+    def bound(self, allowed: Range, dt: float) -> None:
+        self._ends = dt * np.concatenate((allowed.most, -allowed.least))
+
+    def compute_qp_inequalities(self, _: object, __: float) -> tuple[Array, Array]:
+        """G and h of ``G dq <= h``."""
+        return self._sides, self._ends
+
+
+def _bounded(way: Array) -> Array:
+    """A way (3,) of at most 1 m in its direction."""
+    length = math.hypot(*way)
+    return way if length <= _LONGEST else way * (_LONGEST / length)

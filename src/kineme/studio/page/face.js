@@ -1,0 +1,315 @@
+// The page: draw, see live what it is, drag start and goal.
+
+import { open } from "../javascript/runtime.js";
+import { createMoving, placed } from "./movements.js";
+import { boxOf, createStage } from "./stage.js";
+
+const ROWS = 5; // bars
+const STEP = 0.03; // of the stage, by an arrow key
+const ERROR_RATE = 0.05;
+const DRAWN = "Your drawing";
+
+const element = (id) => document.getElementById(id);
+const percent = (share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
+
+function make(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+const runtime = open(element("snapshot").textContent);
+const d = runtime.header.comparison.n_dims;
+const prototypes = runtime.classes.map((name) => runtime.rollout(runtime.primitive(name)).positions);
+const box = viewed();
+const stage = createStage(element("stage"), runtime.header.view, box);
+const state = { stroke: null, live: null, answer: null, moving: null, held: null, pointer: null, played: null, note: "" };
+let [follow, frame] = [null, 0];
+
+/** What is in view: a typical movement fills it. */
+function viewed() {
+  const boxes = prototypes.map(boxOf);
+  if (!runtime.header.comparison.translation) return boxOf(prototypes.flat());
+  const middle = (values) => values.sort((a, b) => a - b)[Math.floor(0.8 * (values.length - 1))];
+  return { center: boxes[0].center.map((_, k) => middle(boxes.map((one) => one.center[k]))), half: middle(boxes.map((one) => one.half)) };
+}
+
+function later() {
+  if (!frame) frame = requestAnimationFrame(paint);
+}
+
+function paint() {
+  frame = 0;
+  const { stroke, moving, answer } = state;
+  if (stroke && follow) {
+    state.live = follow(stroke.times, stroke.positions) ?? state.live;
+    showLive();
+  }
+  stage.cleared();
+  if (state.drawn && moving?.name === DRAWN) stage.line(state.drawn.positions, "--line", { wide: 5 });
+  if (stroke) stage.line(stroke.positions, "--ink", { wide: 4 });
+  if (stroke && state.live) {
+    stage.line(state.live.path, "--predicted", { dashed: true, wide: 4 });
+    stage.dot(state.live.path.at(-1), "--predicted", { radius: 6 });
+  }
+  if (moving && !stroke) paintMoving(moving);
+  element("hint").hidden = Boolean(stroke || moving || answer);
+  for (const id of ["play", "save"]) element(id).disabled = !moving || Boolean(stroke);
+  element("clear").disabled = !moving && !answer;
+}
+
+function paintMoving(moving) {
+  stage.line(moving.positions, "--ink", { wide: 4 });
+  for (const [, x] of moving.via) stage.dot(x, "--predicted", { radius: 6 });
+  stage.dot(moving.start, "--ink", { hollow: true });
+  stage.dot(moving.goal, "--goal");
+  stage.word("start", moving.start, "--soft");
+  stage.word("goal", moving.goal, "--goal");
+  if (state.played !== null) stage.dot(moving.positions[state.played], "--predicted");
+}
+
+/** Words of the answer; a reader of the screen is told once for each verdict. */
+function say(verdict, reason, kind = "") {
+  const said = element("verdict");
+  if (said.textContent !== verdict) said.textContent = verdict;
+  said.className = kind;
+  element("reason").textContent = state.note || reason;
+}
+
+function showLive() {
+  const { live } = state;
+  if (!live) return say("…", "Go on drawing.");
+  const sure = live.decided ?? live.ranked[0].name;
+  const unknown = live.unknown > live.ranked[0].share;
+  say(unknown ? "Unknown so far" : sure, `${percent(live.progress)} done, ${live.decided ? "decided" : "not decided yet"}`, unknown ? "unknown" : "");
+  bars([...live.ranked, { name: null, share: live.unknown }]);
+}
+
+function showAnswer() {
+  const { answer, moving } = state;
+  if (!answer) return say(moving ? moving.name : "What is it?", moving ? "Drag its start, its goal, or the path itself." : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.");
+  const guess = answer.calibrated ? "" : " One drawing of each is known: the verdict is a guess.";
+  if (answer.label === null) say("Unknown", `Nearest is ${answer.ranked[0]}; only ${percent(answer.pKnown)} of known movements differ as much.${guess}`, "unknown");
+  else say(answer.label, `${percent(answer.confidence)} sure.${guess} Drag its start, its goal, or the path; or clear it and draw another.`);
+  const unknown = answer.label === null ? 1 - answer.pKnown : 0;
+  bars([...answer.ranked.map((name) => ({ name, share: answer.shares[name] * (1 - unknown) })), { name: null, share: unknown }]);
+}
+
+/** The most likely ones, always as many rows; names are text. */
+function bars(ranked) {
+  const shown = ranked.slice().sort((a, b) => b.share - a.share).slice(0, ROWS);
+  [...element("bars").children].forEach((row, i) => {
+    const one = shown[i];
+    const [name, track, value] = row.children;
+    name.textContent = one ? one.name ?? "unknown" : "";
+    row.className = one?.name ? "" : "unknown";
+    value.textContent = one ? percent(one.share) : "";
+    track.firstChild.style.width = `${100 * (one?.share ?? 0)}%`;
+  });
+}
+
+function clear() {
+  Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "" });
+  select(null);
+  bars([]);
+  showAnswer();
+  later();
+}
+
+function select(name) {
+  for (const button of element("symbols").querySelectorAll("button")) {
+    button.setAttribute("aria-pressed", String(button.dataset.index === String(runtime.classes.indexOf(name))));
+  }
+}
+
+/** Put a known movement, or a drawn one, on the stage. */
+function show(name, what, place) {
+  try {
+    state.moving = createMoving(runtime, name, what, place);
+    if (element("formulation").value) state.note = state.moving.update({ formulation: element("formulation").value }) ?? "";
+  } catch (error) {
+    state.moving = null;
+    state.note = error.message;
+  }
+}
+
+function choose(name) {
+  clear();
+  show(name, name, placed(runtime, runtime.primitive(name), box));
+  select(name);
+  showAnswer();
+  later();
+}
+
+function finish() {
+  const { times, positions } = state.stroke;
+  const drawn = state.stroke;
+  Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "" });
+  try {
+    state.answer = runtime.recognize(times, positions, ERROR_RATE);
+    state.drawn = drawn;
+    if (runtime.header.movements.encodes) show(DRAWN, runtime.encode(times, positions), { start: positions[0], goal: positions.at(-1) });
+    select(state.answer.label);
+  } catch {
+    state.note = "That was too short: draw a longer movement.";
+    bars([]);
+  }
+  showAnswer();
+  later();
+}
+
+const placeOf = (event) => {
+  const { left, top } = element("stage").getBoundingClientRect();
+  return [event.clientX - left, event.clientY - top];
+};
+
+function down(event) {
+  if (state.pointer !== null || event.button > 0) return;
+  element("stage").setPointerCapture(event.pointerId);
+  state.pointer = event.pointerId;
+  state.played = null;
+  state.held = state.moving?.held(stage, placeOf(event)) ?? null;
+  if (state.held) return;
+  select(null);
+  Object.assign(state, { stroke: { times: [], positions: [] }, answer: null, live: null, drawn: null, moving: null, note: "" });
+  follow = runtime.follow();
+  take(event);
+}
+
+function take(event) {
+  const { times, positions } = state.stroke;
+  const t = event.timeStamp / 1000;
+  if (times.length && t <= times.at(-1)) return;
+  times.push(t);
+  positions.push(stage.unproject(...placeOf(event)));
+}
+
+function move(event) {
+  if (event.pointerId !== state.pointer) return hover(event);
+  if (state.held) {
+    const like = state.held.what === "via" ? box.center : state.moving[state.held.what];
+    state.note = state.moving.drag(state.held, stage.unproject(...placeOf(event), like)) ?? "";
+    if (state.note) showAnswer();
+  } else {
+    const parts = event.getCoalescedEvents?.() ?? [];
+    (parts.length ? parts : [event]).forEach(take);
+  }
+  later();
+}
+
+function hover(event) {
+  element("stage").classList.toggle("over", Boolean(state.moving?.held(stage, placeOf(event))));
+}
+
+function up(event) {
+  if (event.pointerId !== state.pointer) return;
+  state.pointer = null;
+  if (state.held) {
+    state.held = null;
+    state.note = "";
+    showAnswer();
+    later();
+  } else finish();
+}
+
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+function key(event) {
+  if (event.key === "Escape") clear();
+  else if (event.key === " ") play();
+  else if (event.key in ARROWS && state.moving) {
+    const part = event.shiftKey ? "start" : "goal";
+    const step = STEP * element("stage").clientHeight;
+    const at = stage.project(state.moving[part]);
+    const [x, y] = ARROWS[event.key].map((one, k) => at[k] + one * step);
+    state.note = state.moving.update({ [part]: stage.unproject(x, y, state.moving[part]) }) ?? "";
+    showAnswer();
+    later();
+  } else return;
+  event.preventDefault();
+}
+
+/** A dot runs along the movement in its own time; where less motion is asked for, it is shown at the goal. */
+function play() {
+  const { moving } = state;
+  if (!moving) return;
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const begun = performance.now();
+  const duration = moving.times.at(-1);
+  const step = (now) => {
+    if (state.moving !== moving || state.pointer !== null) return;
+    const share = still ? 1 : Math.min((now - begun) / 1000 / duration, 1);
+    state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
+    later();
+    if (share < 1) requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+}
+
+function save() {
+  const { moving } = state;
+  const head = ["t [s]", ..."xyz".slice(0, d)].join(",");
+  const rows = moving.positions.map((x, i) => [moving.times[i], ...x].map((value) => value.toPrecision(9)).join(","));
+  const url = URL.createObjectURL(new Blob([[head, ...rows, ""].join("\n")], { type: "text/csv" }));
+  make("a", { href: url, download: "movement.csv" }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 1000);
+}
+
+/** Small pictures of the known movements, as buttons. */
+function list() {
+  runtime.classes.forEach((name, c) => {
+    const picture = make("canvas", { className: "picture" });
+    picture.setAttribute("aria-hidden", "true");
+    const button = make("button", { type: "button" }, picture, make("span", { textContent: name }));
+    button.dataset.index = c;
+    button.addEventListener("click", () => choose(name));
+    element("symbols").append(make("li", {}, button));
+  });
+}
+
+function pictures() {
+  const [turn, tilt] = ["turn", "tilt"].map((id) => Number(element(id).value));
+  element("symbols").querySelectorAll("canvas").forEach((canvas, c) => {
+    const small = createStage(canvas, runtime.header.view, boxOf(prototypes[c]));
+    small.turned(turn, tilt);
+    small.cleared();
+    small.line(prototypes[c], "--ink", { wide: 2 });
+    small.dot(prototypes[c].at(-1), "--goal", { radius: 3.5 });
+  });
+}
+
+function start() {
+  for (let i = 0; i < ROWS; i++) {
+    element("bars").append(make("li", {}, make("span", { className: "name" }), make("span", { className: "track" }, make("i")), make("span", { className: "value" })));
+  }
+  for (const name of runtime.formulations) element("formulation").append(make("option", { value: name, textContent: name }));
+  element("formulation").value = runtime.header.movements.formulation;
+  element("how").hidden = runtime.formulations.length < 2;
+  for (const label of document.querySelectorAll(".turn")) label.hidden = d === 2;
+  const canvas = element("stage");
+  const listeners = { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, keydown: key };
+  for (const [name, listener] of Object.entries(listeners)) canvas.addEventListener(name, listener);
+  element("clear").addEventListener("click", clear);
+  element("play").addEventListener("click", play);
+  element("save").addEventListener("click", save);
+  element("formulation").addEventListener("change", (event) => {
+    state.note = state.moving?.update({ formulation: event.target.value }) ?? "";
+    showAnswer();
+    later();
+  });
+  for (const id of ["turn", "tilt"]) element(id).addEventListener("input", () => {
+    stage.turned(Number(element("turn").value), Number(element("tilt").value));
+    pictures();
+    later();
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { pictures(); later(); });
+  new ResizeObserver(() => { pictures(); later(); }).observe(canvas);
+  list();
+  clear();
+  pictures();
+  // What is drawn first should not wait for what is made once.
+  window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], [0, 1, 2, 3].map((k) => prototypes[0][k * 20])));
+}
+
+start();
+window.kineme = { runtime, state, stage };

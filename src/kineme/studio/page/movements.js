@@ -1,0 +1,79 @@
+// What moves on the stage: a known movement or one that was drawn, with its start, goal and via points.
+
+import { boxOf } from "./stage.js";
+
+const NEAR = 26; // CSS pixels within which a point is taken hold of
+const NEAR_PATH = 14;
+const ENDS = 0.06; // share of the time next to start and goal where there are no via points
+const APART = 0.08; // least time between two via points
+const MOST_VIA = 3;
+
+const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
+
+/** The sample of a rollout to show a primitive where it was learned, moved to the middle of a box. */
+export function placed(runtime, primitive, box) {
+  const { positions } = runtime.rollout(primitive);
+  const shift = runtime.header.comparison.translation
+    ? boxOf(positions).center.map((c, k) => box.center[k] - c) : box.center.map(() => 0);
+  const moved = (x) => x.map((value, k) => value + shift[k]);
+  return { start: moved(primitive.start), goal: moved(primitive.goal) };
+}
+
+/**
+ * A movement that can be changed.
+ * @param {Object} runtime
+ * @param {string} name
+ * @param {Object|string} what a primitive that was learned, or a class
+ * @param {{start: number[], goal: number[]}} place
+ */
+export function createMoving(runtime, name, what, place) {
+  let { start, goal } = place;
+  let [via, formulation] = [[], runtime.header.movements.formulation];
+  let made = null;
+
+  function update(change) {
+    const before = { start, goal, via, formulation };
+    ({ start = start, goal = goal, via = via, formulation = formulation } = change);
+    try {
+      made = runtime.rollout(runtime.primitive(what, formulation), { start, goal, via });
+      return null;
+    } catch (error) { // as a closed movement that cannot be scaled, or via points too close together
+      ({ start, goal, via, formulation } = before);
+      return error.message;
+    }
+  }
+  const problem = update({});
+  if (problem) throw new Error(problem);
+
+  /** What is under a point of the screen: start, goal, a via point, a place on the path; null for nothing. */
+  function held(stage, at) {
+    const ends = [["goal", goal], ["start", start]].filter(([, x]) => distance(stage.project(x), at) < NEAR);
+    if (ends.length) return { what: ends.sort((a, b) => distance(stage.project(a[1]), at) - distance(stage.project(b[1]), at))[0][0] };
+    const known = via.findIndex(([, x]) => distance(stage.project(x), at) < NEAR);
+    if (known >= 0) return { what: "via", time: via[known][0] };
+    const away = made.positions.map((x) => distance(stage.project(x), at));
+    const nearest = away.indexOf(Math.min(...away));
+    const time = nearest / (away.length - 1);
+    const free = time > ENDS && time < 1 - ENDS && via.every(([one]) => Math.abs(one - time) > APART);
+    return away[nearest] < NEAR_PATH && free && via.length < MOST_VIA ? { what: "via", time } : null;
+  }
+
+  /** Move what is held to a place; an error in words, or null. */
+  function drag({ what: part, time }, x) {
+    if (part !== "via") return update({ [part]: x });
+    const others = via.filter(([one]) => one !== time);
+    return update({ via: [...others, [time, x]].sort((a, b) => a[0] - b[0]) });
+  }
+
+  return {
+    name,
+    update,
+    held,
+    drag,
+    get start() { return start; },
+    get goal() { return goal; },
+    get via() { return via; },
+    get positions() { return made.positions; },
+    get times() { return made.times; },
+  };
+}

@@ -1,0 +1,102 @@
+// The drawing area: where a movement is on the screen, and how it is painted.
+
+const RADIUS = 9; // of start and goal [CSS pixels]
+const FILLED = 0.4; // of the shorter side, by half of a typical movement
+
+/** Rotation matrix of a view: a first one, turned about what is up on the screen, then tilted. */
+function viewOf(first, turn, tilt) {
+  if (first.length === 4) return first;
+  const [a, b] = [turn, tilt].map((one) => (one * Math.PI) / 180);
+  const [right, up, near] = [0, 1, 2].map((k) => first.slice(3 * k, 3 * k + 3));
+  const mix = (u, x, v, y) => u.map((one, k) => x * one + y * v[k]);
+  const behind = mix(near, Math.cos(a), right, -Math.sin(a));
+  return [
+    ...mix(right, Math.cos(a), near, Math.sin(a)),
+    ...mix(up, Math.cos(b), behind, -Math.sin(b)),
+    ...mix(up, Math.sin(b), behind, Math.cos(b)),
+  ];
+}
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {number[]} view rotation matrix, row by row: what is right, up and near on the screen
+ * @param {{center: number[], half: number}} box what is in view, in the unit of the movements
+ */
+export function createStage(canvas, view, box) {
+  const d = box.center.length;
+  const context = canvas.getContext("2d");
+  let [width, height, R] = [1, 1, viewOf(view, 0, 0)];
+  let style = getComputedStyle(canvas);
+  const scale = () => (FILLED * Math.min(width, height)) / box.half;
+  const rotated = (x) => Array.from({ length: d }, (_, k) => x.reduce((sum, value, h) => sum + R[k * d + h] * (value - box.center[h]), 0));
+
+  function project(x) {
+    const v = rotated(x);
+    return [width / 2 + v[0] * scale(), height / 2 - v[1] * scale()];
+  }
+
+  /** The place under a point of the screen, as deep in the view as another place. */
+  function unproject(px, py, like = box.center) {
+    const v = [(px - width / 2) / scale(), (height / 2 - py) / scale(), ...rotated(like).slice(2)];
+    return box.center.map((c, h) => c + v.reduce((sum, value, k) => sum + R[k * d + h] * value, 0));
+  }
+
+  /** A line through places; from a share of it on it is faded. */
+  function line(points, color, { wide = 3, dashed = false } = {}) {
+    if (points.length < 2) return;
+    context.beginPath();
+    points.forEach((x, i) => context[i ? "lineTo" : "moveTo"](...project(x)));
+    context.strokeStyle = style.getPropertyValue(color);
+    context.lineWidth = wide;
+    context.lineJoin = context.lineCap = "round";
+    context.setLineDash(dashed ? [2, 8] : []);
+    context.stroke();
+    context.setLineDash([]);
+  }
+
+  function dot(x, color, { radius = RADIUS, hollow = false } = {}) {
+    context.beginPath();
+    context.arc(...project(x), radius, 0, 2 * Math.PI);
+    context.fillStyle = style.getPropertyValue(hollow ? "--surface" : color);
+    context.fill();
+    context.lineWidth = 3;
+    context.strokeStyle = style.getPropertyValue(hollow ? color : "--surface");
+    context.stroke();
+  }
+
+  function word(text, x, color) {
+    const [px, py] = project(x);
+    context.font = `600 ${style.fontSize} ${style.fontFamily}`;
+    context.textAlign = px > width - 80 ? "right" : "left";
+    context.lineWidth = 4;
+    context.strokeStyle = style.getPropertyValue("--surface");
+    context.fillStyle = style.getPropertyValue(color);
+    const at = [px + (px > width - 80 ? -1 : 1) * (RADIUS + 7), py + 5];
+    context.strokeText(text, ...at);
+    context.fillText(text, ...at);
+  }
+
+  function cleared() {
+    style = getComputedStyle(canvas);
+    const ratio = window.devicePixelRatio || 1;
+    [width, height] = [canvas.clientWidth || 1, canvas.clientHeight || 1];
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    }
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+  }
+
+  const turned = (turn, tilt) => (R = viewOf(view, turn, tilt));
+  return { project, unproject, line, dot, word, cleared, turned };
+}
+
+/** A place in the middle of what points cover, and half of how far they reach. */
+export function boxOf(points) {
+  const center = points[0].map((_, k) => {
+    const values = points.map((x) => x[k]);
+    return (Math.min(...values) + Math.max(...values)) / 2;
+  });
+  const half = Math.max(...points.flatMap((x) => x.map((value, k) => Math.abs(value - center[k]))));
+  return { center, half: half || 1 };
+}

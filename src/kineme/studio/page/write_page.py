@@ -1,0 +1,106 @@
+"""A library as one HTML page that recognizes and moves, without server and network."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from kineme.comparison.describe import N_POINTS
+from kineme.errors import SpecificationError
+from kineme.library.library import ActionLibrary
+from kineme.output.atomic import whole_file
+from kineme.output.text import counted, in_markup
+from kineme.recognition.early.hypotheses import Early
+from kineme.studio.page.bundle import bundled
+from kineme.studio.snapshot.make import snapshot_of_library
+from kineme.studio.snapshot.snapshot import Snapshot
+
+_FOLDER = Path(__file__).parent
+_TOKENS = _FOLDER.parent / "web" / "tokens.css"
+_FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly along z
+#: People draw on a screen faster or slower than they showed: a factor of 7 either way is two standard deviations.
+_EARLY = Early(duration_spread=1.0)
+
+
+def library_page(library: ActionLibrary, title: str) -> tuple[str, Snapshot]:
+    """The text of the page, and the snapshot that it holds.
+
+    Raises
+    ------
+    SpecificationError
+        Movements that are neither in the plane nor in space; what `snapshot_of_library` refuses.
+    """
+    if library.n_dims not in (2, 3) and len(library):
+        raise SpecificationError(
+            f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "
+            "be drawn; learn two or three columns of the recordings, in the shell with --columns"
+        )
+    snapshot = snapshot_of_library(library, early=_EARLY)
+    return page_of(snapshot, title), snapshot
+
+
+def page_of(snapshot: Snapshot, title: str) -> str:
+    """The page of a snapshot. Its content security policy allows its own script and style by their hashes, no more."""
+    snapshot.header["view"] = view_of(snapshot)
+    script = bundled(_FOLDER / "face.js")
+    style = _TOKENS.read_text(encoding="utf-8") + (_FOLDER / "page.css").read_text(encoding="utf-8")
+    parts = {
+        "policy": (
+            f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; base-uri 'none'; "
+            "form-action 'none'"
+        ),
+        "style": style,
+        "script": script,
+        "title": in_markup(title),
+        "summary": in_markup(_summary(snapshot)),
+        "footer": in_markup("Recognized and generated in this page by kineme; nothing leaves it."),
+        "snapshot": snapshot.to_json(),
+    }
+    template = (_FOLDER / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template)
+
+
+def write_page(path: str | Path, library: ActionLibrary, title: str | None = None, replace: bool = True) -> Snapshot:
+    """Write the page of a library, see `library_page`; the title is by default the name of the library's folder.
+
+    Raises
+    ------
+    FileExistsError
+        `replace` is False and there is a file.
+    OSError
+        The folder is missing, read-only or full.
+    """
+    text, snapshot = library_page(library, title or library.store.folder.resolve().name)
+    with whole_file(Path(path), replace=replace) as beside:
+        beside.write_text(text, encoding="utf-8")
+    return snapshot
+
+
+def view_of(snapshot: Snapshot) -> list[float]:
+    """Right, up and near on the screen: the plane in which the movements are largest is that of the screen, z is up."""
+    d = snapshot.header["comparison"]["n_dims"]
+    if d == 2:
+        return [1.0, 0.0, 0.0, 1.0]
+    paths = snapshot.arrays["paths"].reshape(-1, d, N_POINTS).astype(float)
+    away = (paths - paths.mean(axis=2, keepdims=True)).transpose(0, 2, 1).reshape(-1, d)
+    near = np.linalg.eigh(away.T @ away)[1][:, 0]
+    axis = np.eye(3)[1] if abs(near[2]) > _FROM_ABOVE else np.eye(3)[2]
+    up = axis - near * near[axis.argmax()]
+    up /= np.linalg.norm(up)
+    near = near if abs(near[2]) <= _FROM_ABOVE or near[2] > 0 else -near
+    return np.concatenate((np.cross(up, near), up, near)).tolist()
+
+
+def _summary(snapshot: Snapshot) -> str:
+    held, known = snapshot.header["n_movements"], snapshot.header.get("n_all", snapshot.header["n_movements"])
+    of_all = "" if held == known else f" of {known:,}"
+    symbols = counted(len(snapshot.header["classes"]), "symbol")
+    return f"{symbols}, {held:,}{of_all} {'movement' if known == 1 else 'movements'}"
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"

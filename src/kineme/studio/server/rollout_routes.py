@@ -1,0 +1,73 @@
+"""New movements, as numbers and as files."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from fastapi import APIRouter
+from fastapi.responses import Response
+
+from kineme.files.write_movement import encode_movement
+from kineme.studio.server.plain import numbers
+from kineme.studio.server.records import Exported, Moved, Operated, OperatorsOut, StylesOut, Wanted
+from kineme.studio.server.rollouts import learned_as, make, operators, styles_of
+from kineme.studio.server.studio import Reads
+
+router = APIRouter(prefix="/api", tags=["movement"])
+
+
+@router.post("/rollout", response_model=Moved, summary="A new movement")
+def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
+    """Of a symbol, a stored movement or a style: from another start, to another goal, past points and obstacles."""
+    made = make(studio, asked)
+    columns = made.movement.columns
+    return {
+        **{name: numbers(columns[name]) for name in ("times", "positions", "velocities", "accelerations")},
+        "columns": list(made.movement.names.positions),
+        "start": numbers(columns["positions"][0]),
+        "goal": numbers(columns["positions"][-1] if asked.goal is None else asked.goal),
+        "warnings": made.warnings,
+    }
+
+
+@router.post(
+    "/rollout/operators", response_model=OperatorsOut | None, summary="A movement as a sum over start and goal"
+)
+def rollout_operators(studio: Reads, asked: Operated) -> dict[str, Any] | None:
+    """To follow a hand without a request for each picture; null where the movement is no such sum."""
+    learned = learned_as(studio, asked)
+    key = asked.model_dump_json()
+    found = studio.kept_some("operators", key, lambda: operators(learned))
+    return None if found is None else {name: numbers(np.asarray(one)) for name, one in found._asdict().items()}
+
+
+@router.get(
+    "/library/symbols/{key}/styles", response_model=StylesOut, summary="In which ways members of a symbol differ"
+)
+def styles(studio: Reads, key: str) -> dict[str, Any]:
+    """The range of each direction; values of a rollout's style lie between."""
+    model = styles_of(studio, key)
+    ranges = {"lowest": model.lowest, "highest": model.highest, "explained": model.explained_variance}
+    return {name: numbers(values) for name, values in ranges.items()}
+
+
+@router.post("/export", summary="A new movement as a file", response_class=Response)
+def export(studio: Reads, asked: Exported) -> Response:
+    """With times, positions, velocities and accelerations, in each format that movements are written in."""
+    made = make(studio, asked)
+    ending = f".{asked.format.lower().lstrip('.')}"
+    data = encode_movement(made.movement.columns, ending, made.movement.names)
+    symbol = asked.what.symbol or (asked.what.style.symbol if asked.what.style else None)
+    name = studio.symbol(symbol).name if symbol else f"movement {asked.what.movement}"
+    return Response(
+        data, media_type="application/octet-stream", headers={"Content-Disposition": _saved_as(name, ending)}
+    )
+
+
+def _saved_as(name: str, ending: str) -> str:
+    """A file's name for browsers: letters and digits of the name, whatever alphabet they are of."""
+    plain = "".join(mark if mark.isalnum() or mark in "-_" else "_" for mark in name)[:80] or "movement"
+    ascii_only = plain.encode("ascii", "replace").decode().replace("?", "_")
+    return f"attachment; filename=\"{ascii_only}{ending}\"; filename*=UTF-8''{quote(plain + ending)}"

@@ -1,0 +1,154 @@
+"""New movements of what a library holds."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from kineme.errors import SpecificationError
+from kineme.library.storage import read
+from kineme.library.symbols.grounding import prototype_of
+from kineme.primitives.control.obstacles import ObstacleAvoidance
+from kineme.primitives.generation.generate import Generated, MovementOptions, generate
+from kineme.primitives.generation.learned import Learned, learn_one
+from kineme.primitives.styles.learn import learn_styles
+from kineme.primitives.styles.model import StyleModel
+from kineme.studio.server.records import Obstacle, Operated, Wanted, What
+from kineme.studio.server.studio import Studio
+from kineme.validation import Array
+
+_SAMPLES, _MOST_SAMPLES = 200, 20_000
+_STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
+_WARNINGS = Lock()  # Python has one list of filters for all threads
+
+
+class Made(NamedTuple):
+    """A new movement, and what is to be said of it."""
+
+    movement: Generated
+    warnings: list[str]
+
+
+class Operators(NamedTuple):
+    """``positions = of_start start + of_goal goal + constant``: (T,), (T,) and (T, d), at `times` (T,)."""
+
+    times: Array
+    of_start: Array
+    of_goal: Array
+    constant: Array
+
+
+def learned_as(studio: Studio, asked: Operated) -> Learned:
+    """The primitive of what is asked for, in the formulation that is asked for; kept until the library changes."""
+    key = asked.what.model_dump_json() + str(asked.formulation)
+    return studio.kept_some("learned", key, lambda: _learned(studio, asked.what, asked.formulation))
+
+
+def styles_of(studio: Studio, symbol: str) -> StyleModel:
+    """The directions in which the members of a symbol differ; kept in the same way."""
+    name = studio.symbol(symbol).name
+    return studio.kept_some("styles", symbol, lambda: learn_styles(studio.library.primitives(name)))
+
+
+def make(studio: Studio, asked: Wanted) -> Made:
+    """The movement that is asked for.
+
+    Raises
+    ------
+    SpecificationError, TrajectoryError
+        See `kineme.primitives.generation.generate.generate`.
+    """
+    learned = learned_as(studio, asked)
+    duration = asked.duration or float(learned.primitive.durations[0])
+    rate = asked.rate or _SAMPLES / duration
+    if rate * duration > _MOST_SAMPLES:
+        raise SpecificationError(
+            f"expected at most {_MOST_SAMPLES:,} samples, got {rate:g} per second for {duration:g} s; take a lower rate"
+        )
+    options = MovementOptions(
+        start=None if asked.start is None else np.array(asked.start),
+        goal=None if asked.goal is None else np.array(asked.goal),
+        duration=asked.duration,
+        rate=rate,
+        meet_goal=True,  # it ends where the hand put it
+        via=tuple((share, np.array(point)) for share, point in sorted(asked.via, key=lambda one: one[0])),
+    )
+    with _WARNINGS, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        movement, said = _around(learned, options, asked.obstacles)
+    return Made(movement, list(dict.fromkeys([*(str(one.message) for one in caught), *said])))
+
+
+def operators(learned: Learned) -> Operators | None:
+    """The movement as a sum over start and goal; None where it is none, as where it is scaled with their distance."""
+    shown = learned.example
+    start, goal = (np.asarray(shown[k], dtype=np.float64) for k in (0, -1))
+    if len(learned.moving_columns) != shown.shape[1]:
+        return None
+
+    def path(x0: Array, g: Array) -> tuple[Array, Array]:
+        duration = float(learned.primitive.durations[0])
+        made = generate(
+            learned, MovementOptions(start=x0, goal=g, rate=(_SAMPLES // 2) / duration, meet_goal=True)
+        ).columns
+        return made["times"], made["positions"]
+
+    unit = np.full(len(start), float(np.ptp(shown, axis=0).max()) or 1.0)
+    with _WARNINGS, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        times, here = path(start, goal)
+        of_start = (path(start + unit, goal)[1] - here) / unit
+        of_goal = (path(start, goal + unit)[1] - here) / unit
+        a, b = of_start[:, :1], of_goal[:, :1]
+        constant = here - a * start - b * goal
+        turned = unit * np.where(np.arange(len(unit)) % 2, -0.7, 1.3)
+        other = path(start - turned, goal + turned)[1]
+    if not np.allclose(a * (start - turned) + b * (goal + turned) + constant, other, atol=1e-6 * unit.max()):
+        return None
+    return Operators(times, a[:, 0], b[:, 0], constant)
+
+
+def _learned(studio: Studio, what: What, formulation: str | None) -> Learned:
+    store, dmp = studio.library.store, studio.library.specification.dmp
+    if what.style is not None:
+        if formulation not in {None, dmp.formulation}:
+            raise SpecificationError(f"expected styles in the formulation {dmp.formulation!r}, got {formulation!r}")
+        return Learned(styles_of(studio, what.style.symbol).primitive(what.style.values))
+    if what.movement is not None:
+        studio.check_movements([what.movement])
+        key = what.movement
+    else:
+        symbol = studio.symbol(what.symbol or "")
+        if not len(symbol):
+            raise SpecificationError(f"expected a symbol with movements, {symbol.name!r} has none; assign some")
+        key = prototype_of(store, symbol)
+    recording = read.movements(store, np.array([key]))[0]
+    return learn_one(recording, dmp if formulation is None else replace(dmp, formulation=formulation))
+
+
+def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -> tuple[Generated, list[str]]:
+    """The movement, steered around balls as strongly as it takes; what it touches all the same is said."""
+    if not balls:
+        return generate(learned, options), []
+    centers, radii = [one.center for one in balls], np.array([one.radius for one in balls])
+    if len({len(one) for one in centers}) > 1:
+        raise SpecificationError("expected obstacles of equally many dimensions")
+    points = np.array(centers)
+    for stronger in _STRONGER:
+        avoidance = ObstacleAvoidance(gamma=1000.0 * stronger)
+        made = generate(learned, replace(options, obstacles=points, avoidance=avoidance))
+        path = made.columns["positions"][:, : points.shape[1]]
+        gaps = np.linalg.norm(path[:, None] - points, axis=2).min(axis=0) - radii
+        if (gaps >= 0).all():
+            return made, []
+    said = [
+        f"the movement passes {gap + radius:.3g} from the middle of obstacle {k + 1}, whose radius is {radius:.3g}: "
+        "move the obstacle, or add a via point beside it"
+        for k, (gap, radius) in enumerate(zip(gaps.tolist(), radii.tolist(), strict=True))
+        if gap < 0
+    ]
+    return made, said

@@ -1,0 +1,214 @@
+"""The page in Chromium: a recorded letter is drawn, recognized live, dragged; nothing is requested, names are text."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.studio.page.write_page import write_page
+
+playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+
+WIDTHS = (390, 820, 1440)
+HOSTILE = '"><img src=x onerror=alert(1)>'
+SHAPES = ["CShape", "GShape", "Sine", "WShape", "Line"]
+
+
+def lifted(demos):
+    arrays = [np.column_stack((one.positions, 0.2 * one.positions[:, 0])) for one in demos]
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, [one.times for one in demos])
+
+
+def library_of(folder, space=False):
+    demos = kineme.load_lasa(SHAPES)
+    demos = demos[np.arange(len(demos)) % 7 < 4]
+    names = [HOSTILE if label == "Line" else label for label in demos.labels]
+    library = kineme.ActionLibrary(folder, create=True)
+    library.learn(lifted(demos) if space else demos, names)
+    return library
+
+
+def wait_until(page, expression):
+    """Until something holds; the page's own policy forbids what Playwright waits with."""
+    for _ in range(200):
+        if page.evaluate(expression):
+            return
+        time.sleep(0.05)
+    raise AssertionError(expression)
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    for name, space in (("plane", False), ("space", True)):
+        with library_of(folder / name, space) as library:
+            write_page(folder / f"{name}.html", library)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser, pages):
+    """A function that opens a page; at the end, nothing was requested and nothing went wrong."""
+    wrong, requests, contexts = [], [], []
+
+    def open_page(name="plane", width=1440, **options):
+        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, **options))
+        page = contexts[-1].new_page()
+        page.on("console", lambda message: message.type in {"error", "warning"} and wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("dialog", lambda dialog: wrong.append(dialog.message))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto((pages / f"{name}.html").as_uri())
+        wait_until(page, "window.kineme !== undefined")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert wrong == []
+    assert [url for url in requests if not url.startswith(("file:", "blob:"))] == []
+    assert sum(url.startswith("file:") for url in requests) == len(contexts)
+
+
+def draw(page, shape="GShape", index=5, until=1.0):
+    """Draw a recorded letter, in a second or so; the mouse stays down where it is not drawn to its end."""
+    x = kineme.load_lasa([shape])[index].positions[::16]
+    x = (x - (x.min(axis=0) + x.max(axis=0)) / 2) / np.ptp(x, axis=0).max()
+    box = page.locator("#stage").bounding_box()
+    size = 0.6 * min(box["width"], box["height"])
+    points = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]) + x * [size, -size]
+    page.mouse.move(*points[0])
+    page.mouse.down()
+    for point in points[1 : int(until * len(points))]:
+        page.mouse.move(*point)
+        time.sleep(0.01)
+    if until == 1.0:
+        page.mouse.up()
+
+
+def handle(page, part):
+    """Where start or goal is on the screen."""
+    box = page.locator("#stage").bounding_box()
+    x, y = page.evaluate(f"kineme.stage.project(kineme.state.moving.{part})")
+    return np.array([box["x"] + x, box["y"] + y])
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
+    page = opened(width=width)
+    draw(page, until=0.6)
+    wait_until(page, "kineme.state.live?.ranked[0].name === 'GShape'")
+    assert page.locator("#bars li .name").first.inner_text() == "GShape"
+    assert 0.2 < page.evaluate("kineme.state.live.progress") < 1
+    page.mouse.up()
+    page.get_by_role("button", name="Clear").click()
+    draw(page)
+    assert page.evaluate("kineme.state.answer.ranked[0]") == "GShape"
+    before = page.evaluate("kineme.state.moving.positions")
+    page.mouse.move(*handle(page, "goal"))
+    page.mouse.down()
+    page.mouse.move(*(handle(page, "goal") + np.array([40, -30])), steps=3)
+    page.mouse.up()
+    after = page.evaluate("kineme.state.moving.positions")
+    assert np.abs(np.array(after[0]) - before[0]).max() < 1e-9
+    assert np.linalg.norm(np.array(after[-1]) - before[-1]) > 0.5 * np.linalg.norm(
+        np.array(page.evaluate("kineme.state.moving.goal")) - before[-1]
+    )
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_the_path_itself_is_dragged_through_a_point(opened):
+    page = opened()
+    page.get_by_role("button", name="Sine").click()
+    at = page.evaluate("kineme.stage.project(kineme.state.moving.positions[100])")
+    box = page.locator("#stage").bounding_box()
+    page.mouse.move(box["x"] + at[0], box["y"] + at[1])
+    page.mouse.down()
+    page.mouse.move(box["x"] + at[0] + 5, box["y"] + at[1] - 80, steps=3)
+    page.mouse.up()
+    ((time_, point),) = page.evaluate("kineme.state.moving.via")
+    positions = np.array(page.evaluate("kineme.state.moving.positions"))
+    path = np.array([np.interp(time_, np.linspace(0, 1, len(positions)), column) for column in positions.T])
+    assert np.linalg.norm(path - point) < 0.01 * np.ptp(positions, axis=0).max()
+
+
+def test_keys_do_what_the_mouse_does(opened):
+    page = opened(reduced_motion="reduce")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "stage"
+    page.get_by_role("button", name="WShape").press("Enter")
+    assert page.locator("#verdict").inner_text() == "WShape"
+    goal, start = handle(page, "goal"), handle(page, "start")
+    page.locator("#stage").press("ArrowRight")
+    page.locator("#stage").press("Shift+ArrowUp")
+    assert handle(page, "goal")[0] > goal[0] + 5
+    assert handle(page, "start")[1] < start[1] - 5
+    page.locator("#stage").press("Space")
+    wait_until(page, "kineme.state.played === kineme.state.moving.positions.length - 1")
+    page.locator("#stage").press("Escape")
+    assert page.evaluate("kineme.state.moving") is None
+
+
+def test_a_scribble_is_unknown_and_a_dot_is_asked_again(opened):
+    page = opened()
+    box = page.locator("#stage").bounding_box()
+    rng = np.random.default_rng(0)
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    for point in rng.uniform(100, 500, (25, 2)):
+        page.mouse.move(box["x"] + point[0], box["y"] + point[1], steps=3)
+    page.mouse.up()
+    assert page.locator("#verdict").inner_text() == "Unknown"
+    page.mouse.click(box["x"] + 30, box["y"] + 30)
+    assert "too short" in page.locator("#reason").inner_text()
+
+
+def test_names_are_text_and_what_is_saved_is_what_is_shown(opened):
+    page = opened()
+    assert page.locator("#symbols img").count() == 0
+    page.get_by_role("button", name=HOSTILE).click()
+    assert page.locator("#verdict").inner_text() == HOSTILE
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save CSV").click()
+    rows = np.loadtxt(download.value.path(), delimiter=",", skiprows=1)
+    np.testing.assert_allclose(rows[:, 1:], page.evaluate("kineme.state.moving.positions"), rtol=1e-8, atol=1e-9)
+
+
+def plane_of(positions):
+    """The direction in which a path in space does not reach, and how far it does."""
+    away = np.array(positions) - np.mean(positions, axis=0)
+    reach, axes = np.linalg.svd(away, full_matrices=False)[1:]
+    assert reach[2] < 1e-6 * reach[1]
+    return axes[2]
+
+
+def test_movements_in_space_are_turned_and_drawn_in_the_plane_of_the_view(opened):
+    page = opened("space")
+    draw(page, "CShape")
+    assert page.evaluate("kineme.state.answer.ranked[0]") == "CShape"
+    first = plane_of(page.evaluate("kineme.state.moving.positions"))
+    view = np.reshape(page.evaluate("kineme.runtime.header.view"), (3, 3))
+    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(view) == pytest.approx(1)
+    assert abs(first @ view[2]) == pytest.approx(1)
+    page.locator("#turn").fill("60")
+    page.get_by_role("button", name="Clear").click()
+    draw(page, "CShape")
+    second = plane_of(page.evaluate("kineme.state.moving.positions"))
+    assert abs(first @ second) == pytest.approx(0.5, abs=1e-6)
+    assert page.evaluate("kineme.state.answer.ranked[0]") == "CShape"

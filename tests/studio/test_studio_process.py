@@ -1,0 +1,205 @@
+"""The command: started, killed, started again, beside other browsers and commands."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+
+import httpx
+import pytest
+from studio_samples import BEARER, ROOT, TOKEN, Running, asked, drawing, make_library, running, samples
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from kineme import ActionLibrary, Trajectory
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    with running(make_library(tmp_path_factory.mktemp("shared") / "actions")) as one:
+        yield one
+
+
+def _live(studio, **headers):
+    return connect(f"{studio.address.replace('http', 'ws')}/api/live", additional_headers=BEARER | headers)
+
+
+def _get(studio, path="/api/library"):
+    return httpx.get(studio.address + path, headers=BEARER).json()
+
+
+def _kineme(*words):
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    command = [sys.executable, "-m", "kineme", *map(str, words)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_it_says_where_it_is_and_how_to_stop_it_and_ends_at_once_without_a_traceback(folder):
+    one = Running(folder)
+    assert (one.address.startswith("http://127.0.0.1:"), one.token) == (True, TOKEN)
+    with _live(one) as client:
+        client.send(json.dumps({"watch": True}))
+        start = time.perf_counter()
+        code, out, err = one.end()
+    assert time.perf_counter() - start < 5
+    assert "stop it with Ctrl-C" in out
+    assert (code, err) in {(0, ""), (1, "")}
+
+
+def test_only_the_loopback_listens(studio):
+    port = int(studio.address.rpartition(":")[2])
+    own = {found[4][0] for found in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    for address in own - {"127.0.0.1"}:
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection((address, port), 0.5)
+
+
+def test_a_real_websocket_is_guarded(studio):
+    with pytest.raises(InvalidStatus) as refused:
+        _live(studio, Origin="http://evil.example")
+    assert refused.value.response.status_code == 403
+    with pytest.raises(InvalidStatus):
+        _live(studio, Authorization="Bearer x")
+    with _live(studio) as client:
+        client.send(json.dumps({"samples": samples(2)}))
+        assert json.loads(client.recv())["state"]["ranked"][0]["name"] == "kind 2"
+
+
+def test_messages_of_many_megabytes_end_their_websocket_alone(studio):
+    with _live(studio) as client:
+        with suppress(ConnectionClosed):
+            client.send("[" + "0," * 2_000_000 + "0]")
+        with pytest.raises(ConnectionClosed):
+            client.recv()
+    assert _get(studio)["n_movements"] >= 12
+
+
+def test_raw_nonsense_is_survived(studio):
+    port = int(studio.address.rpartition(":")[2])
+    for data in (b"\x16\x03\x01\x02", b"GET\r\n\r\n", b"POST / HTTP/1.1\r\nContent-Length: -5\r\n\r\n", b"A" * 200_000):
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            client.sendall(data)
+            client.settimeout(2)
+            with suppress(OSError):
+                client.recv(1000)
+    assert _get(studio)["n_movements"] >= 12
+
+
+def test_killed_at_any_time_nothing_that_was_answered_is_lost(folder):
+    kept = []
+    for round_ in range(3):
+        with running(folder) as one:
+            stop = threading.Timer(0.4 + 0.3 * round_, one.process.kill)
+            stop.start()
+            with suppress(httpx.HTTPError, json.JSONDecodeError):
+                for k in range(1000):
+                    body = asked(100 + 1000 * round_ + k, label=f"new {round_} {k}")
+                    answer = httpx.post(f"{one.address}/api/library/movements", json=body, headers=BEARER)
+                    kept.append((answer.json()["ids"][0], body["label"]))
+            stop.join()
+    assert len(kept) > 3
+    with ActionLibrary(folder) as library:
+        assert library.verify() == []
+        for key, name in kept:
+            assert key in library[name].members
+
+
+def test_two_browsers_the_command_line_and_python_write_side_by_side(folder):
+    names = []
+
+    def write(studio, who):
+        with httpx.Client(headers=BEARER) as client:
+            for k in range(15):
+                body = asked(1000 * who + k, label=f"{who} {k}")
+                answer = client.post(f"{studio.address}/api/library/movements", json=body)
+                assert answer.status_code == 200, answer.text
+                names.append(body["label"])
+
+    with running(folder) as studio, ActionLibrary(folder) as library:
+        writers = [threading.Thread(target=write, args=(studio, who)) for who in (1, 2, 3)]
+        for one in writers:
+            one.start()
+        for k in range(5):
+            library.learn([Trajectory(*drawing(9000 + k))], [f"python {k}"])
+        renamed = _kineme("library", "rename", "kind 0", "renamed", "-l", folder)
+        assert renamed.returncode == 0, renamed.stderr
+        for one in writers:
+            one.join()
+        shown = {one["name"] for one in _get(studio)["symbols"]}
+        assert shown == {"renamed", "kind 1", "kind 2", "kind 3", *names, *(f"python {k}" for k in range(5))}
+        assert len(names) == 45
+
+
+def test_a_change_by_the_command_line_is_pushed(folder):
+    with running(folder) as studio, _live(studio) as client:
+        client.send(json.dumps({"watch": True}))
+        assert _kineme("library", "rename", "kind 1", "elsewhere", "-l", folder).returncode == 0
+        assert json.loads(client.recv(timeout=10)) == {"changed": 2}
+
+
+def test_fifty_clients_draw_at_once(studio):
+    answers = {}
+
+    def draw(who):
+        rows = samples(who % 4, seed=who)
+        with _live(studio) as client:
+            for start in range(0, 60, 6):
+                client.send(json.dumps({"samples": rows[start : start + 6]}))
+                while "state" not in (message := json.loads(client.recv(timeout=60))):
+                    assert "changed" in message, message
+            client.send(json.dumps({"finish": True}))
+            answers[who] = json.loads(client.recv(timeout=60))["answer"]["ranked"][0]["name"]
+
+    threads = [threading.Thread(target=draw, args=(who,)) for who in range(50)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert answers == {who: f"kind {who % 4}" for who in range(50)}
+
+
+def test_for_reading_only_it_says_so_and_writes_nothing(folder):
+    with running(folder, "--read-only") as studio:
+        assert "for reading only" in studio.line
+        assert httpx.post(f"{studio.address}/api/library/undo", headers=BEARER).status_code == 403
+
+
+REFUSED = [
+    (["--read-only", "-l", "none"], 1, "expected a library in none"),
+    (["-l", "x", "--port", "0"], 2, "0 is not in the range"),
+    (["-l", "x", "--host", "nowhere.invalid"], 1, "correct --host and --port"),
+]
+
+
+@pytest.mark.parametrize(("options", "code", "words"), REFUSED, ids=str)
+def test_what_cannot_be_served_is_refused_in_one_line(tmp_path, monkeypatch, options, code, words):
+    monkeypatch.chdir(tmp_path)
+    done = _kineme("studio", "--no-open", *options)
+    assert done.returncode == code
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_port_that_is_taken_is_refused(folder):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        done = _kineme("studio", "--no-open", "-l", folder, "--port", taken.getsockname()[1])
+    assert (done.returncode, "choose another --port" in done.stderr) == (1, True)
+
+
+def test_a_token_that_is_too_short_is_refused(folder, monkeypatch):
+    monkeypatch.setenv("KINEME_STUDIO_TOKEN", "short")
+    done = _kineme("studio", "--no-open", "-l", folder)
+    assert (done.returncode, "at least 16 letters" in done.stderr) == (1, True)
+
+
+def test_on_a_network_it_says_what_that_means(folder):
+    one = Running(folder, "--host", "0.0.0.0")
+    _, _, err = one.end(signal.SIGTERM)
+    assert "give it to those you trust" in err
