@@ -116,6 +116,7 @@ class Move {
 
   /** A point or the duration is another one. */
   changed() {
+    this.keepInSight();
     this.handles.place();
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
     for (const name of this.on) this.rollouts.get(name).follow(this.plan);
