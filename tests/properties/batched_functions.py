@@ -413,6 +413,8 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
         primitives = dmp.learn(demos)
         start = demos.positions[demos.offsets[:-1]]
         rollout = primitives.rollout(2.0, phase=primitives.phases, start=primitives.baselines)
+        points = primitives.baselines + 0.5 * primitives.amplitudes[:, None]
+        through = primitives.rollout(2.0, via=[(1.0, points)])
         return each(
             len(demos),
             scaled_weights=by_extent(demos, primitives.scaled_weights) / dmp.K,
@@ -428,6 +430,8 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
             accelerations=by_extent(demos, rollout.accelerations) * primitives.periods[:, None, None] ** 2,
             times=rollout.times / demos.durations[:, None],
             stamps=[one.times / demos[i].duration for i, one in enumerate(rollout.trajectories)],
+            through=by_extent(demos, through.positions - start[:, None]),
+            least=through.least_period(velocity=1.0) / extents(demos),
         )
 
     return Batched(f"RhythmicDMP.learn {dmp.fit}", call, 1e-6, draw=rhythms)

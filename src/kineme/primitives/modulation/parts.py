@@ -15,6 +15,8 @@ from kineme.primitives.discrete.rollout import Rollout
 _REMEDIES = {
     "AveragePrimitive": "; pass its primitive, or what it does: average.rollout(via=...)",
     "RhythmicPrimitives": "; a rhythm has no end: record or generate as much of it as is to be moved, and learn that",
+    "PosePrimitives": "; orientations are not added: join or blend positions, or learn what several rollouts make",
+    "PoseRollout": "; orientations are not added: join or blend positions, or learn what several rollouts make",
     "RhythmicRollout": "; a rhythm has no end: learn what was generated, kineme.DMP().learn(rollout)",
 }
 

@@ -57,7 +57,7 @@ def preflight(
     checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
     checks += between_samples(robot, trajectory)
     checks += [_jumps(robot, trajectory), _stands(robot, trajectory)]
-    checks += [_singularity(dense, state), _collision(dense, state)]
+    checks += [_singularity(dense, state), _collision(dense, state), *_below(robot, dense, state)]
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
     return Preflight(tuple(checks), tuple(_unchecked(robot)))
@@ -149,6 +149,15 @@ def _singularity(trajectory: JointTrajectory, state: Along) -> Check:
     t = int(np.argmin(state.smallest_singular_values))
     worst = float(state.smallest_singular_values[t])
     return Check("singularity", "tip", _at(trajectory, t), worst, math.nan, f"(singular below {_SINGULAR:g})", True)
+
+
+def _below(robot: Robot, trajectory: JointTrajectory, state: Along) -> list[Check]:
+    """How far a joint or the tip goes below the base, where a table may be; whether one is there, nobody says."""
+    t, j = np.unravel_index(int(np.argmin(state.heights)), state.heights.shape)
+    lowest = float(state.heights[t, j])
+    where = (*robot.joints, "tip")[j]
+    unit = "m (the base stands at 0)"
+    return [Check("lowest point", where, _at(trajectory, int(t)), lowest, math.nan, unit, True)] if lowest < 0 else []
 
 
 def _collision(trajectory: JointTrajectory, state: Along) -> Check:
