@@ -174,7 +174,15 @@ def test_recordings_of_others_are_not_there(client):
 
 def test_a_recording_that_is_too_large_is_refused(client, monkeypatch):
     monkeypatch.setattr(bodies, "FILE_BYTES", 1000)
+
+    def parts():
+        for _ in range(10):
+            yield b"1,2\n" * 100
+
     assert _send(client, b"1,2\n" * 1000).status_code == 413
+    assert _send(client, parts()).status_code == 413
+    folder = Path(client.app.state.studio.uploads._folder.name)
+    assert not [one for one in folder.rglob("*") if one.is_file()]
 
 
 def test_recordings_are_read_but_not_learned_for_reading_only(folder, open_studio):

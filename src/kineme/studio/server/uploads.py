@@ -50,9 +50,13 @@ class Uploads:
         key = secrets.token_hex(8)
         path = Path(self._folder.name) / key / plain_name(name)
         path.parent.mkdir()
-        with path.open("wb") as file:
-            async for chunk in chunks:
-                file.write(chunk)
+        try:
+            with path.open("wb") as file:
+                async for chunk in chunks:
+                    file.write(chunk)
+        except BaseException:  # refused as too large, or the client has gone
+            path.unlink()
+            raise
         with self._turn:
             self._kept[key] = Upload(path, {})
             old = list(self._kept)[:-_KEPT]
