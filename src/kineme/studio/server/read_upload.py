@@ -1,7 +1,7 @@
 """Read a file that somebody sent, in a process of its own with little memory, which can be ended.
 
 Run as ``python -m kineme.studio.server.read_upload FILE RESULT BYTES``, with the options of the reader as JSON on the
-standard input. The result is an archive of plain arrays and JSON; a refusal is one line on the standard error.
+standard input. The result is an archive of plain arrays and JSON, or the text of a refusal.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def main() -> None:
     try:
         save(read_recordings(path, **options), result)
     except (KinemeError, MemoryError) as error:
-        print(str(error) or "expected a file that fits into memory, got a larger one", file=sys.stderr)
+        result.write_text(str(error) or "expected a file that fits into memory, got a larger one", encoding="utf-8")
         sys.exit(REFUSED)
 
 

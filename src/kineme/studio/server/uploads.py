@@ -93,7 +93,7 @@ class Uploads:
                 command, input=json.dumps(options), capture_output=True, text=True, timeout=self.seconds, check=False
             )
             if done.returncode == REFUSED:
-                raise DataError(done.stderr.strip().replace(f"{path.parent}/", ""))
+                raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
             if done.returncode:
                 raise DataError(f"expected a recording, reading {path.name} ended with code {done.returncode}")
             return load(result)
