@@ -25,10 +25,9 @@ class LiveKinematics(InverseKinematics):
     """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
 
     A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
-    still brake at its end. The least squares of `InverseKinematics`, from the one Jacobian of the step, are solved within the velocities of
-    `Braking`.
-    Far from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of
-    reach comes to rest.
+    still brake at its end. The least squares of `InverseKinematics` are solved within the velocities of `Braking`. Far
+    from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of reach
+    comes to rest.
 
     Parameters
     ----------
