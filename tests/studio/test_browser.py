@@ -391,7 +391,7 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
 def test_the_server_may_be_killed_and_comes_back(opened, studio, tmp_path):
     folder = make_letters(tmp_path / "letters", shown=2)
     running = studio(folder)
-    gone = ("ERR_CONNECTION_REFUSED", "WebSocket connection")
+    gone = ("net::ERR_CONNECTION", "WebSocket connection")
     page = opened(running, tolerated=gone)
     port = running.address.rpartition(":")[2]
     running.end(signal.SIGKILL)

@@ -55,13 +55,19 @@ async function move(event) {
   if (answer.scene) showArm(answer.scene);
 }
 
+/** A server without the routes of arms says so in words. @param {any} error */
+function without(error) {
+  if (error.status !== 404) throw error;
+  return { available: false, why: "This studio moves no arms. The command kineme move does: a movement of the library on an arm, checked before anything moves.", robots: [] };
+}
+
 async function shown() {
   if (currentView() !== "robot") return;
   const { symbols } = library();
   const id = toMove(symbols);
   fill(byId("robot-what"), ...symbols.filter((/** @type {any} */ one) => one.path).map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
   if (byId("robot-arm").children.length) return;
-  const robots = await tried(() => get("/api/robots"));
+  const robots = await tried(() => get("/api/robots").catch(without));
   if (!robots) return;
   byId("robot-empty").hidden = robots.available;
   byId("robot-main").hidden = !robots.available;
