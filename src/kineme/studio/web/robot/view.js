@@ -6,13 +6,13 @@ import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chooseToMove, toMove } from "../move/chosen.js";
 
-/** @param {any} scene Show the arm in a frame of its own: each movement gets a new one. */
-function showArm(scene) {
+/** @param {any} scene @param {any} joints Show the arm in a frame of its own: each movement gets a new one. */
+function showArm(scene, joints) {
   const frame = make("iframe", { src: "/arm.html", title: "The arm moves", class: "arm-frame" });
   const ready = (/** @type {MessageEvent} */ event) => {
     if (event.source !== frame.contentWindow || event.data !== "ready") return;
     window.removeEventListener("message", ready);
-    frame.contentWindow.postMessage({ scene }, location.origin);
+    frame.contentWindow.postMessage({ scene, joints }, location.origin);
   };
   window.addEventListener("message", ready);
   fill(byId("arm"), frame);
@@ -52,7 +52,7 @@ async function move(event) {
   if (!answer) byId("robot-verdict").textContent = "";
   if (!answer) return;
   showPreflight(answer);
-  if (answer.scene) showArm(answer.scene);
+  if (answer.scene) showArm(answer.scene, answer.joints);
 }
 
 /** A server without the routes of arms says so in words. @param {any} error */
