@@ -474,3 +474,18 @@ def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters)
     asked = answered.value.request.post_data_json
     assert asked["what"]["style"]["values"][0] != 0
     assert answered.value.ok
+
+
+def test_an_arm_executes_a_letter(opened, served_letters):
+    pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+    if "robot" not in views_of(served_letters):
+        pytest.skip("this server moves no arms")
+    page = opened(served_letters, "robot")
+    wait_until(page, "!document.getElementById('robot-main').hidden || !document.getElementById('robot-empty').hidden")
+    page.click("#robot-go")
+    wait_until(page, "document.getElementById('robot-verdict').dataset.state !== ''", seconds=60)
+    assert page.locator("#robot-checks tr").count() > 5
+    frame = page.frame_locator(".arm-frame")
+    frame.locator(".chart").first.wait_for()
+    frame.locator("#play").click()
+    assert frame.locator(".chart .limit").count() > 0
