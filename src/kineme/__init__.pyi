@@ -34,7 +34,7 @@ from kineme import styles as styles
 from kineme.primitives.discrete.choose import BasisSelection as BasisSelection
 from kineme.primitives.modulation.couple import couple as couple
 from kineme.primitives.modulation.join import join as join
-from kineme.primitives.modulation.join import blend as blend
+from kineme.primitives.modulation.blend import blend as blend
 from kineme.primitives.contextual.contextual import Contextual as Contextual
 from kineme.primitives.improvement.improve import improve as improve
 from kineme.primitives.improvement.improve import Improvement as Improvement

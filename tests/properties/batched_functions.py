@@ -63,6 +63,7 @@ from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.fits import FITS
 from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.primitives.modulation.laid_out import laid_out, laid_out_poses
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.early import cut
 
@@ -413,6 +414,8 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
         primitives = dmp.learn(demos)
         start = demos.positions[demos.offsets[:-1]]
         rollout = primitives.rollout(2.0, phase=primitives.phases, start=primitives.baselines)
+        points = primitives.baselines + 0.5 * primitives.amplitudes[:, None]
+        through = primitives.rollout(2.0, via=[(1.0, points)])
         return each(
             len(demos),
             scaled_weights=by_extent(demos, primitives.scaled_weights) / dmp.K,
@@ -428,6 +431,8 @@ def rhythm_row(dmp: RhythmicDMP) -> Batched:
             accelerations=by_extent(demos, rollout.accelerations) * primitives.periods[:, None, None] ** 2,
             times=rollout.times / demos.durations[:, None],
             stamps=[one.times / demos[i].duration for i, one in enumerate(rollout.trajectories)],
+            through=by_extent(demos, through.positions - start[:, None]),
+            least=through.least_period(velocity=1.0) / extents(demos),
         )
 
     return Batched(f"RhythmicDMP.learn {dmp.fit}", call, 1e-6, draw=rhythms)
@@ -488,6 +493,39 @@ def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
         accelerations=np.concatenate((accelerations[:, :, :3] / unit, accelerations[:, :, 3:]), axis=2),
         times=rollout.times / demos.durations[:, None],
         stamps=[one.times / demos[i].duration for i, one in enumerate(rollout.trajectories)],
+    )
+
+
+def parts_in_a_row(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Each after itself."""
+    primitives = DMP(n_basis=20).learn(demos)
+    start, tau = demos.positions[demos.offsets[:-1]], demos.durations[:, None]
+    return each(
+        len(demos),
+        **{
+            f"{name} {i}": value
+            for i, part in enumerate(laid_out([primitives, primitives], shift=True))
+            for name, value in (
+                ("path", by_extent(demos, part.positions - start[:, None])),
+                ("begin", by_extent(demos, part.begin_velocities) * tau),
+                ("end", by_extent(demos, part.end_velocities) * tau),
+            )
+        },
+    )
+
+
+def poses_in_a_row(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Each alone: what comes after it may turn past a full turn. Orientations are apart from positions."""
+    primitives = PoseDMP(DMP(n_basis=20)).learn(demos)
+    laid, references = laid_out_poses([primitives], shift=False)
+    start, unit = demos.positions[demos.offsets[:-1], None, :3], pose_extents(demos)[:, None, None]
+    return each(
+        len(demos),
+        references=references * np.sign(references[:, :1]),
+        **{f"path {i}": (part.positions[:, :, :3] - start) / unit for i, part in enumerate(laid)},
+        **{f"vectors {i}": part.positions[:, :, 3:] for i, part in enumerate(laid)},
+        turning=laid[0].begin_velocities[:, 3:] * demos.durations[:, None],
+        turned=laid[0].end_velocities[:, 3:] * demos.durations[:, None],
     )
 
 
@@ -595,6 +633,8 @@ TABLE = [
     Batched("Primitives.rollout via", modulated, 1e-8),
     Batched("Primitives.rollout via stretch", along_stretches, 1e-8),
     Batched("couple", coupled, 1e-8),
+    Batched("laid_out", parts_in_a_row, 1e-8, alone=6),
+    Batched("laid_out_poses", poses_in_a_row, 1e-6, draw=poses, alone=6),
     Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),

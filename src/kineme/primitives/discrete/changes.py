@@ -40,30 +40,31 @@ def changes(factor: Array, observed: Array, errors: Array, slack: Array) -> Arra
     return found
 
 
-def loose_changes(dmp: Specification, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
+def loose_changes(looks: Array, factor: Array, observed: Array, errors: Array, stretch: Array) -> Array:
     """The same (m, p), of the weights of one or more dimensions of one movement.
 
-    The rows of a stretch, those where `stretch` (k,) is 1 and not 0, are met so closely that the path does not swing.
+    The rows of a stretch, those where `stretch` (k,) is 1 and not 0, are met so closely that the path does not swing,
+    which `looks` (N, T) shows: from the weights of a dimension to its path.
     """
     found = changes(factor, observed, errors, SLACK * stretch)
     if not stretch.any():
         return found
     missing = np.where(np.isnan(errors), 0.0, errors)
-    rows = np.flatnonzero(_swing(dmp, found) > _SWING * np.abs(missing).max(axis=1))
+    rows = np.flatnonzero(_swing(looks, found) > _SWING * np.abs(missing).max(axis=1))
     if len(rows):
         tried = np.stack([found[rows], *(changes(factor, observed, errors[rows], k * stretch) for k in _SLACKS)])
         left = np.where(np.isnan(errors[rows]), 0.0, missing[rows] - tried @ observed.T)[:, :, stretch > 0.0]
-        cost = np.abs(left).max(axis=2) + _PRICE * np.stack([_swing(dmp, one) for one in tried])
+        cost = np.abs(left).max(axis=2) + _PRICE * np.stack([_swing(looks, one) for one in tried])
         found[rows] = tried[cost.argmin(axis=0), np.arange(len(rows))]
     return found
 
 
-def _swing(dmp: Specification, changed: Array) -> Array:
+def _swing(looks: Array, changed: Array) -> Array:
     """The largest change of a coordinate, anywhere along the paths (m,)."""
-    paths = changed.reshape(-1, dmp.n_basis) @ looks(dmp)
+    paths = changed.reshape(-1, len(looks)) @ looks
     return np.asarray(np.abs(paths).max(axis=1).reshape(len(changed), -1).max(axis=1))
 
 
-def looks(dmp: Specification) -> Array:
+def looks_of(dmp: Specification) -> Array:
     """From weights to the path at as many times as show how far a change leads (N, T)."""
     return decoder(dmp, _PER_BASIS * dmp.n_basis).Phi[0].T

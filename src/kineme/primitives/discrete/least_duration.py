@@ -6,16 +6,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
-from kineme.primitives.discrete.rollout import Rollout
 from kineme.validation import Array, as_numbers
 
 
 def least_durations(
-    movement: Rollout, motion: tuple[Array, Array], limits: tuple[ArrayLike | None, ArrayLike | None]
+    durations: Array,
+    fixed_velocity: bool,
+    motion: tuple[Array, Array],
+    limits: tuple[ArrayLike | None, ArrayLike | None],
 ) -> Array:
-    """Least durations (n,) for velocities and accelerations (n, T, d) of a movement; see `Rollout.least_duration`."""
-    durations = movement.durations
-    if movement.fixed_velocity:
+    """Least durations (n,) for velocities and accelerations (n, T, d); see `Rollout.least_duration`."""
+    if fixed_velocity:
         raise SpecificationError(
             "expected a movement whose velocities scale with its tempo, got one with velocity=, end_velocity= or "
             "goal_velocity= other than 0: its path depends on the duration; try durations, and look at velocities "

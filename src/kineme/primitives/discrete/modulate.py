@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.condition import condition
-from kineme.primitives.discrete.changes import SLACK, changes, loose_changes
-from kineme.primitives.discrete.extrapolation import Measured, warn_changed, warn_far
+from kineme.primitives.discrete.changes import SLACK, changes, looks_of, loose_changes
+from kineme.primitives.discrete.extrapolation import MEASURED, Changed, Measured, extents_of, warn_changed, warn_far
 from kineme.primitives.discrete.operators import decoder, decoder_at, smoothness_factor
 from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
 from kineme.primitives.discrete.position_limits import within_limits
@@ -44,7 +44,7 @@ def modulated(
     end_velocity: ArrayLike | None,
     position_limits: tuple[ArrayLike, ArrayLike] | None = None,
     factor: Array | None = None,
-    measured: Sequence[Measured] = (Measured(),),
+    measured: Sequence[Measured] = (MEASURED,),
 ) -> Rollout:
     """The movement through the via points, with the end velocity and within the limits.
 
@@ -69,14 +69,15 @@ def modulated(
     observed = _observed(movement.primitives.dmp, tuple(asked.times.tolist()))
     errors = _errors(movement, asked, velocity, observed)
     for one in measured:
-        warn_far(movement, asked, errors, one)
+        warn_far(extents_of(movement, one), asked, errors, one)
     if factor is None or not factor.any():
         change = _smooth_change(movement, asked, observed, errors)
     else:
         change = _shown_change(movement, asked, observed, errors, factor)
     left = errors - change.coefficients @ (change.directions @ observed.weights.T) if asked.stretch.any() else None
+    looks = looks_of(movement.primitives.dmp)
     for one in measured:
-        warn_changed(movement, asked, change, errors, left, one)
+        warn_changed(extents_of(movement, one), asked, errors, Changed(change, left, looks), one)
     fixed = movement.fixed_velocity or (velocity is not None and bool(velocity.any()))
     movement = replace(movement, change=change, fixed_velocity=fixed)
     return (
@@ -137,7 +138,7 @@ def _smooth_change(movement: Rollout, asked: ViaPoints, observed: _Observed, err
     dmp = movement.primitives.dmp
     rows = errors.reshape(-1, errors.shape[2])
     if asked.stretch.any():
-        dense = loose_changes(dmp, smoothness_factor(dmp), observed.weights, rows, _stretch(asked))
+        dense = loose_changes(looks_of(dmp), smoothness_factor(dmp), observed.weights, rows, _stretch(asked))
         return Change(dense.reshape(*errors.shape[:2], -1), np.eye(dmp.n_basis))
     gain = _smooth_gain(dmp, tuple(asked.times.tolist()))
     if not np.isfinite(np.sum(rows)):  # free places follow from the others
@@ -152,7 +153,7 @@ def _shown_change(movement: Rollout, asked: ViaPoints, observed: _Observed, erro
     scale = np.where(movement.ratio == 0.0, 1.0, movement.ratio)[:, :, None]  # the deviations scale like the weights
     rows = (errors / scale).reshape(n, -1)
     every_dim = np.asarray(np.kron(np.eye(d), observed.weights), dtype=np.float64)
-    change = loose_changes(dmp, mixed_factor(dmp, factor), every_dim, rows, np.tile(_stretch(asked), d))
+    change = loose_changes(looks_of(dmp), mixed_factor(dmp, factor), every_dim, rows, np.tile(_stretch(asked), d))
     return Change(change.reshape(n, d, -1) * scale, np.eye(dmp.n_basis))
 
 

@@ -115,7 +115,8 @@ class Rollout(BaseRollout):
         """
         from kineme.primitives.discrete.least_duration import least_durations
 
-        return least_durations(self, (self.velocities, self.accelerations), (velocity, acceleration))
+        motion = (self.velocities, self.accelerations)
+        return least_durations(self.durations, self.fixed_velocity, motion, (velocity, acceleration))
 
     @property
     def _shares(self) -> Array:

@@ -19,6 +19,10 @@ Learned = Callable[[Array, Array], Array]
 _SAME_TIME = 1e-9  # durations
 _SAME_PLACE = 1e-9  # of the larger number
 _FORM = "via=[(time, point), ...] or [((begin, end), points), ...] with times between 0 and 1, shares of the duration"
+_BOUNDS = (
+    "a time, or a begin and a later end, above 0 and below 1 as shares of the duration, got {}; start, goal and "
+    "end_velocity say where the movement begins and ends"
+)
 
 
 class ViaPoints(NamedTuple):
@@ -29,7 +33,20 @@ class ViaPoints(NamedTuple):
     stretch: NDArray[np.bool_]  # (k,): whether it belongs to a stretch, which is met in the least squares
 
 
-def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None) -> ViaPoints:
+class Span(NamedTuple):
+    """What the times of via points are."""
+
+    end: float  # below which they lie
+    closed: bool  # whether 0 is one of them
+    form: str
+    where: str  # how the message names one
+    bounds: str
+
+
+SHARES = Span(1.0, False, _FORM, "{:g} of the duration", _BOUNDS)
+
+
+def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None, span: Span = SHARES) -> ViaPoints:
     """Check what a user wrote; see `Primitives.rollout`.
 
     Parameters
@@ -40,6 +57,8 @@ def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None) -> Via
     learned : callable, optional
         ``learned(times, points)`` gives points (n, k, n_dims) at times (k,) in the coordinates that are learned, if
         these are others.
+    span : Span, default SHARES
+        What the times are; those of the result are shares of it.
 
     Raises
     ------
@@ -49,10 +68,10 @@ def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None) -> Via
         Points of the wrong shape, infinite, or without any number; batches of different lengths.
     """
     if isinstance(via, (str, bytes)) or not isinstance(via, (Sequence, np.ndarray)):
-        raise SpecificationError(f"expected {_FORM}, got {via!r}")
+        raise SpecificationError(f"expected {span.form}, got {via!r}")
     if len(via) == 2 and _is_time(via[0]):
-        raise SpecificationError(f"expected {_FORM}, got one pair; put it in a list: via=[{via!r}]")
-    parts = [_part(i, pair, n_dims) for i, pair in enumerate(via)]
+        raise SpecificationError(f"expected {span.form}, got one pair; put it in a list: via=[{via!r}]")
+    parts = [_part(i, pair, n_dims, span) for i, pair in enumerate(via)]
     n = max((len(points) for _, points, _ in parts), default=1)
     for i, (_, points, _) in enumerate(parts):
         if len(points) not in (1, n):
@@ -66,19 +85,19 @@ def via_points(via: ViaLike, n_dims: int, learned: Learned | None = None) -> Via
     order = np.argsort(times, kind="stable")
     written = ViaPoints(times[order], points[:, order], stretch[order])
     points = written.points if learned is None else learned(written.times, written.points)
-    return _merged(written._replace(points=points), written.points)
+    return _merged(written._replace(points=points), written.points, span)
 
 
 def _is_time(value: Any) -> bool:
     return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
 
 
-def _part(i: int, pair: Any, n_dims: int) -> tuple[Array, Array, bool]:
+def _part(i: int, pair: Any, n_dims: int, span: Span) -> tuple[Array, Array, bool]:
     """Times (m,), points (1 or n, m, d), and whether it is a stretch."""
     try:
         when, where = pair
     except (TypeError, ValueError) as error:
-        raise SpecificationError(f"expected {_FORM}, got {pair!r} as via[{i}]") from error
+        raise SpecificationError(f"expected {span.form}, got {pair!r} as via[{i}]") from error
     points = as_numbers(where, f"via[{i}]")
     stretch = not _is_time(when)
     if stretch:
@@ -95,24 +114,22 @@ def _part(i: int, pair: Any, n_dims: int) -> tuple[Array, Array, bool]:
         raise TrajectoryError(
             f"via[{i}]: expected numbers up to {LARGEST:g}, NaN only for dimensions that are free, got {where!r}"
         )
-    return _times(i, when, points.shape[1]), points, stretch
+    return _times(i, when, points.shape[1], span), points, stretch
 
 
-def _times(i: int, when: Any, n_points: int) -> Array:
+def _times(i: int, when: Any, n_points: int, span: Span) -> Array:
     """Even times (m,) from the begin to the end of a stretch, or one."""
     try:
-        ends = np.array([when] if _is_time(when) else list(when), dtype=np.float64)
+        ends = np.array([when] if _is_time(when) else list(when), dtype=np.float64) / span.end
     except (TypeError, ValueError) as error:
-        raise SpecificationError(f"expected {_FORM}, got {when!r} as the time of via[{i}]") from error
-    if len(ends) != 1 + (not _is_time(when)) or not ((ends > 0) & (ends < 1)).all() or (np.diff(ends) <= 0).any():
-        raise SpecificationError(
-            f"via[{i}]: expected a time, or a begin and a later end, above 0 and below 1 as shares of the duration, "
-            f"got {when!r}; start, goal and end_velocity say where the movement begins and ends"
-        )
+        raise SpecificationError(f"expected {span.form}, got {when!r} as the time of via[{i}]") from error
+    inside = ((ends > 0) | (span.closed & (ends == 0))) & (ends < 1)
+    if len(ends) != 1 + (not _is_time(when)) or not inside.all() or (np.diff(ends) <= 0).any():
+        raise SpecificationError(f"via[{i}]: expected {span.bounds.format(repr(when))}")
     return np.linspace(ends[0], ends[-1], n_points)
 
 
-def _merged(via: ViaPoints, written: Array) -> ViaPoints:
+def _merged(via: ViaPoints, written: Array, span: Span) -> ViaPoints:
     """One point for each time; what contradicts itself is refused, as it was written."""
     same = np.diff(via.times) <= _SAME_TIME
     if not same.any():
@@ -124,7 +141,7 @@ def _merged(via: ViaPoints, written: Array) -> ViaPoints:
         if apart.any():
             k = int(np.argmax(apart.any(axis=1)))
             raise SpecificationError(
-                f"expected one place at {via.times[j]:g} of the duration, got two via points there: "
+                f"expected one place at {span.where.format(via.times[j] * span.end)}, got two via points there: "
                 f"{_shown(written, k, int(j))} and {_shown(written, k, int(j) + 1)}"
                 f"{f' for movement {k}' if len(points) > 1 else ''}"
             )

@@ -104,7 +104,8 @@ class PoseRollout(BaseRollout):
         SpecificationError
             As of `Rollout.least_duration`.
         """
-        return least_durations(self.tangent, (self.velocities, self.accelerations), (velocity, acceleration))
+        motion = (self.velocities, self.accelerations)
+        return least_durations(self.tangent.durations, self.tangent.fixed_velocity, motion, (velocity, acceleration))
 
     @property
     def axis_names(self) -> list[str]:

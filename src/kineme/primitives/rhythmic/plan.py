@@ -7,14 +7,18 @@ from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
 from kineme.primitives.control.plan import Plan
+from kineme.primitives.discrete.via_points import ViaLike
 from kineme.primitives.rhythmic.learned import RhythmicLearned
+from kineme.primitives.rhythmic.modulate import modulated
 from kineme.primitives.rhythmic.rollout import rollout
 from kineme.validation import Array
 
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
-def plan_of(primitive: RhythmicLearned, options: dict[str, ArrayLike | None]) -> tuple[Plan, float]:
+def plan_of(
+    primitive: RhythmicLearned, options: dict[str, ArrayLike | None], via: ViaLike | None = None
+) -> tuple[Plan, float]:
     """The plan of one limit cycle and its amplitude, with the options of `rollout` checked for one movement.
 
     A rhythm is a discrete movement whose shape repeats, without coupling, and whose goal is the baseline.
@@ -22,13 +26,15 @@ def plan_of(primitive: RhythmicLearned, options: dict[str, ArrayLike | None]) ->
     check_one(len(primitive))
     d, dmp = primitive.n_dims, primitive.dmp
     vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
-    movement = rollout(primitive, options | vectors, 1.0, None, n_samples=2)
+    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), via)
     check_one(len(movement))
     origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
-    gain, ones = float(movement.ratio[0]), np.ones(d)
+    gain, ones, weights = float(movement.ratio[0]), np.ones(d), primitive.scaled_weights[0]
+    if movement.change is not None:
+        weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
 
     def shape(u: Array) -> Array:
-        forcing = dmp.basis.design(2 * np.pi * u) @ primitive.scaled_weights[0].T
+        forcing = dmp.basis.design(2 * np.pi * u) @ weights.T
         return np.column_stack((forcing, np.zeros(len(u))))
 
     plan = Plan(

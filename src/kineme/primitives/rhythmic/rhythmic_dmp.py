@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Never
 
 from numpy.typing import ArrayLike
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.primitives.discrete.via_points import ViaLike
 from kineme.primitives.rhythmic.encode import encode
 from kineme.primitives.rhythmic.learned import RhythmicLearned
+from kineme.primitives.rhythmic.modulate import modulated
 from kineme.primitives.rhythmic.operators import forcing_matrix
+from kineme.primitives.rhythmic.refused import refuse_others
 from kineme.primitives.rhythmic.rollout import RhythmicRollout, rollout
 from kineme.primitives.rhythmic.specification import RhythmicSpecification
 from kineme.validation import Array, check_count, check_samples
@@ -164,8 +167,10 @@ class RhythmicPrimitives(RhythmicLearned):
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         phase: ArrayLike = 0.0,
+        via: ViaLike | None = None,
         rate: float | None = None,
         n_samples: int | None = None,
+        **others: Never,
     ) -> RhythmicRollout:
         """Generate movements on the limit cycle or towards it, for any number of periods; all in one product.
 
@@ -181,6 +186,10 @@ class RhythmicPrimitives(RhythmicLearned):
             State at the beginning, by default that of the limit cycle: no transient.
         phase : float or array_like of shape (n,), default 0.0
             Phase at the beginning [rad]; ``phase=primitives.phases`` starts where the recordings did.
+        via : sequence of (phase, point) or ((begin, end), points), optional
+            Where the limit cycle passes, at phases from 0 to below 2 pi [rad]: points (d,) for all movements or (n, d),
+            stretches of points (m, d) or (n, m, d) at even phases. NaN leaves a dimension free. Points are met exactly,
+            a stretch as well as the basis functions can; baseline and period stay.
         rate : float, optional
             Samples per second, at least.
         n_samples : int, optional
@@ -197,11 +206,19 @@ class RhythmicPrimitives(RhythmicLearned):
         TrajectoryError
             An option of the wrong shape; numbers of movements that do not match.
         SpecificationError
-            A period or n_periods of 0 or less, a rate too low to show a period.
+            A period or n_periods of 0 or less, a rate too low to show a period; a phase outside the cycle, two places
+            at one phase, more points than there are basis functions to meet them, an amplitude of 0 with via points;
+            what a rhythm does not have, as an end velocity or position limits.
+
+        Warns
+        -----
+        ExtrapolationWarning
+            A via point farther from the cycle than it is large; a stretch that is not met.
         """
+        refuse_others("rollout", others)
         options = {"period": period, "amplitude": amplitude, "phase": phase}
         options |= {"baseline": baseline, "start": start, "velocity": velocity}
-        return rollout(self, options, n_periods, rate, n_samples)
+        return modulated(rollout(self, options, n_periods, rate, n_samples), via)
 
     def controller(  # noqa: PLR0913 - an option per parameter
         self,
@@ -214,12 +231,14 @@ class RhythmicPrimitives(RhythmicLearned):
         goal: ArrayLike | None = None,
         start: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
+        via: ViaLike | None = None,
         feedback: str = "state",
         phase_stopping: float | None = None,
         goal_filter: float | None = None,
         velocity_limit: ArrayLike | None = None,
         acceleration_limit: ArrayLike | None = None,
         avoidance: ObstacleAvoidance | None = None,
+        **others: Never,
     ) -> RhythmicController:
         """One limit cycle under live control, in steps of `dt` [s].
 
@@ -227,8 +246,8 @@ class RhythmicPrimitives(RhythmicLearned):
         ----------
         dt : float
             Time of a step [s], at most 1000 periods.
-        phase, period, amplitude, baseline, start, velocity : optional
-            As in `rollout`, for one movement.
+        phase, period, amplitude, baseline, start, velocity, via : optional
+            As in `rollout`, for one movement. A new amplitude scales the cycle through the via points as a whole.
         goal : array_like of shape (d,), optional
             Another name of the baseline, as in the other controllers; pass one of the two.
         feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance : optional
@@ -243,16 +262,18 @@ class RhythmicPrimitives(RhythmicLearned):
         Raises
         ------
         SpecificationError
-            More than one primitive; both `baseline` and `goal`; an option out of its range.
+            More than one primitive; both `baseline` and `goal`; an option out of its range, or one that a rhythm does
+            not have.
         """
         from kineme.primitives.control.options import Options  # these load where a robot moves, not to learn
         from kineme.primitives.rhythmic.controller import RhythmicController
         from kineme.primitives.rhythmic.plan import plan_of
 
+        refuse_others("controller", others)
         if goal is not None and baseline is not None:
             raise SpecificationError("expected goal or baseline, which are the same, got both; pass one of them")
         baseline = goal if baseline is None else baseline
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance)
         changed: dict[str, ArrayLike | None] = {"period": period, "amplitude": amplitude, "phase": phase}
-        plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity})
+        plan, gain = plan_of(self, changed | {"baseline": baseline, "start": start, "velocity": velocity}, via)
         return RhythmicController(plan, dt, options, float(self.amplitudes[0]), gain)

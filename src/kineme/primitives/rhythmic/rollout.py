@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kineme.errors import SpecificationError
 from kineme.primitives.base_rollout import BaseRollout
 from kineme.primitives.batch import Batch
+from kineme.primitives.discrete.least_duration import least_durations
 from kineme.primitives.discrete.per_movement import broadcast_length, check_durations, per_movement
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.learned import RhythmicLearned
@@ -40,6 +41,7 @@ class RhythmicRollout(BaseRollout):
     velocity: Array | None  # (1 or n, d), per second
     n_periods: float
     n_samples: int
+    change: Array | None = None  # (n, d, N) of the weights in force: via points
 
     def __len__(self) -> int:
         return len(self.baselines)
@@ -67,6 +69,24 @@ class RhythmicRollout(BaseRollout):
         """Accelerations (n, T, d), per second squared."""
         return (self._derivative(2) / self.periods[:, None, None] ** 2).transpose(0, 2, 1)
 
+    def least_period(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
+        """The least period of each movement (n,) [s] in which the same path stays within limits; closed form.
+
+        ``rollout(period=...)`` moves so; see `Rollout.least_duration`.
+
+        Parameters
+        ----------
+        velocity, acceleration : float or array_like of shape (d,), optional
+            Largest absolute value, per second and per second squared: of all dimensions, or one each.
+
+        Raises
+        ------
+        SpecificationError
+            No limit, or one that is not above 0; a rollout that was given an initial velocity other than 0.
+        """
+        fixed = self.velocity is not None and bool(self.velocity.any())
+        return least_durations(self.periods, fixed, (self.velocities, self.accelerations), (velocity, acceleration))
+
     @property
     def _batch(self) -> Batch:
         return self.primitives
@@ -81,7 +101,16 @@ class RhythmicRollout(BaseRollout):
             **{name: getattr(self, name)[chosen] for name in ("ratio", "baselines", "periods", "phases")},
             start=of(self.start),
             velocity=of(self.velocity),
+            change=None if self.change is None else self.change[chosen],
         )
+
+    @property
+    def _weights(self) -> tuple[Array, Array]:
+        """The weights in force (1 or n, d, N), and what is to be multiplied by the cycle that they make (n,)."""
+        own = self.primitives.scaled_weights
+        if self.change is None:
+            return own, self.ratio
+        return own * self.ratio[:, None, None] + self.change, np.ones(len(self))
 
     @property
     def _u(self) -> Array:
@@ -90,11 +119,12 @@ class RhythmicRollout(BaseRollout):
     def _derivative(self, order: int) -> Array:
         """Position minus baseline and its derivatives in u = t / period, shape (n, d, T)."""
         u, dmp = self._u, self.primitives.dmp
-        result = cycle(self.primitives, self.ratio, self.phases, 2 * np.pi * u, order)
+        weights, ratio = self._weights
+        result = cycle(dmp, weights, ratio, (self.phases, 2 * np.pi * u), order)
         if self.start is None and self.velocity is None:
             return result
         at_start = np.zeros(1)
-        on_cycle = [cycle(self.primitives, self.ratio, self.phases, at_start, k)[:, :, 0] for k in (0, 1)]
+        on_cycle = [cycle(dmp, weights, ratio, (self.phases, at_start), k)[:, :, 0] for k in (0, 1)]
         offset = 0.0 if self.start is None else self.start - self.baselines - on_cycle[0]
         push = 0.0 if self.velocity is None else self.velocity * self.periods[:, None] - on_cycle[1]
         off_cycle = np.stack(np.broadcast_arrays(offset, push, on_cycle[0])[:2], axis=2)
@@ -103,13 +133,15 @@ class RhythmicRollout(BaseRollout):
         return np.asarray(result + off_cycle @ rows.T)
 
 
-def cycle(primitives: RhythmicLearned, ratio: Array, phases: Array, turn: Array, order: int) -> Array:
-    """The x - b, or a derivative in u, on the limit cycle `turn` (T,) radians past `phases`: (n, d, T)."""
-    response = limit_cycle(primitives.dmp)
+def cycle(dmp: RhythmicSpecification, weights: Array, ratio: Array, when: tuple[Array, Array], order: int) -> Array:
+    """The x - b, or a derivative in u, on the limit cycle of these weights (1 or n, d, N), times the ratio (n,).
+
+    `when` is the phases (n,) of the movements and how many radians past them (T,); the result has shape (n, d, T).
+    """
+    (phases, turn), response = when, limit_cycle(dmp)
     harmonics = np.arange(response.shape[1])
     response = response * (2j * np.pi * harmonics) ** order
     synthesis = waves(turn, len(harmonics) - 1).T
-    weights = primitives.scaled_weights
     if (phases == phases[0]).all():
         series = weights @ (as_real(response * np.exp(1j * phases[0] * harmonics)) @ synthesis)
     else:
