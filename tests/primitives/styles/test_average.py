@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, RhythmicDMP, TrajectoryError
+from kineme import DMP, TrajectoryError
 from kineme.styles import average, average_by_label, learn_styles
 
 any_seed = given(seed=st.integers(0, 10**6))
@@ -197,5 +197,3 @@ def test_movements_are_learned_by_the_default_specification(demonstrate):
     learned = DMP().learn(demonstrations)
     np.testing.assert_array_equal(average(demonstrations).factor, average(learned).factor)
     np.testing.assert_array_equal(learn_styles(demonstrations, 2).mean, learn_styles(learned, 2).mean)
-    with pytest.raises(TrajectoryError, match=r"expected kineme.Primitives, got RhythmicPrimitives"):
-        average(RhythmicDMP(aperiodic="accept").learn(demonstrations))

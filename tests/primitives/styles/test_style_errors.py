@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kineme import DMP, SpecificationError, TrajectoryError
+from kineme import DMP, RhythmicDMP, SpecificationError, TrajectoryError
 from kineme.styles import average, average_by_label, learn_styles
 
 
@@ -94,9 +94,7 @@ def test_a_new_demonstration_of_another_kind(model, learned, make_movement):
 
 
 @pytest.mark.parametrize("function", [average, average_by_label, learn_styles])
-def test_movements_must_be_learned_first(demonstrate, function):
-    message = (
-        r"expected kineme\.Primitives, got Demonstrations; learn movements first, kineme\.DMP\(\)\.learn\(movements\)"
-    )
-    with pytest.raises(TrajectoryError, match=message):
-        function(demonstrate(5, 30))
+def test_rhythms_are_no_demonstrations_of_one_movement(demonstrate, function):
+    rhythms = RhythmicDMP(aperiodic="accept").learn(demonstrate(5, 30))
+    with pytest.raises(TrajectoryError, match=r"expected kineme\.Primitives, got RhythmicPrimitives; learn movements"):
+        function(rhythms)
