@@ -8,6 +8,7 @@ import sys
 import warnings
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -217,8 +218,33 @@ def arm() -> Figure:
     return draw_robot_movement(robots.move(primitive.rollout(rate=100), robots.load("panda"), timing="slowed"))
 
 
+def simulated_panda() -> Figure:
+    """The simulation of docs/robots.md: the path of the tip, and how far it is off."""
+    names: dict[str, Any] = {}
+    with TemporaryDirectory() as place:
+        for _ in walk(Path(__file__).parent / "robots.md", Path(place), names):
+            pass
+    goals, wanted, tips = (names[name] for name in ("goals", "wanted", "tips"))
+    figure = new_figure(9.6, 3.6)
+    left, right = figure.subplots(1, 2)
+    left.plot(goals[:, 1], goals[:, 2], color=GRAY, linewidth=5, alpha=0.4, label="goal")
+    left.plot(tips[:, 1], tips[:, 2], color=BLUE, label="tip in MuJoCo")
+    left.plot(*tips[0, 1:], "o", color=BLUE, markersize=5)
+    left.plot(*goals[0, 1:], "*", color="black", markersize=9)
+    left.set(xlabel="y [m]", ylabel="z [m]", aspect="equal")
+    left.legend(fontsize="small", loc="lower right")
+    times = 1e-3 * np.arange(len(tips))
+    for reference, color, label in ((goals, GRAY, "from the goal"), (wanted, BLUE, "from the movement")):
+        right.semilogy(times, 1e3 * np.linalg.norm(tips - reference, axis=1), color=color, label=label)
+    right.axhline(10.0, color=ORANGE, linestyle="--", linewidth=1, label="1 cm")
+    right.set(xlabel="time [s]", ylabel="distance of the tip [mm]", ylim=(0.05, None))
+    right.legend(fontsize="small")
+    return figure
+
+
 FIGURES = {
     "robots": arm,
+    "simulated-panda": simulated_panda,
     "via-points": via_points,
     "around-obstacles": around_obstacles,
     "adapting": adapting,

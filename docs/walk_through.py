@@ -1,7 +1,8 @@
 """Walk through a page: run its Python blocks and its commands in order, in one folder, and keep what they answer.
 
 A block marked python is executed; all of a page share their names. In a block marked console, a line that begins with
-``$ `` is a command of kineme, and the lines below it are what it answers. No shell takes part.
+``$ `` is a command of kineme, and the lines below it are what it answers. No shell takes part. A Python block
+that begins with the import of a package in `OPTIONAL` is left out where that is not installed.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
+OPTIONAL = ("mujoco",)
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
 
@@ -30,10 +33,12 @@ class Step(NamedTuple):
     status: int
 
 
-def walk(page: Path, folder: Path) -> Iterator[Step]:
-    """Run a page in an empty folder, step by step."""
-    names: dict[str, Any] = {}
+def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Iterator[Step]:
+    """Run a page in an empty folder, step by step; `names` are what its Python defines."""
+    names = {} if names is None else names
     for kind, text in _BLOCK.findall(page.read_text(encoding="utf-8")):
+        if any(text.startswith(f"import {package}\n") and not find_spec(package) for package in OPTIONAL):
+            continue
         yield from [_run_python(text, page.name, folder, names)] if kind == "python" else _run_console(text, folder)
 
 

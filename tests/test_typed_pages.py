@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-_UNTYPED = "matplotlib.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
+_UNTYPED = "matplotlib.*,mujoco.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
 # The package itself is checked with its own settings, elsewhere.
 _CONFIGURATION = f"[mypy]\nstrict = True\n[mypy-{_UNTYPED}]\nignore_missing_imports = True\n"
 _CONFIGURATION += "[mypy-kineme.*]\nfollow_imports = silent\n"

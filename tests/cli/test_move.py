@@ -163,3 +163,18 @@ def test_what_takes_as_long_as_generated_is_not_said_to_take_once_as_long(wave):
     result = run("wave.csv", "--robot", "panda", "--duration", "3")
     assert result.exit_code == 0, result.output
     assert "as long as generated" not in result.output
+
+
+def test_the_last_line_says_what_was_written_or_that_nothing_was(wave):
+    words = ("wave.csv", "--robot", "panda", "--slow-down")
+    assert run(*words).output.splitlines()[-1].startswith("checked only, nothing written")
+    assert run(*words, "-o", "j.csv", "--view", "v.html").output.splitlines()[-1] == "wrote j.csv, v.html"
+    assert "wrote" not in run(*words, "-o", "-").output
+
+
+@pytest.mark.parametrize("path", ["none/j.csv", "there.csv"])
+def test_what_cannot_be_written_is_refused_before_anything_else_is(wave, path):
+    (wave / "there.csv").mkdir()
+    result = run("wave.csv", "--robot", "no such arm", "--view", "v.html", "-o", path, "--overwrite")
+    assert result.exit_code == 2
+    assert path in result.output

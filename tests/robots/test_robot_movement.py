@@ -158,3 +158,19 @@ def test_joints_that_come_to_a_stop_stay_within_their_limits_between_samples():
     positions = np.column_stack((0.2 + 0 * s, 0.3 * s - 0.15, 0.04 + 0.03 * np.sin(2 * np.pi * s)))
     made = move(np.column_stack((positions, turned)), robot, timing="slowed")  # more of a turn than five joints have
     assert made.preflight.passed
+
+
+def test_what_goes_below_the_base_is_said_with_how_far():
+    robot = load("panda")
+    u = np.linspace(0, 1, 60)[:, None]
+    s = 10 * u**3 - 15 * u**4 + 6 * u**5
+
+    def lowest(*end):
+        made = move(kineme.Trajectory(6 * u[:, 0], robot.rest + s * (end - robot.rest)), robot, space="joints")
+        return [check for check in made.preflight.checks if check.what == "lowest point"], made
+
+    assert not lowest(*robot.rest + 0.1)[0]
+    (check,), made = lowest(0, 1.7, 0, -0.8, 0, 2.0, 0.785)
+    assert check.passed
+    assert check.where == "tip"
+    assert check.worst == pytest.approx(along(robot, made.trajectory).tip_positions[:, 2].min(), abs=1e-3)

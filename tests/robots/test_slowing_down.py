@@ -93,3 +93,36 @@ def test_steps_hold_from_the_same_place_of_the_path_on_whatever_the_timing(timin
     for k, from_here in zip(at, (30, 71), strict=True):
         before, after = t.positions[k, 0], t.positions[k + 1, 0]
         assert before <= movement.positions[from_here, 0] <= after + 1e-9
+
+
+def waiting(robot):
+    """Out, one second at a stand, and on; its times, and its joints."""
+    u = np.linspace(0, 1, 50)
+    s = np.concatenate(((10 * u**3 - 15 * u**4 + 6 * u**5), np.ones(50), 1 + (10 * u**3 - 15 * u**4 + 6 * u**5)))
+    joints = np.tile(robot.rest, (150, 1))
+    joints[:, 0] += 0.5 * s
+    return kineme.Trajectory(times=0.02 * np.arange(150), positions=joints)
+
+
+@pytest.mark.parametrize(("closes", "opens"), [(65, 85), (60, 150)])
+def test_a_gripper_that_waits_for_a_stand_is_not_timed_without_one(closes, opens):
+    robot = load("ur5e")
+    grip = np.zeros(150)
+    grip[closes:opens] = 1.0
+    for timing in ("generated", "slowed"):
+        t = move(waiting(robot), robot, space="joints", steps={"grip": grip}, timing=timing).trajectory
+        changed = np.flatnonzero(np.diff(t.steps["grip"])) + 1
+        assert len(changed) == (2 if opens < 150 else 1)
+        assert np.abs(t.velocities[changed]).max() < 1e-3
+    with pytest.raises(InfeasibleError, match=r"steps of grip .* It works in 2.98 s instead of 0.9\d*: slow it down"):
+        move(waiting(robot), robot, space="joints", steps={"grip": grip}, timing="fastest")
+
+
+def test_a_pulse_of_a_gripper_that_few_samples_would_lose_is_said_with_a_rate_that_keeps_it():
+    robot = load("ur5e")
+    grip = np.zeros(150)
+    grip[70:71] = 1.0
+    with pytest.raises(InfeasibleError, match=r"steps of grip at 0.00 s: 0, limit 2 changes. Choose .* of 100 samples"):
+        move(waiting(robot), robot, space="joints", steps={"grip": grip}, rate=10.0)
+    made = move(waiting(robot), robot, space="joints", steps={"grip": grip}, rate=100.0)
+    assert made.trajectory.steps["grip"].sum() == 2

@@ -97,6 +97,9 @@ def test_the_command_writes_a_page_and_never_over_another(library, tmp_path):
     assert file.read_text() == "mine"
     assert CliRunner().invoke(main, [*command, "--force"]).exit_code == 0
     assert file.read_bytes() == before
+    done = CliRunner().invoke(main, [*command, "--force", "--json", "--most", "2"])
+    assert json.loads(done.stdout)["movements"] == 2
+    assert "2 of 3 movements" in file.read_text()
     assert [one.name for one in tmp_path.iterdir() if one.name != "actions"] == ["actions.html"]
 
 

@@ -154,19 +154,12 @@ def test_close_and_uneven_stamps_are_treated_as_in_python():
         assert compare_answers(kineme.Recognizer(cutoff=cutoff).fit(demos), close) <= SIMILAR
 
 
-@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
-@pytest.mark.parametrize("settings", [{}, {"max_angle": 0.0}, {"translation": False}], ids=str)
-def test_movements_under_way_are_recognized_as_in_python(space, settings):
-    demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
-    recognizer = kineme.Recognizer(**settings).fit(demos[one_in(2, demos)])
-    some = [
-        kineme.Trajectory(one.times[::10], one.positions[::10])
-        for one in demos[one_in(1, demos, 4)][:: 1 if not settings else 4]
-    ]
+def compare_states(recognizer, movements, runtime=RUNTIME):
+    """Worst difference while movements are under way, positions in their extent; infinite where a name differs."""
     ends = [3, 6, 12, 30, 50, 70, 90, 100]
-    asked = [question("follow", one, ends=ends) for one in some]
-    n_states = 0
-    for one, states in zip(some, ask(snapshot_of_recognizer(recognizer), asked), strict=True):
+    asked = [question("follow", one, ends=ends) for one in movements]
+    worst, n_states = 0.0, 0
+    for one, states in zip(movements, ask(snapshot_of_recognizer(recognizer), asked, runtime), strict=True):
         live, begin, size = recognizer.stream(), 0, np.ptp(one.positions, axis=0).max()
         for end, got in zip(ends, states, strict=True):
             said = live.update(one.times[begin:end], one.positions[begin:end])
@@ -176,24 +169,34 @@ def test_movements_under_way_are_recognized_as_in_python(space, settings):
                 continue
             n_states += 1
             shares = {guess.label: guess.confidence for guess in said.ranked}
-            assert got["decided"] == said.label
-            assert got["ranked"][0]["name"] == said.ranked[0].label
-            for guess in got["ranked"]:
-                assert guess["share"] == pytest.approx(shares[guess["name"]], abs=2e-5)
-            assert got["unknown"] == pytest.approx(said.unknown, abs=2e-5)
-            assert got["progress"] == pytest.approx(said.progress, abs=2e-5)
-            assert got["arrival"] == pytest.approx(said.arrival, abs=1e-4)
-            assert np.abs(np.array(got["path"]) - said.path).max() <= 1e-5 * size
-    assert n_states == 7 * len(some)
+            if (got["decided"], got["ranked"][0]["name"]) != (said.label, said.ranked[0].label):
+                return np.inf
+            numbers = [guess["share"] - shares[guess["name"]] for guess in got["ranked"]]
+            numbers += [got["unknown"] - said.unknown, got["progress"] - said.progress]
+            numbers += [(got["arrival"] - said.arrival) / said.arrival]
+            worst = max(worst, np.abs(numbers).max(), np.abs(np.array(got["path"]) - said.path).max() / size)
+    assert n_states == 7 * len(movements)
+    return worst
 
 
-@pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")  # via points far away are asked for, too
+def every_tenth(movements):
+    return [kineme.Trajectory(one.times[::10], one.positions[::10]) for one in movements]
+
+
 @pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
-@pytest.mark.parametrize("formulation", ["bio-inspired", "original", "amplitude-scaled", "decoupled"])
-def test_movements_to_new_goals_are_those_of_python(space, formulation):
-    """Stored primitives, and movements learned in the runtime; to new starts and goals, and through via points."""
+@pytest.mark.parametrize("settings", [{}, {"max_angle": 0.0}, {"translation": False}], ids=str)
+def test_movements_under_way_are_recognized_as_in_python(space, settings):
     demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
-    demos = demos[one_in(1, demos)]
+    recognizer = kineme.Recognizer(**settings).fit(demos[one_in(2, demos)])
+    some = demos[one_in(1, demos, 4)][:: 4 if settings else 1]
+    assert compare_states(recognizer, every_tenth(some)) <= 2 * SIMILAR
+
+
+def compare_rollouts(demos, formulation, runtime=RUNTIME):
+    """Worst distance, in extents, of stored primitives and of movements learned in the runtime.
+
+    To new starts and goals, and through via points.
+    """
     snapshot = snapshot_of_recognizer(kineme.Recognizer().fit(demos))
     primitives = kineme.DMP(formulation).learn(demos)
     rng, asked, expected = np.random.default_rng(1), [], []
@@ -213,9 +216,19 @@ def test_movements_to_new_goals_are_those_of_python(space, formulation):
             asked.append({"ask": "rollout", "symbol": one.label, "formulation": formulation, "asked": options})
             asked.append(question("rollout", one, formulation=formulation, asked=options))
             expected += [(moved, size)] * 2
-    for got, (moved, size) in zip(ask(snapshot, asked), expected, strict=True):
+    worst = 0.0
+    for got, (moved, size) in zip(ask(snapshot, asked, runtime), expected, strict=True):
         np.testing.assert_allclose(got["times"], moved.times[0], atol=1e-9)
-        assert np.abs(np.array(got["positions"]) - moved.positions[0]).max() <= MOVED * size
+        worst = max(worst, np.abs(np.array(got["positions"]) - moved.positions[0]).max() / size)
+    return worst
+
+
+@pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")  # via points far away are asked for, too
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize("formulation", ["bio-inspired", "original", "amplitude-scaled", "decoupled"])
+def test_movements_to_new_goals_are_those_of_python(space, formulation):
+    demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
+    assert compare_rollouts(demos[one_in(1, demos)], formulation) <= MOVED
 
 
 @pytest.mark.parametrize(
@@ -234,34 +247,73 @@ def test_primitives_of_other_specifications_move_as_in_python(dmp):
         assert np.abs(np.array(got["positions"]) - positions).max() <= MOVED * np.ptp(positions, axis=0).max()
 
 
-#: File -> constants, each with a value that is wrong.
+def worst_answers(runtime):
+    demos = kineme.load_lasa()
+    recognizer = kineme.Recognizer().fit(demos[one_in(1, demos)])
+    return compare_answers(recognizer, perturbed(demos[one_in(1, demos, 3)]), runtime) / SIMILAR
+
+
+def worst_states(runtime):
+    demos = kineme.load_lasa()
+    recognizer = kineme.Recognizer().fit(demos[one_in(2, demos)])
+    return compare_states(recognizer, every_tenth(demos[one_in(1, demos, 4)][::3]), runtime) / (2 * SIMILAR)
+
+
+def worst_rollouts(runtime):
+    demos = kineme.load_lasa(["CShape", "Sine", "WShape"])[::7]
+    return max(compare_rollouts(demos, name, runtime) for name in ("amplitude-scaled", "decoupled")) / MOVED
+
+
+#: File -> constants, each with a value that is a little wrong, and what sees it.
 WRONG = {
-    "preparation.js": [("TIME_SHARE = 1e-3", "TIME_SHARE = 2e-3")],
-    "recognition.js": [("EXPONENT = 15", "EXPONENT = 14.9"), ("0.25 * Math.PI", "0.2501 * Math.PI")],
-    "distances.js": [
-        ("how.line_weight ** 0.25", "how.line_weight ** 0.26"),
-        ("how.turning_weight)", "how.turning_weight * 1.001)"),
+    "preparation.js": [("TIME_SHARE = 1e-3", "TIME_SHARE = 1.1e-3", worst_answers)],
+    "recognition.js": [
+        ("EXPONENT = 15", "EXPONENT = 14.9", worst_answers),
+        ("0.25 * Math.PI", "0.2501 * Math.PI", worst_answers),
     ],
-    "description.js": [("N_POINTS = 199", "N_POINTS = 198"), ("0.5 * (ends", "0.501 * (ends")],
-    "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01")],
+    "distances.js": [
+        ("how.line_weight ** 0.25", "how.line_weight ** 0.26", worst_answers),
+        ("how.turning_weight)", "how.turning_weight * 1.001)", worst_answers),
+    ],
+    "description.js": [
+        ("N_POINTS = 199", "N_POINTS = 198", worst_answers),
+        ("0.5 * (ends", "0.501 * (ends", worst_answers),
+    ],
+    "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01", worst_answers)],
+    "early.js": [
+        ("LAST = 0.02", "LAST = 0.021", worst_states),
+        ("ROTATION = 10", "ROTATION = 10.1", worst_states),
+        ("SPEED_SPREAD = 0.5", "SPEED_SPREAD = 0.501", worst_states),
+        ("PROGRESS = 0.25", "PROGRESS = 0.251", worst_states),
+        ("POWER = 3", "POWER = 3.01", worst_states),
+        ("OVER = -3", "OVER = -3.01", worst_states),
+        ("(1.5 / 0.4)", "(1.51 / 0.4)", worst_states),
+        ("TEMPER = 0.8", "TEMPER = 0.801", worst_states),
+        ("EXPLAINING = 20", "EXPLAINING = 20.1", worst_states),
+    ],
+    "rollout.js": [
+        ("HANDOVER = 0.2", "HANDOVER = 0.201", worst_rollouts),
+        ("0.18134189", "0.18134289", worst_rollouts),
+        ("0.23723379", "0.23823379", worst_rollouts),
+    ],
 }
 
 
-@pytest.mark.parametrize(("file", "right", "wrong"), [(file, *pair) for file, pairs in WRONG.items() for pair in pairs])
-def test_a_wrong_constant_is_seen(file, right, wrong, tmp_path):
+@pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")
+@pytest.mark.parametrize(
+    ("file", "right", "wrong", "worst"), [(file, *one) for file, several in WRONG.items() for one in several]
+)
+def test_a_wrong_constant_is_seen(file, right, wrong, worst, tmp_path):
     shutil.copytree(FOLDER, tmp_path / "javascript")
     path = tmp_path / "javascript" / file
     text = path.read_text()
     assert right in text
     path.write_text(text.replace(right, wrong))
-    demos = kineme.load_lasa()
-    recognizer = kineme.Recognizer().fit(demos[one_in(1, demos)])
-    movements = perturbed(demos[one_in(1, demos, 3)])
     try:
-        worst = compare_answers(recognizer, movements, tmp_path / "javascript" / "runtime.js")
+        found = worst(tmp_path / "javascript" / "runtime.js")
     except AssertionError:  # node refused
         return
-    assert worst > 2 * SIMILAR
+    assert found > 1
 
 
 def test_the_runtime_is_small_and_every_file_is_correct_javascript():

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.move_files import check_files, file_options, write_files
+from kineme.cli.move_files import check_files, file_options, write_files, written_in_words
 from kineme.cli.options import (
     Finite,
     Numbers,
@@ -92,6 +92,8 @@ def move(**options: Any) -> None:
     if not made.preflight.passed:
         write(f"warning: checks FAILED: {len(made.preflight.failed)}; written because of --force", err=True)
     write_files(made, options)
+    if not options["as_json"] and str(options["output"]) != "-":
+        write(written_in_words(options))
 
 
 def _moved(robot: Any, options: dict[str, Any]) -> Any:

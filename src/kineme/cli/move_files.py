@@ -9,6 +9,7 @@ import click
 
 from kineme.cli.output import check_new, write_bytes
 from kineme.cli.source import name_of_source
+from kineme.output.text import printable
 
 _NEW_FILE = click.Path(path_type=Path)
 
@@ -52,7 +53,20 @@ def check_files(options: dict[str, Any]) -> None:
             raise click.BadParameter(
                 f"expected {known}, got {path.suffix or 'no ending'}", param_hint=f"--{name.replace('_', '-')}"
             )
+        if path.is_dir():
+            raise click.UsageError(
+                f"expected a new file or folder to write, {printable(path)} is a folder that is there"
+            )
+        if not path.absolute().parent.is_dir():
+            raise click.UsageError(f"expected a folder to write {printable(path)} into, there is none; create it")
         check_new(path, options["overwrite"] or options["force"], options["source"], remedy="--overwrite")
+
+
+def written_in_words(options: dict[str, Any]) -> str:
+    """The files and folders that are asked for, in one line."""
+    paths = [options[name] for name in (*_FILES, "lerobot") if options[name] is not None]
+    named = ", ".join(str(path) for path in paths)
+    return f"wrote {named}" if paths else "checked only, nothing written; name a file: -o joints.csv, --view arm.html"
 
 
 def write_files(made: Any, options: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from kineme.cli.library import opened
-from kineme.cli.options import force_option, json_option, library_option
+from kineme.cli.options import force_option, json_option, library_option, whole
 from kineme.cli.output import check_new, say
 from kineme.output.text import counted, printable
 
@@ -16,19 +16,20 @@ from kineme.output.text import counted, printable
 @library_option
 @click.option("--output", "-o", type=click.Path(path_type=Path, dir_okay=False), required=True, help="An .html file.")
 @click.option("--title", help="Of the page.  [default: the name of the library's folder]")
+@click.option("--most", type=whole(1), help="Movements in the page.  [default: as many as fit into 2 MB]")
 @json_option
 @force_option
-def page(folder: Path, output: Path, title: str | None, as_json: bool, force: bool) -> None:
+def page(folder: Path, output: Path, title: str | None, most: int | None, as_json: bool, force: bool) -> None:
     """Write one HTML file in which a library recognizes drawings and moves again, without server and network.
 
     The file holds the movements of the library: whoever has it can read them. Of large libraries some movements of each
-    symbol are taken, so that it stays below 2 MB.
+    symbol are taken, evenly spaced, and the page answers as a library of these does.
     """
     from kineme.studio.page.write_page import write_page
 
     check_new(output, force)
     with opened(folder) as library:
-        made = write_page(output, library, title, replace=force)
+        made = write_page(output, library, title, most, replace=force)
     header, size = made.header, output.stat().st_size
     held, known = header["n_movements"], header["n_all"]
     data = {"file": str(output), "bytes": size, "symbols": len(header["classes"]), "movements": held, "of": known}

@@ -57,7 +57,7 @@ def preflight(
     checks = [*_positions(robot, trajectory), *_rates(robot, trajectory), *_torques(robot, dense, state)]
     checks += between_samples(robot, trajectory)
     checks += [_jumps(robot, trajectory), _stands(robot, trajectory)]
-    checks += [_singularity(dense, state), _collision(dense, state)]
+    checks += [_singularity(dense, state), _collision(dense, state), *_below(robot, dense, state)]
     if path is not None:
         checks += tracking(robot, trajectory, path, follow, (times, state))
     return Preflight(tuple(checks), tuple(_unchecked(robot)))
@@ -151,6 +151,15 @@ def _singularity(trajectory: JointTrajectory, state: Along) -> Check:
     return Check("singularity", "tip", _at(trajectory, t), worst, math.nan, f"(singular below {_SINGULAR:g})", True)
 
 
+def _below(robot: Robot, trajectory: JointTrajectory, state: Along) -> list[Check]:
+    """How far a joint or the tip goes below the base, where a table may be; whether one is there, nobody says."""
+    t, j = np.unravel_index(int(np.argmin(state.heights)), state.heights.shape)
+    lowest = float(state.heights[t, j])
+    where = (*robot.joints, "tip")[j]
+    unit = "m (the base stands at 0)"
+    return [Check("lowest point", where, _at(trajectory, int(t)), lowest, math.nan, unit, True)] if lowest < 0 else []
+
+
 def _collision(trajectory: JointTrajectory, state: Along) -> Check:
     if not state.contacts:
         return Check("self-collision", "none", 0.0, 0, 0, "contacts", True)
@@ -165,6 +174,11 @@ def _unchecked(robot: Robot) -> Iterator[str]:
     elif np.isnan(robot.effort).any():
         named = ", ".join(np.array(robot.joints)[np.isnan(robot.effort)])
         yield f"torques of {named}: the model does not say the largest"
+    weightless = [
+        name for name, body in zip(robot.joints, list(robot.model.inertias)[1:], strict=True) if body.mass <= 0
+    ]
+    if knows_masses(robot) and weightless:
+        yield f"the weight of what {', '.join(weightless)} move: the model has no masses there"
     if robot.geometry.ngeoms == 0:
         yield "self-collision: the model has no shapes"
 

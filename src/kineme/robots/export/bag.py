@@ -15,7 +15,7 @@ TOPIC = "/joint_trajectory_controller/joint_trajectory"  # that of ros2_control
 STATES = "/joint_states"
 
 
-def write_bag(path: Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Path:
+def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Path:
     """Write a ``.bag`` of ROS 1, a ``.mcap`` of ROS 2, or, with no ending, a folder of ROS 2 with MCAP in it.
 
     One JointTrajectory on `topic` at time 0, and a JointState for each sample on /joint_states.
@@ -29,6 +29,7 @@ def write_bag(path: Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Pa
         import rosbags  # noqa: F401 - so that the message names the extra
     except ImportError as error:
         raise DataError("expected the package rosbags to write bags; pip install 'kineme[ros]'") from error
+    path = Path(path)
     if path.suffix == ".bag":
         with whole_file(path) as hidden:
             hidden.unlink(missing_ok=True)

@@ -10,7 +10,7 @@ from kineme.files.write_movement import ColumnNames, Columns, encode_movement, w
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 
 
-def write_joints(path: Path, trajectory: JointTrajectory) -> Path:
+def write_joints(path: str | Path, trajectory: JointTrajectory) -> Path:
     """Times, joints and discrete channels under their names, then velocities ``v_NAME`` and accelerations ``a_NAME``.
 
     Raises
@@ -18,7 +18,7 @@ def write_joints(path: Path, trajectory: JointTrajectory) -> Path:
     DataError
         An ending that no writer has, or a file that cannot be written.
     """
-    return write_movement(path, *as_columns(trajectory))
+    return write_movement(Path(path), *as_columns(trajectory))
 
 
 def encode_joints(trajectory: JointTrajectory, ending: str = ".csv") -> bytes:

@@ -11,8 +11,12 @@ from kineme.files.lerobot.write_episode import write_episode
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.validation import Array, check_number
 
+_FASTEST = 10_000.0  # frames per second
 
-def write_lerobot(folder: Path, trajectory: JointTrajectory, task: str, fps: float = 30.0, robot: str = "arm") -> int:
+
+def write_lerobot(
+    folder: str | Path, trajectory: JointTrajectory, task: str, fps: float = 30.0, robot: str = "arm"
+) -> int:
     """Write one episode into a new data set of version 3.0, or behind the others of one that is there.
 
     ``observation.state`` holds the positions of the joints and, under their names, the discrete channels as of a
@@ -21,12 +25,12 @@ def write_lerobot(folder: Path, trajectory: JointTrajectory, task: str, fps: flo
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
     trajectory : JointTrajectory
     task : str
         What is done, as the name of the symbol.
     fps : float, default 30
-        Frames per second.
+        Frames per second, at most 10,000.
     robot : str
         Type of the robot, of a new data set.
 
@@ -40,11 +44,11 @@ def write_lerobot(folder: Path, trajectory: JointTrajectory, task: str, fps: flo
     DataError
         The extra ``parquet`` is not installed; or a data set of another version, with other features or another rate.
     """
-    check_number("fps", fps, above=0.0)
+    check_number("fps", fps, above=0.0, most=_FASTEST)
     state = states_at(trajectory, fps)
     action = np.concatenate((state[1:], state[-1:]))
     names = (*trajectory.joints, *trajectory.steps)
-    return write_episode(folder, {"action": action, "observation.state": state}, names, fps, task, robot)
+    return write_episode(Path(folder), {"action": action, "observation.state": state}, names, fps, task, robot)
 
 
 def states_at(trajectory: JointTrajectory, fps: float) -> Array:

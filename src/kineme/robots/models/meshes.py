@@ -34,4 +34,7 @@ def find_mesh(name: str, path: Path) -> Path | None:
     """Where the mesh lies that the URDF at `path` calls `name`; None where it is not there."""
     within = next((name.removeprefix(prefix) for prefix in _PREFIXES if name.startswith(prefix)), name)
     folders = path.resolve().parents
-    return next((folder / within for folder in folders if within and (folder / within).is_file()), None)
+    try:
+        return next((folder / within for folder in folders if within and (folder / within).is_file()), None)
+    except (OSError, ValueError):  # as a name that is too long
+        return None

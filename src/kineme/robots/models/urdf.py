@@ -9,10 +9,13 @@ from xml.etree import ElementTree
 
 from kineme.errors import DataError
 from kineme.robots.models.meshes import resolve_meshes
+from kineme.robots.models.numbers import check_axis, check_masses, check_shapes
 
 _LARGEST = 20_000_000  # bytes
 _MOVING = ("revolute", "continuous", "prismatic")
 _TWIN = " link"  # is added to the name of a link that a joint has too
+_DECLARED = b"<!DOCTYPE"  # declares entities: other files, or texts that grow
+_LEAST = 1e-9  # velocity, acceleration or effort that is a limit and no rounding error
 _TURNS = 2 * math.pi  # a joint without stops is kept within one turn to each side
 
 
@@ -64,10 +67,19 @@ def read_chain(path: Path, tip: str | None) -> Chain:
         raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
     free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
     limits = tuple(_limits(joint, path) for joint in moving)
+    check_masses(robot, path)
+    check_shapes(robot, path)
     missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
     joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
-    return Chain(ElementTree.tostring(robot, "unicode"), joints, units, limits, tip, free, missing)
+    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing)
+
+
+def _as_text(robot: ElementTree.Element, path: Path) -> str:
+    try:
+        return ElementTree.tostring(robot, "unicode")
+    except RecursionError as error:
+        raise DataError(f"{path}: expected a URDF file, got elements within one another without end") from error
 
 
 def read_root(path: Path) -> ElementTree.Element:
@@ -81,11 +93,16 @@ def read_root(path: Path) -> ElementTree.Element:
     try:
         if path.stat().st_size > _LARGEST:
             raise DataError(f"{path}: expected a URDF of at most {_LARGEST / 1e6:.0f} MB, got {path.stat().st_size:,}")
-        robot = ElementTree.fromstring(path.read_bytes())
+        text = path.read_bytes()
+        robot = None if _DECLARED in text else ElementTree.fromstring(text)
     except OSError as error:
         raise DataError(f"{path}: expected a URDF file, got {error.strerror or error}") from error
     except (ElementTree.ParseError, ValueError) as error:
         raise DataError(f"{path}: expected a URDF file, got text that is no XML: {error}") from error
+    if robot is None:
+        raise DataError(
+            f"{path}: expected a URDF file, got text that is no XML of a robot: it declares a document type"
+        )
     if robot.tag != "robot":
         raise DataError(
             f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>; "
@@ -140,6 +157,9 @@ def _tip(tip: str | None, links: list[str], parents: dict[str, ElementTree.Eleme
 def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
     """The limits of a joint; one without stops becomes a joint with those of one turn to each side, in place."""
     name = joint.get("name")
+    if not name:
+        raise DataError(f"{path}: expected a name of each joint that moves, got one without")
+    check_axis(joint, path)
     if joint.find("mimic") is not None:
         raise DataError(
             f"{path}: joint {name!r} mimics another one, which is not known within an arm; "
@@ -161,6 +181,8 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
     for key in ("velocity", "effort"):
         limit.set(key, limit.get(key, "0"))
     known = {key: getattr(found, key) for key in ("velocity", "acceleration", "effort")}
+    if any(0 < value < _LEAST for value in known.values()):
+        raise DataError(f"{path}: joint {name!r}: expected limits of at least {_LEAST:g}, got {known}")
     return found._replace(**{key: value if value > 0 else math.nan for key, value in known.items()})
 
 

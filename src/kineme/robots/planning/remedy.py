@@ -9,7 +9,8 @@ from kineme.robots.checks.between_samples import SAMPLING
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.timed_movement import FASTEST_RATE, Untimed, with_timing
 
-_OF_SAMPLING = ("jump", "tracking", "turned away")  # may be mended by more samples
+_OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
+_ELSEWHERE = "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
 _TRIED = 20_000  # samples, at most, of the movement slowed down
 _MORE = 10  # times the samples, where they are too few
 
@@ -20,7 +21,7 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
     finer = untimed._replace(rate=min(_MORE * untimed.rate, FASTEST_RATE))
     sampled = any(check.what in _OF_SAMPLING or check.what.endswith(SAMPLING) for check in failed)
     if not sampled and not np.isfinite(made.preflight.slower):
-        return "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
+        return _ELSEWHERE
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
@@ -29,6 +30,8 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
         if slower is not None:
             slow = "slow it down (timing='slowed', --slow-down)"
             return f"It works in {slower:.3g} s instead of {duration:.3g}{besides}: {slow}"
+    if not np.isfinite(made.preflight.slower):
+        return _ELSEWHERE
     return "No speed helps, or only a very low one: look at the movement for jumps, or choose another posture"
 
 

@@ -48,6 +48,9 @@ def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Re
             f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns"
         )
     turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
+    known = sorted({*roles.discrete, *_given(steps)} & set(robot.joints))
+    if known:
+        raise TrajectoryError(f"expected discrete channels of other names than the joints have, got {known[0]!r}")
     recorded = {name: columns[:, k] for name, k in roles.discrete.items()}
     return Request(
         one.times - one.times[0],
@@ -59,7 +62,7 @@ def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Re
 
 
 def _given(steps: Any) -> Mapping[str, Any]:
-    if not isinstance(steps, Mapping | None):
+    if not isinstance(steps, Mapping | None) or not all(isinstance(name, str) for name in steps or {}):
         raise SpecificationError(f"expected steps as a dict of channels and their values, got {steps!r:.80}")
     return steps or {}
 

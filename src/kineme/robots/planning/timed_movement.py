@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from kineme.robots.checks.check import Check
 from kineme.robots.checks.preflight import preflight
+from kineme.robots.checks.steps import Steps, steps_kept
 from kineme.robots.execution.approach import approach
 from kineme.robots.execution.between import dense_times
-from kineme.robots.execution.joint_trajectory import joined
+from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
 from kineme.robots.execution.retime import fastest
 from kineme.robots.execution.timing import LONGEST, Timing, as_generated, n_samples, timed
 from kineme.robots.kinematics.task_path import TaskPath
@@ -31,7 +33,7 @@ class Untimed(NamedTuple):
     """What is executed, whatever its timing."""
 
     robot: Robot
-    joints: CubicSpline  # (n,) over the time of the movement, or over its length
+    joints: CubicSpline  # (n,) over the time of the movement
     path: TaskPath | None  # of the tip
     start: Array  # (n,), where the joints stand
     rate: float  # samples per second of what is sent
@@ -51,14 +53,15 @@ def with_timing(untimed: Untimed, timing: str, most: int = LONGEST) -> RobotMove
     robot, rate = untimed.robot, untimed.rate
     if timing == "fastest":
         joints, chosen = fastest(robot, untimed.joints, rate)
-        return _checked(untimed._replace(joints=joints), chosen)
-    made, factor = _checked(untimed, as_generated(robot, untimed.joints, rate)), 1.0
+        return _checked(untimed, joints, chosen)
+    joints, factor = untimed.joints, 1.0
+    made = _checked(untimed, joints, as_generated(robot, joints, rate))
     for _ in range(_ROUNDS if timing == "slowed" else 0):
         if made.preflight.passed or not np.isfinite(made.preflight.slower):
             break
-        factor *= min(made.preflight.slower, _least(robot, untimed.joints, factor)) * _A_LITTLE
-        n_samples(factor * float(untimed.joints.x[-1]), rate, most)
-        made = _checked(untimed, as_generated(robot, untimed.joints, rate, factor))
+        factor *= min(made.preflight.slower, _least(robot, joints, factor)) * _A_LITTLE
+        n_samples(factor * float(joints.x[-1]), rate, most)
+        made = _checked(untimed, joints, as_generated(robot, joints, rate, factor))
     return made
 
 
@@ -72,25 +75,32 @@ def _least(robot: Robot, joints: CubicSpline, factor: float) -> float:
     return max(2.0, float(needed) / factor)
 
 
-def _checked(untimed: Untimed, timing: Timing) -> RobotMovement:
+def _checked(untimed: Untimed, joints: CubicSpline, timing: Timing) -> RobotMovement:
     """The approach and the movement with that timing, and the checks of both; the approach slow enough for torques."""
-    made = _assembled(untimed, timing)
+    made = _assembled(untimed, joints, timing)
     slower = max((check.slower for check in made.preflight.failed if check.time < made.begins), default=1.0)
-    return _assembled(untimed, timing, slower * _APPROACH) if 1 < slower < np.inf else made
+    return _assembled(untimed, joints, timing, slower * _APPROACH) if 1 < slower < np.inf else made
 
 
-def _assembled(untimed: Untimed, timing: Timing, longer: float = 1.0) -> RobotMovement:
+def _assembled(untimed: Untimed, joints: CubicSpline, timing: Timing, longer: float = 1.0) -> RobotMovement:
     robot = untimed.robot
     in_force = np.searchsorted(untimed.step_times, timing.generated + 1e-9, "right") - 1
     steps = {name: values[in_force] for name, values in untimed.steps.items()}
-    movement = replace(timed(robot, untimed.joints, timing), steps=steps)
+    movement = replace(timed(robot, joints, timing), steps=steps)
     first = approach(robot, untimed.start, movement.positions[0], untimed.rate, longer)
     whole = joined(first, movement)
     times = dense_times(robot, whole)
     times = times[np.searchsorted(times, first.duration - 1e-9) :]
     report = preflight(robot, whole, _wanted(untimed, timing, times, first.duration), untimed.follow)
+    report = replace(report, checks=(*report.checks, *_steps(untimed, whole)))
     wanted = _wanted(untimed, timing, first.duration + timing.times, first.duration)
     return RobotMovement(robot, whole, wanted, report, first.duration, movement.duration / float(timing.generated[-1]))
+
+
+def _steps(untimed: Untimed, trajectory: JointTrajectory) -> Iterator[Check]:
+    velocities = untimed.joints(untimed.step_times, 1)
+    for name, values in untimed.steps.items():
+        yield steps_kept(untimed.robot, trajectory, Steps(name, values, velocities))
 
 
 def _wanted(untimed: Untimed, timing: Timing, times: Array, begins: float) -> TaskPath | None:

@@ -7,7 +7,8 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.robots.models.meshes import find_mesh
-from kineme.robots.view.elements import Element, as_text, numbers, origin_of, set_color
+from kineme.robots.models.numbers import finite_numbers
+from kineme.robots.view.elements import Element, as_text, origin_of, set_color
 
 _LARGEST = 16_000_000  # bytes of all meshes of one page
 _MESHES = {".stl": "stl", ".dae": "collada"}
@@ -57,7 +58,7 @@ class LinkShapes:
         color = given.find("material/color")
         if color is None and (material := given.find("material")) is not None:
             color = self.colors.get(material.get("name"))
-        values = [] if color is None else numbers(color.get("rgba"), 4)
+        values = [] if color is None else finite_numbers(color.get("rgba"), 4)
         if values:
             set_color(made, tuple(min(max(value, 0.0), 1.0) for value in values))
         return made
@@ -67,12 +68,12 @@ class LinkShapes:
             number = self._mesh(given.get("filename", ""))
             if number is None:
                 return None
-            scale = numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
+            scale = finite_numbers(given.get("scale"), 3) or [1.0, 1.0, 1.0]
             return ElementTree.Element("mesh", filename=str(number), scale=as_text(scale))
         if given.tag not in _SHAPES:
             return None
         names, length = _SHAPES[given.tag]
-        sizes = {name: numbers(given.get(name), length) for name in names.split()}
+        sizes = {name: finite_numbers(given.get(name), length) for name in names.split()}
         if not all(values and min(values) > 0 for values in sizes.values()):
             return None
         return ElementTree.Element(given.tag, {name: as_text(values) for name, values in sizes.items()})

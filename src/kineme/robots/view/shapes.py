@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree import ElementTree
 
+from kineme.robots.models.numbers import finite_numbers
 from kineme.robots.models.robot import Robot
-from kineme.robots.view.elements import Element, as_text, numbers, origin_of, set_color
+from kineme.robots.view.elements import Element, as_text, origin_of, set_color
 from kineme.robots.view.installed_meshes import root_with_shapes
 from kineme.robots.view.link_shapes import LinkShapes, Mesh
 
@@ -68,7 +69,7 @@ def _joint(given: Element, name: str, links: dict[str, str], moves: bool) -> Ele
         found = given.find(end)
         ElementTree.SubElement(made, end, link=links["" if found is None else str(found.get("link"))])
     axis = given.find("axis")
-    values = [] if axis is None else numbers(axis.get("xyz"), 3)
+    values = [] if axis is None else finite_numbers(axis.get("xyz"), 3)
     ElementTree.SubElement(made, "axis", xyz=as_text(values if any(values) else [1.0, 0.0, 0.0]))
     return made
 
@@ -79,7 +80,7 @@ def _cylinders(root: Element, link: str) -> Iterator[Element]:
         parent = joint.find("parent")
         if parent is None or parent.get("link") != link:
             continue
-        x, y, z = numbers(origin_of(joint).get("xyz"), 3)
+        x, y, z = finite_numbers(origin_of(joint).get("xyz"), 3)
         length = math.hypot(x, y, z)
         if length < 1e-3:
             continue

@@ -149,8 +149,8 @@ function matched(x, y, P, d, room) {
   for (let p = 0; p < P; p++) {
     let smallest = FAR;
     let at = 0;
-    for (let q = 0; q < P; q++) {
-      const [from, to] = [p * w, q * w];
+    const from = p * w;
+    for (let q = 0, to = 0; q < P; q++, to += w) {
       let both = x[from + d + 1] * y[to + d + 1];
       for (let k = d + 2; k < w; k++) both += x[from + k] * y[to + k];
       const cost = halves[p] + halves[P + q] + squaredGap(x, from, y, to, d + 1) - both * both;

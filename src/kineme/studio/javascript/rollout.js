@@ -195,9 +195,10 @@ export function encode({ header, arrays }, one) {
     weights.set(own, k * how.n_basis);
     return v0 / duration;
   });
-  const extents = start.map((_, k) => {
-    const column = Array.from(times, (_, t) => positions[t * d + k]);
-    return Math.max(...column) - Math.min(...column);
+  const extents = start.map((x, k) => {
+    let [low, high] = [x, x];
+    for (let j = k; j < positions.length; j += d) [low, high] = [Math.min(low, positions[j]), Math.max(high, positions[j])];
+    return high - low;
   });
   return { weights, start, goal, velocity, duration, extents, formulation: how.formulation };
 }

@@ -148,7 +148,9 @@ function finish() {
   try {
     state.answer = runtime.recognize(times, positions, ERROR_RATE);
     state.drawn = drawn;
-    if (runtime.header.movements.encodes) show(DRAWN, runtime.encode(times, positions), { start: positions[0], goal: positions.at(-1) });
+    const place = { start: positions[0], goal: positions.at(-1) };
+    if (runtime.header.movements.encodes) show(DRAWN, runtime.encode(times, positions), place);
+    else if (state.answer.label !== null) show(state.answer.label, state.answer.label, place);
     select(state.answer.label);
   } catch {
     state.note = "That was too short: draw a longer movement.";

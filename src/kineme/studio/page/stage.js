@@ -93,10 +93,7 @@ export function createStage(canvas, view, box) {
 
 /** A place in the middle of what points cover, and half of how far they reach. */
 export function boxOf(points) {
-  const center = points[0].map((_, k) => {
-    const values = points.map((x) => x[k]);
-    return (Math.min(...values) + Math.max(...values)) / 2;
-  });
-  const half = Math.max(...points.flatMap((x) => x.map((value, k) => Math.abs(value - center[k]))));
-  return { center, half: half || 1 };
+  const [low, high] = [Math.min, Math.max].map((most) => points[0].map((_, k) => points.reduce((one, x) => most(one, x[k]), points[0][k])));
+  const center = low.map((one, k) => (one + high[k]) / 2);
+  return { center, half: Math.max(...high.map((one, k) => one - center[k])) || 1 };
 }

@@ -26,8 +26,8 @@ _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly al
 _EARLY = Early(duration_spread=1.0)
 
 
-def library_page(library: ActionLibrary, title: str) -> tuple[str, Snapshot]:
-    """The text of the page, and the snapshot that it holds.
+def library_page(library: ActionLibrary, title: str, most: int | None = None) -> tuple[str, Snapshot]:
+    """The text of the page, and the snapshot that it holds: `most` movements, see `snapshot_of_library`.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def library_page(library: ActionLibrary, title: str) -> tuple[str, Snapshot]:
             f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "
             "be drawn; learn two or three columns of the recordings, in the shell with --columns"
         )
-    snapshot = snapshot_of_library(library, early=_EARLY)
+    snapshot = snapshot_of_library(library, most, _EARLY)
     return page_of(snapshot, title), snapshot
 
 
@@ -64,7 +64,9 @@ def page_of(snapshot: Snapshot, title: str) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], template)
 
 
-def write_page(path: str | Path, library: ActionLibrary, title: str | None = None, replace: bool = True) -> Snapshot:
+def write_page(
+    path: str | Path, library: ActionLibrary, title: str | None = None, most: int | None = None, *, replace: bool = True
+) -> Snapshot:
     """Write the page of a library, see `library_page`; the title is by default the name of the library's folder.
 
     Raises
@@ -74,7 +76,7 @@ def write_page(path: str | Path, library: ActionLibrary, title: str | None = Non
     OSError
         The folder is missing, read-only or full.
     """
-    text, snapshot = library_page(library, title or library.store.folder.resolve().name)
+    text, snapshot = library_page(library, title or library.store.folder.resolve().name, most)
     with whole_file(Path(path), replace=replace) as beside:
         beside.write_text(text, encoding="utf-8")
     return snapshot

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from kineme.comparison.describe import N_POINTS
 from kineme.errors import SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.library.recognition.members import Members, members_of
@@ -25,17 +26,15 @@ from kineme.studio.snapshot.snapshot import Snapshot
 
 #: Numbers of the stored paths, at most: 1.3 MB in base64, so that a page with all else stays below 2 MB.
 MOST_NUMBERS = 240_000
-_PER_PATH = 199
 
 
-def snapshot_of_library(
-    library: ActionLibrary, most_numbers: int = MOST_NUMBERS, early: Early | None = None
-) -> Snapshot:
+def snapshot_of_library(library: ActionLibrary, most: int | None = None, early: Early | None = None) -> Snapshot:
     """The symbols of a library with their movements.
 
-    Of symbols with many movements some are taken, evenly spaced, as many of each as fit; widths and calibration are
-    those of the movements taken, as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how
-    movements are recognized under way; by default as `kineme.Recognizer.stream` does.
+    Of symbols with many movements some are taken, evenly spaced, as many of each as add up to `most`; by default as
+    many as fit into 2 MB, 603 in the plane and 402 in space. Widths and calibration are those of the movements taken,
+    as if a library held these alone. ``header["n_all"]`` says of how many. `early` is how movements are recognized
+    under way; by default as `kineme.Recognizer.stream` does.
 
     Raises
     ------
@@ -44,8 +43,8 @@ def snapshot_of_library(
     """
     store = library.store
     members = members_of(store)
-    most = most_numbers // (_PER_PATH * (store.n_dims or 1))
-    taken = some_members(members, most)
+    fitting = MOST_NUMBERS // (N_POINTS * (store.n_dims or 1))
+    taken = some_members(members, fitting if most is None else most)
     known = known_members(store, taken)
     prototypes = [prototype_of(store, symbol(store, str(name))) for name in members.names]
     primitives = read.primitives(store, np.array(prototypes, dtype=np.int64))
@@ -69,7 +68,8 @@ def some_members(members: Members, most: int) -> Members:
     counts = np.diff(members.first, append=len(members.ids))
     if most < len(counts):
         raise SpecificationError(
-            f"expected at most {most} symbols, as many as fit into a page, got {len(counts)}; make a library of some"
+            f"expected at most {most} symbols, as many as there may be movements, got {len(counts)}; take more of "
+            "these, in the shell with --most, or make a library of some of the symbols"
         )
     each = int(counts.max(initial=1))
     while np.minimum(counts, each).sum() > most:

@@ -58,19 +58,30 @@ export class MovementMap {
   names(pixels) {
     const { context, width } = this.board;
     const places = new Map();
+    /** @type {number[][]} */
+    const taken = [];
     this.points.forEach((point, k) => point.symbol !== null && places.set(point.symbol, [...(places.get(point.symbol) ?? []), pixels[k]]));
     if (places.size > 40) return;
     Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", lineWidth: 4, strokeStyle: color("--surface"), fillStyle: color("--text"), lineJoin: "round" });
     for (const [id, members] of places) {
       const name = symbolOf(id)?.name ?? "";
       const short = name.length > 18 ? `${name.slice(0, 17)}…` : name;
-      const middle = [0, 1].map((k) => members.reduce((/** @type {number} */ sum, /** @type {number[]} */ one) => sum + one[k], 0) / members.length);
-      const top = Math.min(...members.map((/** @type {number[]} */ one) => one[1])) - 11;
       const half = context.measureText(short).width / 2 + 4;
-      const x = Math.min(Math.max(middle[0], half), width - half);
-      context.strokeText(short, x, Math.max(top, 14));
-      context.fillText(short, x, Math.max(top, 14));
+      const x = Math.min(Math.max(members.reduce((/** @type {number} */ sum, /** @type {number[]} */ one) => sum + one[0], 0) / members.length, half), width - half);
+      const y = this.freeLine(members, x, half, taken);
+      if (y === null) continue;
+      taken.push([x - half, x + half, y]);
+      context.strokeText(short, x, y);
+      context.fillText(short, x, y);
     }
+  }
+
+  /** Above or below the dots of a name, where no other name stands; null where there is no room. */
+  freeLine(/** @type {number[][]} */ members, /** @type {number} */ x, /** @type {number} */ half, /** @type {number[][]} */ taken) {
+    const heights = members.map((one) => one[1]);
+    const lines = [Math.max(Math.min(...heights) - 11, 14), Math.min(Math.max(...heights) + 21, this.board.height - 6)];
+    const free = (/** @type {number} */ y) => taken.every(([left, right, other]) => x + half < left || x - half > right || Math.abs(y - other) > 15);
+    return lines.find(free) ?? null;
   }
 
   /** @param {MouseEvent} event */

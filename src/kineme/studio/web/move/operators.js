@@ -6,12 +6,12 @@ import { post } from "../parts/api.js";
 /** @type {Map<string, Promise<Operators|null>>} */
 const known = new Map();
 
-/** @param {string} symbol @param {string} formulation @param {number} version Of the library. @returns {Promise<Operators|null>} */
-export function operatorsOf(symbol, formulation, version) {
-  const key = JSON.stringify([symbol, formulation, version]);
+/** @param {any} what @param {string} formulation @param {number} version Of the library. @returns {Promise<Operators|null>} */
+export function operatorsOf(what, formulation, version) {
+  const key = JSON.stringify([what, formulation, version]);
   if (!known.has(key)) {
     if (known.size > 60) known.clear();
-    known.set(key, post("/api/rollout/operators", { what: { symbol }, formulation }).catch(() => null));
+    known.set(key, post("/api/rollout/operators", { what, formulation }).catch(() => null));
   }
   return /** @type {Promise<Operators|null>} */ (known.get(key));
 }

@@ -2,14 +2,14 @@
 
 /**
  * @typedef {{symbol: string, start: number[], goal: number[], path: number[][], usual: number, share: number,
- *   via: {at: number, point: number[]}[], obstacles: {center: number[], radius: number}[]}} Plan
+ *   style: number[]|null, via: {at: number, point: number[]}[], obstacles: {center: number[], radius: number}[]}} Plan
  *   `usual` is the demonstrated duration [s]; `share` stretches it.
  */
 
 /** The movement as it was shown. @param {any} symbol @param {any} rollout @returns {Plan} */
 export function asShown(symbol, rollout) {
   const usual = rollout.times[rollout.times.length - 1] - rollout.times[0];
-  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: symbol.path ?? rollout.positions, usual, share: 1, via: [], obstacles: [] };
+  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: symbol.path ?? rollout.positions, usual, share: 1, style: null, via: [], obstacles: [] };
 }
 
 /** The size of the movement, for distances that fit it. @param {number[][]} path */
@@ -18,9 +18,12 @@ export function extent(path) {
   return Math.hypot(...spans) || 1;
 }
 
+/** What moves: the prototype, or a style of its symbol. @param {Plan} plan */
+export const what = (plan) => (plan.style ? { style: { symbol: plan.symbol, values: plan.style } } : { symbol: plan.symbol });
+
 /** @param {Plan} plan @param {string} formulation @returns {any} A question to the server. */
 export function question(plan, formulation) {
-  const body = { what: { symbol: plan.symbol }, formulation, start: plan.start, goal: plan.goal, duration: plan.usual * plan.share };
+  const body = { what: what(plan), formulation, start: plan.start, goal: plan.goal, duration: plan.usual * plan.share };
   if (plan.via.length) body.via = [...plan.via].sort((a, b) => a.at - b.at).map(({ at, point }) => [at, point]);
   if (plan.obstacles.length) body.obstacles = plan.obstacles;
   return body;

@@ -2,7 +2,7 @@
 import { post } from "../parts/api.js";
 import { library } from "../parts/library_state.js";
 import { evaluate, operatorsOf } from "./operators.js";
-import { isPlain, question } from "./plan.js";
+import { isPlain, question, what } from "./plan.js";
 
 const SETTLED = 120; // how long nothing must change before the server is asked for what the page already drew [ms]
 
@@ -17,13 +17,15 @@ export class Rollouts {
     this.wanted = null;
     this.operators = null;
     this.timer = 0;
+    this.preparing = "";
   }
 
   /** @param {any} plan */
   async prepare(plan) {
     this.operators = null;
-    const operators = await operatorsOf(plan.symbol, this.formulation, library().version);
-    this.operators = operators;
+    const key = (this.preparing = JSON.stringify(what(plan)));
+    const operators = await operatorsOf(what(plan), this.formulation, library().version);
+    if (this.preparing === key) this.operators = operators;
   }
 
   /** @param {any} plan The newest. */

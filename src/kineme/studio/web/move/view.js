@@ -14,6 +14,7 @@ import { MovePicture } from "./picture.js";
 import { asShown, extent, question } from "./plan.js";
 import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
+import { showStyles } from "./styles.js";
 
 const FORMATS = ["csv", "json", "npz", "parquet"];
 
@@ -75,7 +76,22 @@ class Move {
     this.picture.paths = [];
     this.picture.fit();
     this.structure();
+    const plan = this.plan;
+    showStyles(symbol, (values) => this.style(values), () => this.plan === plan);
+    await this.prepare();
+  }
+
+  async prepare() {
     await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
+  }
+
+  /** Another style moves; its operators are asked for once the slider rests. @param {number[]|null} values */
+  style(values) {
+    this.plan.style = values;
+    for (const one of this.rollouts.values()) one.operators = null;
+    this.changed();
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => this.prepare(), 400);
   }
 
   /** Points came or went. */
@@ -100,6 +116,7 @@ class Move {
 
   /** A point or the duration is another one. */
   changed() {
+    this.keepInSight();
     this.handles.place();
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
     for (const name of this.on) this.rollouts.get(name).follow(this.plan);

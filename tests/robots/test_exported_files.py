@@ -1,0 +1,61 @@
+"""Files of joint trajectories: numbers that YAML takes for texts, paths as texts, rates without end, equal names."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import kineme
+from kineme.errors import SpecificationError, TrajectoryError
+from kineme.robots import JointTrajectory, load, move, write_action_goal, write_bag, write_joints, write_lerobot
+
+
+@pytest.fixture
+def trajectory():
+    q = np.array([[0.0, 1e-05], [1e16, -2e-07], [5e-324, 0.1], [-0.0, 123456789.0]])
+    return JointTrajectory(("a 1e-05", "b"), np.arange(4.0), q, 0 * q, 0 * q, {})
+
+
+_YAML_FLOAT = re.compile(r"[-+]?[0-9]+\.[0-9]*([eE][-+][0-9]+)?")  # of YAML 1.1, as PyYAML and so ROS 2 read it
+
+
+def test_numbers_of_a_goal_are_numbers_in_yaml_of_version_1_1_too(trajectory, tmp_path):
+    text = write_action_goal(tmp_path / "goal.yaml", trajectory).read_text()
+    goal = json.loads(text)["trajectory"]
+    assert goal["joint_names"] == ["a 1e-05", "b"]
+    np.testing.assert_array_equal([point["positions"] for point in goal["points"]], trajectory.positions)
+    written = re.findall(r'"positions": \[(.*?)\]', text)
+    assert len(written) == 4
+    assert all(_YAML_FLOAT.fullmatch(number) for row in written for number in row.split(", "))
+
+
+def test_paths_may_be_texts(trajectory, tmp_path):
+    assert write_joints(f"{tmp_path}/joints.csv", trajectory).is_file()
+    assert write_action_goal(f"{tmp_path}/goal.json", trajectory).is_file()
+
+
+def test_paths_of_bags_and_data_sets_may_be_texts(trajectory, tmp_path):
+    pytest.importorskip("rosbags", reason="the extra ros is not installed")
+    pytest.importorskip("pyarrow", reason="the extra parquet is not installed")
+    assert write_bag(f"{tmp_path}/plan.mcap", trajectory).is_file()
+    assert write_bag(f"{tmp_path}/plan", trajectory).is_dir()
+    assert write_lerobot(f"{tmp_path}/set", trajectory, "task") == 0
+
+
+def test_frames_without_end_are_refused_before_they_fill_the_memory(trajectory, tmp_path):
+    with pytest.raises(SpecificationError, match=r"fps to be a number .* 10000, got 1000000000000"):
+        write_lerobot(tmp_path / "set", trajectory, "task", 10**12)
+    assert not (tmp_path / "set").exists()
+
+
+def test_a_discrete_channel_is_not_called_as_a_joint():
+    pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+    robot = load("ur5e")
+    still = kineme.Trajectory(times=np.linspace(0, 3, 50), positions=np.tile(robot.rest, (50, 1)))
+    with pytest.raises(TrajectoryError, match="other names than the joints have, got 'elbow_joint'"):
+        move(still, robot, steps={"elbow_joint": np.zeros(50)})
+    with pytest.raises(SpecificationError, match="expected steps as a dict"):
+        move(still, robot, steps={1: np.zeros(50)})

@@ -1,0 +1,68 @@
+"""URDF files that would be misread without a word: what they leave out is refused by name, and they cannot do harm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kineme.errors import DataError
+from kineme.robots import JointTrajectory, load, preflight
+
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+JOINT = (
+    '<joint name="{name}" type="revolute"><parent link="a"/><child link="b"/><axis xyz="{axis}"/>'
+    '<limit lower="-1" upper="1" velocity="{velocity}" effort="1"/></joint>'
+)
+INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+
+
+def urdf(folder, inside="", before="", name="j", axis="0 0 1", velocity="1"):
+    """An arm of one joint, with something inside its last link or before everything else."""
+    path = folder / "arm.urdf"
+    joint = JOINT.format(name=name, axis=axis, velocity=velocity)
+    path.write_text(f'{before}<robot name="r"><link name="a"/><link name="b">{inside}</link>{joint}</robot>')
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"inside": f'<inertial><mass value="nan"/>{INERTIA}</inertial>'}, "link 'b': expected <inertial> with <mass"),
+        ({"inside": f'<inertial><mass value="-5"/>{INERTIA}</inertial>'}, "link 'b': expected <inertial> with <mass"),
+        ({"inside": '<inertial><mass value="1"/></inertial>'}, "link 'b': expected <inertial> with <mass"),
+        ({"inside": "<inertial/>"}, "link 'b': expected <inertial> with <mass"),
+        ({"inside": "<collision/>"}, "link 'b': expected the <geometry> of a <collision>"),
+        ({"inside": "<collision><geometry/></collision>"}, "link 'b': expected the <geometry> of a <collision>"),
+        ({"inside": '<collision><geometry><sphere radius="-1"/></geometry></collision>'}, "sizes above 0"),
+        ({"inside": '<collision><geometry><box size="nan 1 1"/></geometry></collision>'}, "sizes above 0"),
+        ({"inside": '<collision><geometry><torus radius="1"/></geometry></collision>'}, "to be a mesh, or a"),
+        ({"inside": "<x>" * 50_000 + "</x>" * 50_000}, "elements within one another"),
+        ({"before": '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>'}, "declares a document type"),
+        ({"axis": "0 0 0"}, "joint 'j': expected <axis xyz=/> as three numbers that are not all 0, got '0 0 0'"),
+        ({"axis": "nan 0 0"}, "joint 'j': expected <axis"),
+        ({"name": ""}, "a name of each joint that moves"),
+        ({"velocity": "1e-320"}, "joint 'j': expected limits of at least 1e-09"),
+    ],
+)  # fmt: skip
+def test_what_would_be_left_out_without_a_word_is_refused_by_name(tmp_path, changed, words):
+    path = urdf(tmp_path, **changed)
+    with pytest.raises(DataError, match=words):
+        load(path, tip="b")
+
+
+def test_a_mesh_whose_name_no_file_can_have_is_not_there(tmp_path):
+    mesh = f'<collision><geometry><mesh filename="{"a" * 5000}"/></geometry></collision>'
+    assert load(urdf(tmp_path, mesh)).assumed[0] == "b has no shape: its mesh is not there"
+
+
+def test_joints_that_move_nothing_with_a_mass_are_named(tmp_path):
+    path = tmp_path / "arm.urdf"
+    links = f'<link name="a"/><link name="b"><inertial><mass value="1"/>{INERTIA}</inertial></link><link name="c"/>'
+    first = JOINT.format(name="j", axis="0 0 1", velocity=1)
+    second = first.replace('"b"', '"c"').replace('"a"', '"b"').replace('"j"', '"k"')
+    path.write_text(f'<robot name="r">{links}{first}{second}</robot>')
+    robot = load(path)
+    still = np.zeros((3, 2))
+    report = preflight(robot, JointTrajectory(robot.joints, np.arange(3.0), still, still, still, {}))
+    assert "the weight of what k move: the model has no masses there" in report.unchecked

@@ -1,0 +1,98 @@
+"""A browser at a studio: real letters drawn by the mouse, and what every page must keep to."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+
+import numpy as np
+
+import kineme
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+LETTERS = ("GShape", "Sine", "Angle", "CShape")
+SHOWN = 5  # demonstrations of each letter that the library gets; the others are drawn
+
+#: Names that would do harm if they were read as markup, as code or as an address.
+HOSTILE = (
+    "<img src=x onerror=alert(1)>",
+    '"><script>alert(1)</script>',
+    "javascript:alert(1)",
+    "\u202eevil",
+    "x" * 190,
+)
+
+
+def letters(shape):
+    """All demonstrations of a letter."""
+    return list(kineme.load_lasa([shape]))
+
+
+def make_letters(folder, shapes=LETTERS, shown=SHOWN):
+    """A library of letters, some demonstrations of each."""
+    with kineme.ActionLibrary(folder, create=True) as library:
+        for shape in shapes:
+            library.learn(letters(shape)[:shown], [shape] * min(shown, len(letters(shape))))
+    return folder
+
+
+def wait_until(page, expression, *arguments, seconds=20):
+    """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
+    deadline = time.monotonic() + seconds
+    while not page.evaluate(expression, *arguments):
+        assert time.monotonic() < deadline, expression
+        page.wait_for_timeout(20)
+
+
+def wait_for_text(page, selector, text, seconds=20):
+    """Wait until an element has a text."""
+    deadline = time.monotonic() + seconds
+    while (now := page.inner_text(selector)) != text:
+        assert time.monotonic() < deadline, (selector, now, text)
+        page.wait_for_timeout(20)
+
+
+def draw(page, movement, seconds=1.6, n=80, share=1.0, at=(0.5, 0.5)):
+    """Draw a movement by the mouse, all of it in `seconds`; with a share, begin it and hold the button."""
+    box = page.locator("#draw-canvas").bounding_box()
+    size = np.ptp(movement.positions, axis=0)
+    scale = min(0.5 * box["width"] / size[0], 0.6 * box["height"] / size[1])
+    away = (movement.positions - movement.positions.min(axis=0) - size / 2) * scale
+    x, y = box["x"] + at[0] * box["width"] + away[:, 0], box["y"] + at[1] * box["height"] - away[:, 1]
+    times = (movement.times - movement.times[0]) / np.ptp(movement.times) * seconds
+    kept = np.linspace(0, len(times) - 1, n).astype(int)
+    kept = kept[: max(round(share * n), 2)]
+    page.mouse.move(x[0], y[0])
+    page.mouse.down()
+    began = time.monotonic()
+    for k in kept[1:]:
+        if (left := times[k] - (time.monotonic() - began)) > 0:
+            time.sleep(left)
+        page.mouse.move(x[k], y[k])
+    if share == 1.0:
+        page.mouse.up()
+
+
+def center(page, selector):
+    """The middle of an element on the screen."""
+    box = page.locator(selector).first.bounding_box()
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+#: How many pixels of the stage of Move are of the drawn path, around a point of the screen: its color is the token's.
+INKED = """([x, y, r]) => {
+  const canvas = document.getElementById("move-canvas");
+  const box = canvas.getBoundingClientRect();
+  const sharp = canvas.width / box.width;
+  const corner = [(x - box.left - r) * sharp, (y - box.top - r) * sharp];
+  const pixels = canvas.getContext("2d").getImageData(...corner, 2 * r * sharp, 2 * r * sharp).data;
+  const probe = document.createElement("canvas").getContext("2d");
+  probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink");
+  probe.fillRect(0, 0, 1, 1);
+  const ink = probe.getImageData(0, 0, 1, 1).data;
+  const off = (i) => [0, 1, 2].reduce((sum, k) => sum + Math.abs(pixels[i + k] - ink[k]), 0);
+  let inked = 0;
+  for (let i = 0; i < pixels.length; i += 4) if (pixels[i + 3] > 200 && off(i) < 60) inked += 1;
+  return inked;
+}"""

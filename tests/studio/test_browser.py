@@ -1,0 +1,491 @@
+"""The studio in Chromium: real letters are drawn, recognized while they are drawn, named and moved; nothing is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+from threading import Thread
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+from browser_samples import (
+    CHROMIUM,
+    HOSTILE,
+    INKED,
+    LETTERS,
+    SHOWN,
+    center,
+    draw,
+    letters,
+    make_letters,
+    wait_for_text,
+    wait_until,
+)  # fmt: skip
+from studio_samples import Running
+
+import kineme
+
+playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+pytest.importorskip("uvicorn", reason="the extra studio is not installed")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+
+WIDTHS = (390, 820, 1440)
+ANSWERED = "['This is', 'The answer'].includes(document.getElementById('verdict-kind').textContent)"
+VIEWS = ("draw", "library", "move", "recordings", "robot")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def studio(tmp_path):
+    """A function that serves a library; all are ended."""
+    running = []
+
+    def start(folder, *options):
+        running.append(Running(folder, *options))
+        return running[-1]
+
+    yield start
+    for one in running:
+        if one.process.poll() is None:
+            one.end()
+
+
+@pytest.fixture
+def opened(browser, studio):  # studios are ended after their pages
+    """A function that opens a studio; at the end nothing went wrong, and nothing was asked from elsewhere."""
+    wrong, requests, contexts, addresses = [], [], [], set()
+
+    def open_page(running, view="draw", width=1440, height=900, tolerated=(), **options):
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        contexts.append(context)
+        page = context.new_page()
+
+        def heard(message):
+            if message.type == "error" and not any(text in message.text for text in tolerated):
+                wrong.append(message.text)
+
+        page.on("console", heard)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("dialog", lambda dialog: wrong.append(dialog.message))
+        page.on("request", lambda request: requests.append(request.url))
+        addresses.add(running.address)
+        page.goto(f"{running.address}/?token={running.token}#{view}")
+        wait_until(page, "document.getElementById('library-name').textContent.trim() !== ''")
+        wait_until(page, "document.getElementById('status').dataset.state === 'here'")
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert wrong == []
+    own = (*addresses, "blob:", "data:")
+    assert [url for url in requests if not url.startswith(own)] == []
+
+
+@pytest.fixture(scope="module")
+def served_letters(tmp_path_factory):
+    """A studio of letters that no test changes."""
+    running = Running(make_letters(tmp_path_factory.mktemp("letters") / "letters"), "--read-only")
+    yield running
+    running.end()
+
+
+def views_of(running):
+    """The views for which this server has answers."""
+    needs = {"robot": "/api/robots", "recordings": "/api/recordings"}
+    request = Request(f"{running.address}/api/openapi.json", headers={"Authorization": f"Bearer {running.token}"})
+    with urlopen(request, timeout=20) as response:
+        served = json.load(response)["paths"]
+    return [view for view in VIEWS if needs.get(view, "/api/library") in served]
+
+
+@pytest.mark.parametrize("shape", LETTERS[:2])
+def test_a_letter_is_recognized_while_it_is_drawn(opened, served_letters, shape):
+    page = opened(served_letters)
+    draw(page, letters(shape)[SHOWN], share=0.8)
+    wait_until(page, "name => document.querySelector('.rank-name').textContent === name", shape)
+    assert float(page.get_attribute("#draw-progress", "aria-valuenow")) > 30
+    page.mouse.up()
+    answers = set()
+    for movement in letters(shape)[SHOWN:]:
+        draw(page, movement)
+        wait_until(page, ANSWERED)
+        assert page.inner_text(".rank:first-child .rank-name") == shape
+        answers.add((page.inner_text("#verdict"), page.inner_text("#spoken")))
+    assert (shape, f"This is {shape}.") in answers  # one in twenty may be called unknown, more where the mouse jerks
+
+
+def test_a_movement_of_no_known_letter_is_unknown(opened, served_letters):
+    page = opened(served_letters)
+    draw(page, letters("Zshape")[0])
+    wait_for_text(page, "#verdict", "Unknown")
+    assert page.is_disabled("#naming-name")  # it is open for reading only
+
+
+def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing(opened, studio, tmp_path):
+    page = opened(studio(tmp_path / "new"))
+    assert page.inner_text("#draw-empty-title") == "Nothing is known yet"
+    assert "One drawing is enough" in page.inner_text("#draw-empty-text")
+    for name in ("GShape", "Sine"):
+        draw(page, letters(name)[0])
+        wait_until(page, "document.activeElement.id === 'naming-name'")
+        page.keyboard.type(name)
+        page.keyboard.press("Enter")
+        wait_for_text(page, "#verdict-kind", "Learned")
+    with kineme.ActionLibrary(tmp_path / "new", read_only=True) as library:
+        assert [one.name for one in library.symbols()] == ["GShape", "Sine"]
+    draw(page, letters("GShape")[3])
+    wait_until(page, ANSWERED)
+    assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+    assert "a guess" in page.inner_text("#verdict-note") or page.inner_text("#verdict") == "Unknown"
+
+
+def test_the_path_follows_the_goal_without_asking_the_server(opened, served_letters):
+    page = opened(served_letters, "move")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    page.wait_for_timeout(1500)  # operators are asked for once
+    page.route("**/api/rollout", lambda route: None)  # from now on it never answers
+    x, y = center(page, ".handle.goal")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 70, y - 90, steps=10)
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.evaluate(INKED, [x + 70, y - 90, 30]) > 20
+    page.mouse.up()
+    assert center(page, ".handle.goal") != (x, y)
+
+
+def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):
+    page = opened(served_letters, "move")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    page.click("#add-via")
+    assert page.evaluate("document.activeElement.getAttribute('aria-label')").startswith("Via point 1 at")
+    for _ in range(6):
+        page.keyboard.press("Shift+ArrowUp")
+    wait_until(
+        page,
+        f"""() => {{ const b = document.querySelector(".handle.via").getBoundingClientRect();
+        return ({INKED})([b.x + b.width / 2, b.y + b.height / 2, 24]) > 20; }}""",
+    )
+    page.keyboard.press("Delete")
+    assert page.locator(".handle").count() == 2
+    page.click("#add-obstacle")
+    assert page.locator(".handle.obstacle").count() == 1
+    with page.expect_response("**/api/rollout") as answered:
+        page.keyboard.press("ArrowRight")
+    assert answered.value.ok
+
+
+def test_a_movement_is_exported(opened, served_letters, tmp_path):
+    page = opened(served_letters, "move")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    with page.expect_download() as download:
+        page.click("#export")
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    assert kineme.read_recording(path).positions.shape[1] == 2
+
+
+def test_two_tabs_show_the_same_library_and_undo_takes_back(opened, studio, tmp_path):
+    running = studio(make_letters(tmp_path / "letters", shown=2))
+    one, other = opened(running, "library"), opened(running, "library")
+    for page in (one, other):
+        wait_until(page, "document.querySelectorAll('.card-open').length === 4")
+    one.click(".card-open >> nth=0")
+    one.get_by_role("button", name="Rename").click()
+    one.keyboard.type("first")
+    one.keyboard.press("Enter")
+    wait_until(other, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+    other.locator("body").press("Control+z")
+    wait_until(one, "![...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+    assert sorted(one.locator(".card-name").all_inner_texts()) == sorted(LETTERS)
+
+
+def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studio, tmp_path):
+    running = studio(make_letters(tmp_path / "letters", shown=3))
+    page = opened(running, "library")
+    names = page.locator(".card-name")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 4")
+    page.locator(".choose").nth(0).check()
+    page.locator(".choose").nth(1).check()
+    page.click("#merge")
+    page.keyboard.type("both")
+    page.keyboard.press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 3")
+    assert "both" in names.all_inner_texts()
+    page.click("text=both")
+    wait_until(page, "document.querySelectorAll('.member').length === 6")
+    page.locator(".member").nth(0).click()
+    page.get_by_role("button", name="Split off").click()
+    page.keyboard.type("part")
+    page.keyboard.press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 4")
+    page.click("text=part")
+    page.get_by_role("button", name="Delete symbol").click()
+    page.keyboard.press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 3")
+    for left in (4, 3, 4):
+        page.click("#undo")
+        wait_until(page, "n => document.querySelectorAll('.card-open').length === n", left)
+    assert sorted(names.all_inner_texts()) == sorted(LETTERS)
+
+
+def test_hostile_names_are_text(opened, studio, tmp_path):
+    folder = tmp_path / "hostile"
+    with kineme.ActionLibrary(folder, create=True) as library:
+        for name, shape in zip(HOSTILE, ("GShape", "Sine", "Angle", "CShape", "Zshape"), strict=True):
+            library.learn(letters(shape)[:2], [name] * 2)
+            library.annotate(name, name)
+    running = studio(folder)
+    page = opened(running, "library", width=390, height=844)
+    wait_until(page, "document.querySelectorAll('.card-open').length === 5")
+    assert set(page.locator(".card-name").all_text_contents()) == set(HOSTILE)
+    for k in range(5):
+        page.locator(".card-open").nth(k).click()
+        assert page.input_value("#symbol textarea") in HOSTILE
+    for view in views_of(running):
+        page.evaluate("view => { location.hash = view; }", view)
+        page.wait_for_timeout(200)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, view
+    page.evaluate("location.hash = 'draw'")
+    draw(page, letters("GShape")[3])
+    wait_until(page, "document.querySelectorAll('.chip').length > 0")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert page.locator("main img, main script").count() == 0
+
+
+def test_movements_without_a_name_are_proposed_and_named_together(opened, studio, tmp_path):
+    with kineme.ActionLibrary(tmp_path / "unnamed", create=True) as library:
+        for shape in LETTERS[:3]:
+            library.learn(letters(shape), [None] * len(letters(shape)))
+    page = opened(studio(tmp_path / "unnamed"), "library")
+    wait_until(page, "document.querySelectorAll('.proposal').length > 1", seconds=60)
+    first = page.locator(".proposal").first
+    assert first.locator(".member").count() >= 3
+    first.locator("input").fill("named together")
+    first.locator("input").press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 1")
+    wait_until(page, "document.querySelectorAll('.proposal').length > 0")
+    some = page.locator(".proposal").first
+    some.locator(".member").nth(0).click()
+    some.locator(".member").nth(1).click()
+    assert some.locator("button[type=submit]").inner_text() == "Name the 2 chosen"
+    some.locator("input").fill("two of them")
+    some.locator("input").press("Enter")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 2")
+    with kineme.ActionLibrary(tmp_path / "unnamed", read_only=True) as library:
+        assert len(library["two of them"].members) == 2
+
+
+def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened, served_letters):
+    page = opened(served_letters, width=390, height=844, has_touch=True, is_mobile=True)
+    box = page.locator("#draw-canvas").bounding_box()
+    client = page.context.new_cdp_session(page)
+    one = letters("GShape")[SHOWN]
+    kept = np.linspace(0, len(one.times) - 1, 50).astype(int)
+    away = (one.positions[kept] - one.positions.min(axis=0)) / np.ptp(one.positions, axis=0).max()
+    points = np.column_stack((box["x"] + 40 + 220 * away[:, 0], box["y"] + 260 - 220 * away[:, 1]))
+    for k, (x, y) in enumerate(points):
+        kind = "touchMove" if k else "touchStart"
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y}]})
+        page.wait_for_timeout(20)
+    client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    wait_until(page, ANSWERED)
+    assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+    assert page.evaluate("window.scrollY") == 0
+    assert page.evaluate("document.activeElement.id") != "naming-name"
+
+
+def test_the_program_that_the_page_shows_sends_samples(opened, served_letters, capsys):
+    page = opened(served_letters)
+    program = page.locator("#live-source-text pre").first.text_content()
+    made: dict[str, object] = {}
+    exec(program, made)
+    samples = letters("Sine")[SHOWN].positions[::20].tolist()
+    thread = Thread(target=lambda: asyncio.run(made["main"](served_letters.token, samples)))
+    thread.start()  # a loop of its own: the browser's runs here
+    thread.join(30)
+    assert "'answer':" in capsys.readouterr().out
+
+
+def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
+    page = opened(studio(make_letters(tmp_path / "letters", shown=2)))
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "tab-draw"
+    for _ in range(10):
+        if page.evaluate("document.activeElement.id") == "draw-canvas":
+            break
+        page.keyboard.press("Tab")
+    page.keyboard.press(" ")
+    for key in ("ArrowRight", "ArrowDown", "ArrowLeft"):
+        page.keyboard.down(key)
+        page.wait_for_timeout(350)
+        page.keyboard.up(key)
+    page.keyboard.press(" ")
+    wait_until(page, "document.activeElement.id === 'naming-name'")
+    page.keyboard.type("hook")
+    page.keyboard.press("Enter")
+    wait_for_text(page, "#verdict", "hook")
+    page.keyboard.press("2")
+    wait_until(page, "document.querySelectorAll('.card-open').length === 5")
+    assert page.evaluate("document.activeElement.id") == "tab-library"
+    page.keyboard.press("ArrowRight")
+    assert page.is_visible("#view-move")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    before = page.get_attribute(".handle.goal", "aria-label")
+    for _ in range(20):
+        page.keyboard.press("Tab")
+        if "goal" in (page.evaluate("document.activeElement.className") or ""):
+            break
+    page.keyboard.press("Shift+ArrowRight")
+    assert page.get_attribute(".handle.goal", "aria-label") != before
+    page.keyboard.press("?")
+    assert page.is_visible("#keys")
+    page.keyboard.press("Escape")
+    assert not page.is_visible("#keys")
+
+
+def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, tmp_path):
+    rows, at, end = [], 0.0, np.zeros(2)
+    for shape in ("GShape", "Sine"):
+        one = letters(shape)[SHOWN]
+        kept = np.linspace(0, len(one.times) - 1, 200).astype(int)
+        positions = one.positions[kept] - one.positions[0] + end
+        times = one.times[kept] - one.times[0] + at
+        rest = np.arange(times[-1] + 0.02, times[-1] + 0.7, 0.02)
+        end, at = positions[-1], rest[-1] + 0.02
+        rows += [*zip(times, *positions.T, strict=True), *((t, *end) for t in rest)]
+    path = tmp_path / "two letters <b>.csv"
+    path.write_text("time,x,y\n" + "".join(f"{t:.4f},{x:.4f},{y:.4f}\n" for t, x, y in rows))
+    running = studio(make_letters(tmp_path / "letters"))
+    if "recordings" not in views_of(running):
+        pytest.skip("this server reads no recordings")
+    page = opened(running, "recordings")
+    page.set_input_files("#file", path)
+    wait_for_text(page, "#recording-name", path.name)
+    page.click("#spot")
+    wait_until(page, "document.querySelectorAll('#spans tbody tr').length >= 2", seconds=60)
+    named = [page.input_value(f"#spans tbody tr:nth-child({k}) input[type=text]") for k in (1, 2)]
+    assert set(named) <= {"GShape", "Sine", ""}
+    page.fill("#spans tbody tr:nth-child(1) input[type=text]", "from a file")
+    page.locator("#spans tbody tr:nth-child(1) input[type=text]").press("Tab")
+    page.locator("[data-key='edge end']").press("ArrowLeft")
+    before = float(page.input_value("#spans tbody tr:nth-child(1) td:nth-child(2) input"))
+    page.locator("[data-key='edge end']").press("Shift+ArrowLeft")
+    assert float(page.input_value("#spans tbody tr:nth-child(1) td:nth-child(2) input")) < before
+    page.click("#learn-spans")
+    wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'from a file')")
+    with kineme.ActionLibrary(tmp_path / "letters", read_only=True) as library:
+        assert len(library["from a file"].members) == 1
+
+
+def test_the_server_may_be_killed_and_comes_back(opened, studio, tmp_path):
+    folder = make_letters(tmp_path / "letters", shown=2)
+    running = studio(folder)
+    gone = ("net::ERR_CONNECTION", "WebSocket connection")
+    page = opened(running, tolerated=gone)
+    port = running.address.rpartition(":")[2]
+    running.end(signal.SIGKILL)
+    wait_until(page, "!document.getElementById('away-note').hidden")
+    draw(page, letters("GShape")[SHOWN])
+    studio(folder, "--port", port)
+    wait_until(page, "document.getElementById('away-note').hidden")
+    draw(page, letters("GShape")[SHOWN])
+    wait_until(page, ANSWERED)
+    assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_view_fits_its_window(opened, served_letters, width, scheme):
+    page = opened(served_letters, width=width, color_scheme=scheme, reduced_motion="reduce")
+    for view in views_of(served_letters):
+        page.evaluate("view => { location.hash = view; }", view)
+        wait_until(page, "view => !document.getElementById(`view-${view}`).hidden", view)
+        page.wait_for_timeout(250)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, view
+        small = page.evaluate(
+            """() => [...document.querySelectorAll("button, select, input[type=text], input[type=number]")]
+            .filter((one) => one.checkVisibility() && one.getBoundingClientRect().width && !one.closest(".away"))
+            .filter((one) => Math.min(one.getBoundingClientRect().height, one.getBoundingClientRect().width) < 24)
+            .map((one) => one.outerHTML.slice(0, 80))"""
+        )
+        assert small == [], view
+
+
+def test_drawing_does_not_move_anything_else(opened, served_letters):
+    """No jumping layout: what stands beside the drawing stays where it is, whatever is said."""
+    page = opened(served_letters)
+    where = """() => ["ranks", "naming", "draw-canvas", "draw-clear"].map((id) => {
+        const b = document.getElementById(id).getBoundingClientRect(); return [id, b.x, b.y, b.width, b.height]; })"""
+    before = page.evaluate(where)
+    draw(page, letters("Sine")[SHOWN], share=0.6)
+    assert page.evaluate(where) == before
+    page.mouse.up()
+    wait_until(page, "document.getElementById('verdict').textContent !== '…'")
+    assert page.evaluate(where) == before
+
+
+def test_movements_in_space_turn(opened, studio, tmp_path):
+    t = np.linspace(0, 2, 80)
+    shapes = [np.column_stack((np.cos(k * t), np.sin(2 * t), 0.4 * t)) for k in (1, 2, 3)]
+    with kineme.ActionLibrary(tmp_path / "space", create=True) as library:
+        for k, shape in enumerate(shapes):
+            library.learn([kineme.Trajectory(t, shape), kineme.Trajectory(t, 1.1 * shape)], [f"in space {k}"] * 2)
+    page = opened(studio(tmp_path / "space"))
+    assert page.inner_text("#draw-empty-title") == "Movements in space"
+    assert "additional_headers" in page.inner_text("#live-source-text")
+    page.keyboard.press("3")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    before = center(page, ".handle.goal")
+    page.locator("#move-canvas").press("ArrowLeft")
+    assert center(page, ".handle.goal") != before
+
+
+def test_no_rule_of_accessibility_is_broken(opened, studio, tmp_path):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+    running = studio(make_letters(tmp_path / "letters", shown=2))
+    page = opened(running, reduced_motion="reduce")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        for view in views_of(running):
+            page.evaluate("view => { location.hash = view; }", view)
+            page.wait_for_timeout(400)
+            found = axe.Axe().run(page).response["violations"]
+            assert [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in found] == [], view
+
+
+def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters):
+    page = opened(served_letters, "move")
+    wait_until(page, "!document.getElementById('styles').hidden", seconds=40)
+    with page.expect_response("**/api/rollout"):
+        page.locator("#styles input[type=checkbox]").check()
+    with page.expect_response("**/api/rollout") as answered:
+        page.locator("#styles input[type=range]").first.press("ArrowRight")
+    asked = answered.value.request.post_data_json
+    assert asked["what"]["style"]["values"][0] != 0
+    assert answered.value.ok
+
+
+def test_an_arm_executes_a_letter(opened, served_letters):
+    pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+    if "robot" not in views_of(served_letters):
+        pytest.skip("this server moves no arms")
+    page = opened(served_letters, "robot")
+    wait_until(page, "!document.getElementById('robot-main').hidden || !document.getElementById('robot-empty').hidden")
+    page.click("#robot-go")
+    wait_until(page, "document.getElementById('robot-verdict').dataset.state !== ''", seconds=60)
+    assert page.locator("#robot-checks tr").count() > 5
+    frame = page.frame_locator(".arm-frame")
+    frame.locator(".chart").first.wait_for()
+    frame.locator("#play").click()
+    assert frame.locator(".chart .limit").count() > 0
