@@ -45,6 +45,14 @@ def test_paths_of_bags_and_data_sets_may_be_texts(trajectory, tmp_path):
     assert write_lerobot(f"{tmp_path}/set", trajectory, "task") == 0
 
 
+def test_the_trajectory_of_a_bag_is_sent_at_its_beginning_and_states_at_their_times(trajectory, tmp_path):
+    rosbags = pytest.importorskip("rosbags.highlevel", reason="the extra ros is not installed")
+    with rosbags.AnyReader([write_bag(tmp_path / "plan.bag", trajectory)]) as bag:
+        sent = [(connection.msgtype, stamp) for connection, stamp, _ in bag.messages()]
+    assert sent[0] == ("trajectory_msgs/msg/JointTrajectory", 0)
+    assert [stamp for kind, stamp in sent[1:]] == [0, 10**9, 2 * 10**9, 3 * 10**9]
+
+
 def test_frames_without_end_are_refused_before_they_fill_the_memory(trajectory, tmp_path):
     with pytest.raises(SpecificationError, match=r"fps to be a number .* 10000, got 1000000000000"):
         write_lerobot(tmp_path / "set", trajectory, "task", 10**12)
