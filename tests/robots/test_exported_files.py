@@ -16,7 +16,7 @@ from kineme.robots import JointTrajectory, load, move, write_action_goal, write_
 @pytest.fixture
 def trajectory():
     q = np.array([[0.0, 1e-05], [1e16, -2e-07], [5e-324, 0.1], [-0.0, 123456789.0]])
-    return JointTrajectory(("a 1e-05", "b"), np.arange(4.0), q, 0 * q, 0 * q, {})
+    return JointTrajectory(("a 1e-05", "b"), np.arange(4.0), q, q + 1, q - 2, {})
 
 
 _YAML_FLOAT = re.compile(r"[-+]?[0-9]+\.[0-9]*([eE][-+][0-9]+)?")  # of YAML 1.1, as PyYAML and so ROS 2 read it
@@ -26,7 +26,9 @@ def test_numbers_of_a_goal_are_numbers_in_yaml_of_version_1_1_too(trajectory, tm
     text = write_action_goal(tmp_path / "goal.yaml", trajectory).read_text()
     goal = json.loads(text)["trajectory"]
     assert goal["joint_names"] == ["a 1e-05", "b"]
-    np.testing.assert_array_equal([point["positions"] for point in goal["points"]], trajectory.positions)
+    for name in ("positions", "velocities", "accelerations"):
+        np.testing.assert_array_equal([point[name] for point in goal["points"]], getattr(trajectory, name))
+    assert [point["time_from_start"] for point in goal["points"]] == [{"sec": k, "nanosec": 0} for k in range(4)]
     written = re.findall(r'"positions": \[(.*?)\]', text)
     assert len(written) == 4
     assert all(_YAML_FLOAT.fullmatch(number) for row in written for number in row.split(", "))
