@@ -37,6 +37,11 @@ def test_numbers_of_a_goal_are_numbers_in_yaml_of_version_1_1_too(trajectory, tm
 def test_paths_may_be_texts(trajectory, tmp_path):
     assert write_joints(f"{tmp_path}/joints.csv", trajectory).is_file()
     assert write_action_goal(f"{tmp_path}/goal.json", trajectory).is_file()
+    text = (tmp_path / "joints.csv").read_text().splitlines()
+    assert text[0] == "time,a 1e-05,b,v_a 1e-05,v_b,a_a 1e-05,a_b"
+    t = trajectory
+    columns = np.column_stack((t.times, t.positions, t.velocities, t.accelerations))
+    np.testing.assert_array_equal(np.array([line.split(",") for line in text[1:]], dtype=float), columns)
 
 
 def test_paths_of_bags_and_data_sets_may_be_texts(trajectory, tmp_path):
