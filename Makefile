@@ -124,7 +124,7 @@ lock:
 	uv pip compile pyproject.toml --group lowest --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
 	uv pip compile requirements/ros2.in --universal --python-version 3.11 --no-emit-package empy --generate-hashes --no-annotate --no-emit-index-url --no-header --quiet -o requirements/ros2.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
-	uv pip compile bench/peers.in pyproject.toml --extra parquet --extra ros --extra robot -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
+	uv pip compile bench/peers.in pyproject.toml --extra parquet --extra ros --extra robot --extra studio -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:

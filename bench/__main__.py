@@ -34,6 +34,7 @@ SUBJECTS = (
     "anchoring",
     "annotate",
     "page",
+    "studio",
     "by_person",
     "nested",
 )

@@ -63,6 +63,7 @@ from kineme.orientation import PoseDMP, continuous, from_tangent, normalized, to
 from kineme.primitives.discrete.basis import GATINGS
 from kineme.primitives.discrete.fits import FITS
 from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.primitives.modulation.laid_out import laid_out, laid_out_poses
 from kineme.recognition.answer import Answer
 from kineme.recognition.early.early import cut
 
@@ -495,6 +496,39 @@ def posed(demos: Demonstrations, rollout: Any) -> list[dict[str, Any]]:
     )
 
 
+def parts_in_a_row(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Each after itself."""
+    primitives = DMP(n_basis=20).learn(demos)
+    start, tau = demos.positions[demos.offsets[:-1]], demos.durations[:, None]
+    return each(
+        len(demos),
+        **{
+            f"{name} {i}": value
+            for i, part in enumerate(laid_out([primitives, primitives], shift=True))
+            for name, value in (
+                ("path", by_extent(demos, part.positions - start[:, None])),
+                ("begin", by_extent(demos, part.begin_velocities) * tau),
+                ("end", by_extent(demos, part.end_velocities) * tau),
+            )
+        },
+    )
+
+
+def poses_in_a_row(demos: Demonstrations) -> list[dict[str, Any]]:
+    """Each alone: what comes after it may turn past a full turn. Orientations are apart from positions."""
+    primitives = PoseDMP(DMP(n_basis=20)).learn(demos)
+    laid, references = laid_out_poses([primitives], shift=False)
+    start, unit = demos.positions[demos.offsets[:-1], None, :3], pose_extents(demos)[:, None, None]
+    return each(
+        len(demos),
+        references=references * np.sign(references[:, :1]),
+        **{f"path {i}": (part.positions[:, :, :3] - start) / unit for i, part in enumerate(laid)},
+        **{f"vectors {i}": part.positions[:, :, 3:] for i, part in enumerate(laid)},
+        turning=laid[0].begin_velocities[:, 3:] * demos.durations[:, None],
+        turned=laid[0].end_velocities[:, 3:] * demos.durations[:, None],
+    )
+
+
 def recorded_numbers(demos: Demonstrations) -> list[dict[str, Any]]:
     """What a recording of the replayed poses would be, with a gripper that steps; positions in extents of their own."""
     elapsed = demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
@@ -599,6 +633,8 @@ TABLE = [
     Batched("Primitives.rollout via", modulated, 1e-8),
     Batched("Primitives.rollout via stretch", along_stretches, 1e-8),
     Batched("couple", coupled, 1e-8),
+    Batched("laid_out", parts_in_a_row, 1e-8, alone=6),
+    Batched("laid_out_poses", poses_in_a_row, 1e-6, draw=poses, alone=6),
     Batched("Primitives.rollout goal_velocity", to_moving_goals, 1e-8),
     Batched("Primitives.concatenate", concatenated, 1e-8),
     Batched("Primitives.save", saved, 1e-8),

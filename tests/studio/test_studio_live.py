@@ -113,6 +113,16 @@ def test_samples_that_do_not_fit_are_skipped_and_counted(client):
         assert _said(socket, "answer")["ranked"]
 
 
+def test_samples_of_other_widths_behind_each_other_are_taken_in_one_by_one(client):
+    with client.websocket_connect(LIVE) as socket:
+        rows = samples(0)
+        for k in range(0, 60, 6):  # faster than they are answered: some wait together
+            socket.send_json({"samples": rows[k : k + 6]})
+            socket.send_json({"samples": [[*row, 0.0] for row in rows[k : k + 6]]})
+        socket.send_json({"finish": True})
+        assert _said(socket, "answer")["ranked"][0]["name"] == "kind 0"
+
+
 def test_too_little_to_answer_is_said(client):
     with client.websocket_connect(LIVE) as socket:
         socket.send_json({"samples": [[0, 0, 0], [0.1, 1, 1]]})

@@ -67,6 +67,10 @@ def stepped(one):
 def joined(one):
     part = getattr(one, "primitive", one)
     kineme.join([part, part], shift=True)
+
+
+def blended(one):
+    part = getattr(one, "primitive", one)
     kineme.blend(part, part, (0.4, 0.6))
 
 
@@ -83,7 +87,8 @@ ASKED = {
     "`rollout(position_limits=...)`": lambda one: one.rollout(position_limits=(-9.0, 9.0)),
     "`controller(via=...)`": controlled,
     "`least_duration`": fastest,
-    "`join`, `blend`": joined,
+    "`join`": joined,
+    "`blend`": blended,
     "`couple`": lambda one: kineme.couple(one, one, during=(0.4, 0.6)),
 }
 

@@ -52,7 +52,8 @@ def blend(first: Primitives | Rollout, second: Primitives | Rollout, stretch: tu
     times = np.concatenate((np.zeros((len(path), 1)), np.cumsum(steps, axis=1)), axis=1)
     shares = times / times[:, -1:]
     switch = _at_phase(shares, 0.5 * (begin + end))
-    return carried_over(refitted(dmp, path, times, laid[0], laid[1]), movements, [shares, shares], switch[None])
+    ends = (laid[0].velocities[:, 0], laid[1].positions[:, -1], laid[1].velocities[:, -1])
+    return carried_over(refitted(dmp, path, times, ends), movements, [shares, shares], switch[None])
 
 
 def _at_phase(shares: Array, u: float) -> Array:

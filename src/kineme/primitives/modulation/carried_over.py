@@ -9,18 +9,21 @@ import numpy as np
 
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete_steps import DiscreteSteps
+from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.primitives.recorded_as import RecordedAs, merged
 from kineme.validation import Array
 
 
-def carried_over(made: Primitives, parts: Sequence[Primitives], when: Sequence[Array], switches: Array) -> Primitives:
+def carried_over(
+    made: Primitives, parts: Sequence[Primitives | PosePrimitives], when: Sequence[Array], switches: Array
+) -> Primitives:
     """The movements with the labels and names that all their parts have in common, and with their channels.
 
     Parameters
     ----------
     made : Primitives
         n movements.
-    parts : sequence of Primitives
+    parts : sequence of Primitives or PosePrimitives
         The p parts, each of n movements.
     when : sequence of ndarray of shape (n, 2 or more)
         Of each part, at even shares of its duration: when that is, as a share of the duration of the whole.

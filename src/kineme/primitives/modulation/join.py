@@ -12,6 +12,8 @@ velocity and acceleration at each transition, by an exact solve, bends them by 6
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
@@ -19,14 +21,26 @@ from kineme.errors import SpecificationError
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.modulation.carried_over import carried_over
+from kineme.primitives.modulation.laid_out import laid_out, laid_out_poses
 from kineme.primitives.modulation.parts import moving
 from kineme.primitives.modulation.refit import fitting_specification, refitted, smooth_rise
+from kineme.primitives.pose.pose_primitives import PosePrimitives
+from kineme.primitives.pose.pose_rollout import PoseRollout
 from kineme.validation import Array, check_number
 
-_SAMPLES = 2_000  # of each part, between which a straight line is 1e-6 of the extent off
 
-
-def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap: float = 0.0) -> Primitives:
+@overload
+def join(parts: Sequence[Primitives | Rollout], *, shift: bool = ..., overlap: float = ...) -> Primitives: ...
+@overload
+def join(
+    parts: Sequence[PosePrimitives | PoseRollout], *, shift: bool = ..., overlap: float = ...
+) -> PosePrimitives: ...
+def join(
+    parts: Sequence[Primitives | Rollout] | Sequence[PosePrimitives | PoseRollout],
+    *,
+    shift: bool = False,
+    overlap: float = 0.0,
+) -> Primitives | PosePrimitives:
     """One movement out of several, one after another; smooth in velocity and acceleration.
 
     Each part begins where the one before it ends, and goes on to its own goal, or as far as it was shown to go
@@ -36,17 +50,18 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
 
     Parameters
     ----------
-    parts : sequence of Primitives or Rollout
+    parts : sequence of Primitives or Rollout, or of PosePrimitives or PoseRollout
         Of one movement each, or some of them of n: then n movements come out.
     shift : bool, default False
-        Move each part to where the one before it ends, goal and all; else its goal stays where it was.
+        Move each part to where the one before it ends, goal and all; else its goal stays where it was. Orientations are
+        turned as a tool that is mounted otherwise: angular velocities stay.
     overlap : float, default 0.0
         Time [s] for which two neighbors go on together: the end of one fades into the beginning of the next, which
         begins that much earlier. It cuts the corner instead of slowing down in it.
 
     Returns
     -------
-    Primitives
+    Primitives, or PosePrimitives of poses
         With the specification of the first part, ``fit="trajectory"``, and as many basis functions per second as
         that part which has most; the movements of a batch share one specification, so all have as many as the one that
         needs most. Labels and names are kept where they are those of all parts, channels if all were recorded as the
@@ -56,22 +71,20 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     ------
     TrajectoryError
         No part, something else than primitives and rollouts, different dimensions or numbers of movements; channels
-        that are known to differ, as joint angles and positions.
+        that are known to differ, as joint angles and positions; orientations farther than a full turn from the last.
     SpecificationError
         An overlap that is negative or longer than half a part; more than 2,000 basis functions.
     """
-    movements = moving(parts)
+    movements = moving(parts, poses=True)
     durations = np.stack([one.durations for one in movements])  # (parts, n)
     check_number("overlap", overlap, least=0.0)
     if len(movements) > 1 and overlap > 0.5 * durations.min():
         raise SpecificationError(
             f"expected overlap of at most half the shortest part, {0.5 * durations.min():.3g} s, got {overlap:g} s"
         )
-    laid: list[Rollout] = []
-    for one in movements:
-        start = laid[-1].positions[:, -1] if laid else one.starts
-        goal = one.goals + (start - one.starts) if shift else one.goals
-        laid.append(one.rollout(start, goal, n_samples=_SAMPLES))
+    plain = [one for one in movements if isinstance(one, Primitives)]
+    turning = [one for one in movements if isinstance(one, PosePrimitives)]
+    laid, references = laid_out_poses(turning, shift) if turning else (laid_out(plain, shift), None)
     begins = np.vstack((np.zeros(durations.shape[1]), np.cumsum(durations[:-1] - overlap, axis=0)))
     total = begins[-1] + durations[-1]
     dmp = fitting_specification(
@@ -80,17 +93,18 @@ def join(parts: Sequence[Primitives | Rollout], *, shift: bool = False, overlap:
     times = total[:, None] * np.linspace(0.0, 1.0, dmp.n_points)
     rises = [smooth_rise(times - begin[:, None], overlap) for begin in begins[1:]]
     shares = [a - b for a, b in zip([np.ones_like(times), *rises], [*rises, np.zeros_like(times)], strict=True)]
-    path = np.zeros((*times.shape, movements[0].n_dims))
+    path = np.zeros((*times.shape, laid[0].positions.shape[2]))
     for part, begin, share in zip(laid, begins, shares, strict=True):
-        path += share[:, :, None] * _at(part, (times - begin[:, None]) / part.durations[:, None])
+        path += share[:, :, None] * _at(part.positions, (times - begin[:, None]) / part.durations[:, None])
     when = [np.column_stack((a, a + b)) / total[:, None] for a, b in zip(begins, durations, strict=True)]
-    made = refitted(dmp, path, times, laid[0], laid[-1])
-    return carried_over(made, movements, when, begins[1:] / total)
+    ends = (laid[0].begin_velocities, laid[-1].positions[:, -1], laid[-1].end_velocities)
+    made = carried_over(refitted(dmp, path, times, ends), movements, when, begins[1:] / total)
+    return made if references is None else PosePrimitives(replace(made, recorded_as=None), references, made.recorded_as)
 
 
-def _at(movement: Rollout, u: Array) -> Array:
-    """Positions (n, T, d) at normalized times (n, T), of each movement its own."""
-    place = np.clip(u, 0.0, 1.0) * (movement.n_samples - 1)
-    before = np.minimum(place.astype(np.intp), movement.n_samples - 2)[:, :, None]
-    x, share = movement.positions, place[:, :, None] - before
+def _at(x: Array, u: Array) -> Array:
+    """Positions (n, T, d) at normalized times (n, T), of each movement its own, from even samples (n, S, d)."""
+    place = np.clip(u, 0.0, 1.0) * (x.shape[1] - 1)
+    before = np.minimum(place.astype(np.intp), x.shape[1] - 2)[:, :, None]
+    share = place[:, :, None] - before
     return np.asarray((1.0 - share) * np.take_along_axis(x, before, 1) + share * np.take_along_axis(x, before + 1, 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, overload
 
 import numpy as np
 
@@ -10,26 +11,41 @@ from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.channels.alike import check_alike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.rollout import Rollout
+from kineme.primitives.pose.pose_primitives import PosePrimitives
+from kineme.primitives.pose.pose_rollout import PoseRollout
 
+_OF_POSES = "; poses are joined with poses, and neither blended nor coupled: learn their positions alone"
 #: What to do with parts that are none.
 _REMEDIES = {
     "AveragePrimitive": "; pass its primitive, or what it does: average.rollout(via=...)",
     "RhythmicPrimitives": "; a rhythm has no end: record or generate as much of it as is to be moved, and learn that",
-    "PosePrimitives": "; orientations are not added: join or blend positions, or learn what several rollouts make",
-    "PoseRollout": "; orientations are not added: join or blend positions, or learn what several rollouts make",
+    "PosePrimitives": _OF_POSES,
+    "PoseRollout": _OF_POSES,
     "RhythmicRollout": "; a rhythm has no end: learn what was generated, kineme.DMP().learn(rollout)",
 }
 
 
-def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]:
-    """All parts as primitives of the same number of movements."""
-    if isinstance(parts, (Primitives, Rollout)) or not isinstance(parts, Sequence) or not len(parts):
+@overload
+def moving(parts: Sequence[Primitives | Rollout]) -> list[Primitives]: ...
+@overload
+def moving(parts: Sequence[Any], poses: bool) -> list[Primitives] | list[PosePrimitives]: ...
+def moving(parts: Sequence[Any], poses: bool = False) -> list[Primitives] | list[PosePrimitives]:
+    """All parts as primitives of the same number of movements; all of poses where that is possible and the first is."""
+    if (
+        isinstance(parts, (Primitives, Rollout, PosePrimitives, PoseRollout))
+        or not isinstance(parts, Sequence)
+        or not len(parts)
+    ):
         raise TrajectoryError(f"expected several movements, as [reach, pour], got {parts!r}")
+    poses = poses and isinstance(parts[0], (PosePrimitives, PoseRollout))
+    expected = (PosePrimitives, PoseRollout) if poses else (Primitives, Rollout)
     for i, one in enumerate(parts):
-        if not isinstance(one, (Primitives, Rollout)):
+        if not isinstance(one, expected):
             what, remedy = type(one).__name__, _REMEDIES.get(type(one).__name__, "")
-            raise TrajectoryError(f"expected Primitives or Rollout as part {i}, got {what}{remedy}")
-    moving = [one if isinstance(one, Primitives) else Primitives.from_rollout(one) for one in parts]
+            names = " or ".join(known.__name__ for known in expected)
+            raise TrajectoryError(f"expected {names} as part {i}, got {what}{remedy}")
+    own: Any = PosePrimitives if poses else Primitives
+    moving: Any = [one if isinstance(one, own) else own.from_rollout(one) for one in parts]
     n = max(len(one) for one in moving)
     for i, one in enumerate(moving):
         if one.n_dims != moving[0].n_dims:

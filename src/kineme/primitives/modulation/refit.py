@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +14,13 @@ from kineme.primitives.condition import condition
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.fits import trajectory_columns
 from kineme.primitives.discrete.operators import decoder
-from kineme.primitives.discrete.rollout import Rollout
+from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.validation import Array
 
 _PER_BASIS = 5  # samples of the whole for each basis function
 
 
-def fitting_specification(parts: list[Primitives], n_basis: float) -> DMP:
+def fitting_specification(parts: Sequence[Primitives | PosePrimitives], n_basis: float) -> DMP:
     """The specification of the first part, with which a path that was generated is fitted as it is.
 
     Raises
@@ -52,14 +53,14 @@ def smooth_rise(passed: Array, length: float) -> Array:
     return np.asarray(z**3 * (10.0 - 15.0 * z + 6.0 * z**2))
 
 
-def refitted(dmp: DMP, path: Array, times: Array, first: Rollout, last: Rollout) -> Primitives:
-    """Learn paths (n, T, d) at times (n, T), under the condition that their ends are exactly those of the parts.
+def refitted(dmp: DMP, path: Array, times: Array, ends: tuple[Array, Array, Array]) -> Primitives:
+    """Learn paths (n, T, d) at times (n, T), under the condition that their ends are exactly those that are given.
 
-    Starts and the velocities there are those of `first`, goals and the velocities there those of `last`.
+    `ends` are the velocities at the start (n, d), the positions at the end, and the velocities there.
     """
     made = dmp.learn(Demonstrations.from_arrays(path, times=list(times)))
     movement = made.rollout(n_samples=2)
-    asked = np.stack((first.velocities[:, 0], last.positions[:, -1], last.velocities[:, -1]), axis=2)
+    asked = np.stack(ends, axis=2)
     reached = np.stack((made.velocities, movement.positions[:, -1], movement.velocities[:, -1]), axis=2)
     errors = (asked - reached) * np.stack((made.durations, np.ones(len(made)), made.durations), axis=1)[:, None]
     change = errors @ _end_gain(dmp)  # (n, d, N + 1)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from kineme.errors import DataError
@@ -148,16 +145,16 @@ class InverseKinematics:
 
     def _advance(self) -> float:
         """One step towards the target of the tip; the largest change of a joint."""
-        change = self._change(self._limits, 0.0)
+        change = self._change()
         if change is None:
             return 0.0
         self._configuration.integrate_inplace(change, 1.0)
         return float(np.abs(change).max())
 
-    def _change(self, limits: Sequence[Any], damping: float) -> Array | None:
+    def _change(self) -> Array | None:
         """The change of the joints (n,) that a step asks for; None without one, as of a pose beyond all numbers."""
         tasks = (self._tip, self._posture)
-        problem = self._program(self._configuration, tasks, 1.0, _DAMPING + damping, limits)
+        problem = self._program(self._configuration, tasks, 1.0, _DAMPING, self._limits)
         found = self._solve(problem, solver="daqp")
         return np.asarray(found.x) if found.found and found.x is not None else None
 

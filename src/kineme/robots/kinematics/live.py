@@ -25,9 +25,9 @@ class LiveKinematics(InverseKinematics):
     """Follows a pose that moves, within limits of position, velocity and acceleration of the joints.
 
     A step asks for the pose's own motion since the last step, and for that part of the gap to it which the joints can
-    still brake at its end. The quadratic program of `InverseKinematics` is solved within the velocities of `Braking`.
-    Far from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of
-    reach comes to rest.
+    still brake at its end. The least squares of `InverseKinematics` are solved within the velocities of `Braking`. Far
+    from the pose the step is damped in proportion to the distance, so that an arm stretched towards a pose out of reach
+    comes to rest.
 
     Parameters
     ----------
@@ -45,8 +45,10 @@ class LiveKinematics(InverseKinematics):
 
     def __init__(self, robot: Robot, orientation: str, time_step: float) -> None:
         self._braking, self._dt = Braking(robot, time_step), time_step
-        self._box = _Box(robot.n_joints)
         super().__init__(robot, orientation)
+        from qpsolvers import Problem
+
+        self._problem = Problem
         self._weights = np.concatenate((np.ones(3), self.costs))
         self._still = np.zeros(robot.n_joints)
         self._turns = np.zeros(3) if is_partial(robot) else self.costs
@@ -80,10 +82,8 @@ class LiveKinematics(InverseKinematics):
     def step(self, position: Array, rotation: Array) -> Array:
         """Follow the pose to where it is after one more step of time; joint positions (n,) then."""
         last, self._wanted, self._before = self._wanted, self._pose(rotation, position), self.velocities
-        damping = self._set_targets(last)
         self._allowed = self._braking.range(self._configuration.q, self._before)
-        self._box.bound(self._allowed, self._dt)
-        change = self._change((self._box,), damping)
+        change = self._within(self._allowed, *self._asked(last))
         # The solver keeps limits to 1e-6 only; where it finds nothing, the joints brake.
         self.velocities = self._allowed.nearest(self._still if change is None else change / self._dt)
         self.accelerations = (self.velocities - self._before) / self._dt
@@ -92,29 +92,29 @@ class LiveKinematics(InverseKinematics):
         self._at = self._configuration.get_transform_frame_to_world(self.robot.tip)
         return self.q
 
-    def _set_targets(self, last: Any) -> float:
-        """What this step asks of tip and posture; the damping it needs."""
+    def _asked(self, last: Any) -> tuple[Array, Array]:
+        """What this step asks of the joints: ``|A dq|^2 / 2 - b dq`` is least, as `A' A` (n, n) and b (n,)."""
         at, wanted, q = self._at, self._wanted, self._configuration.q
         back = at.rotation.T
         away, turn = _bounded(last.translation - at.translation), self._log(back @ last.rotation)
         gap = self._weights * np.concatenate((back @ away, turn))
         distance = math.hypot(*gap)
-        damping = _CURVED * distance * distance / (distance + _NEAR)
-        to_rest = self.robot.rest - q
-        closing = self._closing(gap, damping) if distance > _CLOSED else self._still
-        share, share_to_rest = self._shares(np.array((closing, to_rest)))
-        moved = _bounded(wanted.translation - last.translation)
-        rotation = at.rotation @ self._exp(share * turn) @ (last.rotation.T @ wanted.rotation)
-        self._tip.set_target(self._pose(rotation, at.translation + share * away + moved))
-        self._posture.set_target(q + share_to_rest * to_rest)
-        return damping
-
-    def _closing(self, gap: Array, damping: float) -> Array:
-        """The change of the joints (n,) that closes a weighted gap (6,) to first order."""
         J = self._weights[:, None] * self._configuration.get_frame_jacobian(self.robot.tip)
         curvature = J.T @ J
-        curvature.flat[:: len(curvature) + 1] += damping + POSTURE_COST**2
-        return np.asarray(np.linalg.solve(curvature, J.T @ gap))
+        curvature.flat[:: len(q) + 1] += _CURVED * distance * distance / (distance + _NEAR) + POSTURE_COST**2
+        to_rest = self.robot.rest - q
+        closing = np.linalg.solve(curvature, J.T @ gap) if distance > _CLOSED else self._still
+        share, share_to_rest = self._shares(np.array((closing, to_rest)))
+        moved = back @ (share * away + _bounded(wanted.translation - last.translation))
+        turned = self._log(self._exp(share * turn) @ (last.rotation.T @ wanted.rotation))
+        way = self._weights * np.concatenate((moved, turned))
+        return curvature, J.T @ way + POSTURE_COST**2 * share_to_rest * to_rest
+
+    def _within(self, allowed: Range, curvature: Array, slope: Array) -> Array | None:
+        """The change of the joints (n,) that a step asks for, within a range of velocities."""
+        problem = self._problem(curvature, -slope, lb=allowed.least * self._dt, ub=allowed.most * self._dt)
+        found = self._solve(problem, solver="daqp")
+        return np.asarray(found.x) if found.found and found.x is not None else None
 
     def _shares(self, changes: Array) -> Array:
         """How much of changes of the joints (m, n) one step may take so that it can be braked where they end."""
@@ -122,21 +122,6 @@ class LiveKinematics(InverseKinematics):
         fastest = brakeable(sizes, _SHARE * self._braking.change, self._dt)
         ways = np.minimum(fastest, self.robot.velocity) * self._dt
         return np.minimum((ways / np.maximum(sizes, _TINY)).min(axis=1), 1.0)
-
-
-class _Box:
-    """Bounds of a step, as pink asks for them."""
-
-    def __init__(self, n_joints: int) -> None:
-        self._sides = np.vstack((np.eye(n_joints), -np.eye(n_joints)))
-        self._ends = np.zeros(2 * n_joints)
-
-    def bound(self, allowed: Range, dt: float) -> None:
-        self._ends = dt * np.concatenate((allowed.most, -allowed.least))
-
-    def compute_qp_inequalities(self, _: object, __: float) -> tuple[Array, Array]:
-        """G and h of ``G dq <= h``."""
-        return self._sides, self._ends
 
 
 def _bounded(way: Array) -> Array:

@@ -17,6 +17,8 @@ from kineme.studio.server import (
     live_socket,
     proposal_routes,
     recognize_routes,
+    recording_routes,
+    robot_routes,
     rollout_routes,
 )
 from kineme.studio.server.access import Guard
@@ -34,6 +36,8 @@ ROUTERS = (
     recognize_routes.router,
     rollout_routes.router,
     proposal_routes.router,
+    recording_routes.router,
+    robot_routes.router,
     live_socket.router,
 )
 

@@ -13,15 +13,19 @@ Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]
 Points = list[list[float | None]]
 
 
-class _Request(BaseModel):
+class Sent(BaseModel):
+    """What a client sends: nothing but the fields that are known."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class _Change(_Request):
+class Change(Sent):
+    """What a change may say beside what it is."""
+
     version: int | None = Field(None, description="The version that the client has seen; 409 if what is named is gone.")
 
 
-class NewMovement(_Change):
+class NewMovement(Change):
     """A movement to be stored."""
 
     times: Point
@@ -30,50 +34,50 @@ class NewMovement(_Change):
     group: Name | None = Field(None, description="Who showed it.")
 
 
-class Rename(_Change):
+class Rename(Change):
     """A new name of a symbol."""
 
     name: Name
 
 
-class Describe(_Change):
+class Describe(Change):
     """A description of a symbol."""
 
     text: str = Field(max_length=1_000_000)
 
 
-class Split(_Change):
+class Split(Change):
     """Members of a symbol that become a new one."""
 
     ids: Ids
     name: Name
 
 
-class Merge(_Change):
+class Merge(Change):
     """Symbols that become one."""
 
     ids: list[str] = Field(min_length=1, max_length=10_000)
     into: Name
 
 
-class Assign(_Change):
+class Assign(Change):
     """Movements, and the symbol that they belong to from now on; none if null."""
 
     ids: Ids
     symbol: Name | None
 
 
-class Chosen(_Change):
+class Chosen(Change):
     """Movements."""
 
     ids: Ids
 
 
-class AsOf(_Change):
+class AsOf(Change):
     """The version that the client has seen, if it matters."""
 
 
-class Asked(_Request):
+class Asked(Sent):
     """A movement to be recognized."""
 
     times: Point
@@ -81,14 +85,14 @@ class Asked(_Request):
     error_rate: Number = Field(0.05, gt=0, lt=1)
 
 
-class Style(_Request):
+class Style(Sent):
     """A symbol with values of the directions in which its members differ."""
 
     symbol: str
     values: list[Number] = Field(min_length=1, max_length=100)
 
 
-class What(_Request):
+class What(Sent):
     """What moves: the prototype of a symbol, a stored movement, or a style of a symbol; one of the three."""
 
     symbol: str | None = None
@@ -102,14 +106,14 @@ class What(_Request):
         return self
 
 
-class Obstacle(_Request):
+class Obstacle(Sent):
     """A ball to pass by."""
 
     center: Point
     radius: Number = Field(0.0, ge=0)
 
 
-class Operated(_Request):
+class Operated(Sent):
     """A movement as a sum over start and goal."""
 
     what: What
@@ -182,7 +186,7 @@ class ProposalsOut(BaseModel):
     left_over: int
 
 
-class Named(_Change):
+class Named(Change):
     """A name for a proposal."""
 
     name: Name

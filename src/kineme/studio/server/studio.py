@@ -16,6 +16,7 @@ from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.studio.server.refusals import ConflictError, MissingError
+from kineme.studio.server.uploads import Uploads
 
 Made = TypeVar("Made")
 
@@ -44,6 +45,7 @@ class Studio:
     def __init__(self, folder: Path, read_only: bool = False) -> None:
         self.read_only = read_only
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
+        self.uploads = Uploads()
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
@@ -53,6 +55,7 @@ class Studio:
         """Close the library, once what runs has ended."""
         self.live.shutdown(wait=False, cancel_futures=True)
         self.library.close()
+        self.uploads.close()
 
     def shown(self) -> Shown:
         """The symbols as they are now."""

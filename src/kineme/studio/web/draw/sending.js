@@ -7,8 +7,8 @@ export class Sending {
   constructor(send) {
     this.send = send;
     this.waiting = [];
-    this.stale = 0;
-    this.open = 0;
+    this.stale = false;
+    this.open = false;
     this.finishes = 0;
     this.over = false;
     this.asked = false;
@@ -42,7 +42,7 @@ export class Sending {
       if (!this.send({ samples: this.waiting })) return false;
       this.waiting = [];
       this.sent = performance.now();
-      this.open += 1;
+      this.open = true;
       return true;
     }
     if (!this.over || this.asked) return true;
@@ -59,17 +59,16 @@ export class Sending {
 
   /** An answer to samples came. @returns {boolean} Whether it is about the movement of now. */
   heard() {
-    this.open = Math.max(this.open - 1, 0);
-    const wanted = this.stale === 0;
-    this.stale = Math.max(this.stale - 1, 0);
+    const wanted = !this.stale;
+    this.open = this.stale = false; // messages that waited together are answered together
     this.go();
     return wanted;
   }
 
   /** The connection is new: nothing is open. */
   renewed() {
-    this.open = 0;
-    this.stale = 0;
+    this.open = false;
+    this.stale = false;
     this.finishes = 0;
   }
 }

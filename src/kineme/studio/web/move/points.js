@@ -3,7 +3,7 @@ import { byId, fill, make } from "../parts/elements.js";
 import { keepingFocus } from "../parts/keep_focus.js";
 
 const AXES = ["x", "y", "z"];
-const short = (/** @type {number} */ value) => String(Number(value.toPrecision(3)));
+const short = (/** @type {number} */ value) => (Math.abs(value) < 1e-6 ? "0" : String(Number(value.toPrecision(3))));
 
 /** @param {string} label @param {string} key @param {number} value @param {(value: number) => void} set @param {Record<string, any>} more */
 function number(label, key, value, set, more = {}) {

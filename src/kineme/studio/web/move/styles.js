@@ -30,7 +30,7 @@ export async function showStyles(symbol, changed, current) {
       values[k] = at < 0 ? -at * low : at * high;
       changed([...values]);
     });
-    return { slider, row: make("label", { class: "style-row" }, make("span", { class: "small" }, `Style ${k + 1}`, make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of the differences`)), slider) };
+    return { slider, row: make("label", { class: "style-row" }, make("span", { class: "small" }, `Style ${k + 1}`, make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`)), slider) };
   });
   box.addEventListener("change", () => {
     for (const { slider } of sliders) slider.disabled = !box.checked;

@@ -10,7 +10,7 @@ async function send(file) {
   byId("drop").classList.add("busy");
   const response = await tried(() => request("/api/recordings", { method: "POST", body: file, headers: { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" } }));
   byId("drop").classList.remove("busy");
-  byId("drop-state").textContent = response ? "" : "It could not be read.";
+  byId("drop-state").textContent = response ? "" : "It could not be read. The command kineme learn reads whole folders.";
   return response?.json();
 }
 

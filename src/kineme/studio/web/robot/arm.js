@@ -4,9 +4,9 @@ import { chart } from "./charts.js";
 
 window.addEventListener("message", (event) => {
   if (event.origin !== location.origin || event.source !== parent || !event.data?.scene || byId("data")) return;
-  const { scene } = event.data;
+  const { scene, joints } = event.data;
   document.body.append(make("script", { type: "application/json", id: "data" }, JSON.stringify(scene)));
-  byId("charts").append(...scene.joints.map((/** @type {string} */ name, /** @type {number} */ k) => chart(scene, name, k)));
+  byId("charts").append(...scene.joints.map((/** @type {string} */ name, /** @type {number} */ k) => chart(scene, joints?.[k] ?? { name, low: null, high: null }, k)));
   document.body.append(make("script", { src: "/vendor/viewer.js" }));
 });
 parent.postMessage("ready", location.origin);

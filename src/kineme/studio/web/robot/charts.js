@@ -1,23 +1,14 @@
-// Each joint over time, between the limits that the URDF states.
+// Each joint over time, between its limits.
 import { make, svg } from "../parts/elements.js";
 
 const [WIDTH, HEIGHT] = [300, 80];
 
-/** @param {string} urdf @param {string} joint @returns {{low: number, high: number}|null} */
-function limitsOf(urdf, joint) {
-  const parsed = new DOMParser().parseFromString(urdf, "application/xml");
-  const found = [...parsed.querySelectorAll("robot > joint")].find((one) => one.getAttribute("name") === joint);
-  const limit = found?.getAttribute("type") === "continuous" ? null : found?.querySelector("limit");
-  const [low, high] = ["lower", "upper"].map((name) => Number(limit?.getAttribute(name) ?? "0"));
-  return limit && high > low ? { low, high } : null;
-}
-
-/** @param {any} scene @param {string} joint @param {number} k */
+/** @param {any} scene @param {{name: string, low: number|null, high: number|null}} joint @param {number} k Its column. */
 export function chart(scene, joint, k) {
   const values = scene.positions.map((/** @type {number[]} */ row) => row[k]);
-  const limits = limitsOf(scene.urdf, joint);
-  const low = Math.min(...values, limits?.low ?? Infinity);
-  const high = Math.max(...values, limits?.high ?? -Infinity);
+  const limits = [joint.low, joint.high].filter((one) => Number.isFinite(one));
+  const low = Math.min(...values, ...limits);
+  const high = Math.max(...values, ...limits);
   const room = 0.08 * (high - low || 1);
   const end = scene.times[scene.times.length - 1] || 1;
   const x = (/** @type {number} */ time) => (WIDTH * time) / end;
@@ -28,9 +19,9 @@ export function chart(scene, joint, k) {
     "svg",
     { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", "aria-hidden": "true" },
     svg("rect", { class: "approach", x: 0, y: 0, width: x(scene.begins), height: HEIGHT }),
-    ...(limits ? [level(limits.low), level(limits.high)] : []),
+    ...limits.map(level),
     svg("path", { class: "joint", d: `M${path}` }),
     svg("line", { class: "cursor", x1: 0, x2: 0, y1: 0, y2: HEIGHT }),
   );
-  return make("figure", { class: "chart" }, make("figcaption", {}, make("span", { class: "name" }, joint), make("output", { "data-unit": "rad" })), picture);
+  return make("figure", { class: "chart" }, make("figcaption", {}, make("span", { class: "name", title: joint.name }, joint.name), make("output", { "data-unit": "rad" })), picture);
 }

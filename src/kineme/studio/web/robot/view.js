@@ -6,13 +6,13 @@ import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chooseToMove, toMove } from "../move/chosen.js";
 
-/** @param {any} scene Show the arm in a frame of its own: each movement gets a new one. */
-function showArm(scene) {
+/** @param {any} scene @param {any} joints Show the arm in a frame of its own: each movement gets a new one. */
+function showArm(scene, joints) {
   const frame = make("iframe", { src: "/arm.html", title: "The arm moves", class: "arm-frame" });
   const ready = (/** @type {MessageEvent} */ event) => {
     if (event.source !== frame.contentWindow || event.data !== "ready") return;
     window.removeEventListener("message", ready);
-    frame.contentWindow.postMessage({ scene }, location.origin);
+    frame.contentWindow.postMessage({ scene, joints }, location.origin);
   };
   window.addEventListener("message", ready);
   fill(byId("arm"), frame);
@@ -52,7 +52,13 @@ async function move(event) {
   if (!answer) byId("robot-verdict").textContent = "";
   if (!answer) return;
   showPreflight(answer);
-  if (answer.scene) showArm(answer.scene);
+  if (answer.scene) showArm(answer.scene, answer.joints);
+}
+
+/** A server without the routes of arms says so in words. @param {any} error */
+function without(error) {
+  if (error.status !== 404) throw error;
+  return { available: false, why: "This studio moves no arms. The command kineme move does: a movement of the library on an arm, checked before anything moves.", robots: [] };
 }
 
 async function shown() {
@@ -61,7 +67,7 @@ async function shown() {
   const id = toMove(symbols);
   fill(byId("robot-what"), ...symbols.filter((/** @type {any} */ one) => one.path).map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
   if (byId("robot-arm").children.length) return;
-  const robots = await tried(() => get("/api/robots"));
+  const robots = await tried(() => get("/api/robots").catch(without));
   if (!robots) return;
   byId("robot-empty").hidden = robots.available;
   byId("robot-main").hidden = !robots.available;

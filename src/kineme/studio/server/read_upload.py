@@ -1,0 +1,105 @@
+"""Read a file that somebody sent, in a process of its own with little memory, which can be ended.
+
+Run as ``python -m kineme.studio.server.read_upload FILE RESULT BYTES``, with the options of the reader as JSON on the
+standard input. The result is an archive of plain arrays and JSON, or the text of a refusal.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kineme.errors import DataError, KinemeError
+from kineme.files.merge_files import Recordings, Source
+from kineme.files.problem import Problem
+from kineme.files.recordings import read_recordings
+from kineme.movements.channels.plain_data import channels_from_data, channels_to_data
+from kineme.movements.trajectories.channels import of_channels
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
+
+REFUSED = 3  # exit code
+
+
+def save(recordings: Recordings, path: Path) -> None:
+    """Write recordings to an archive, as they were recorded."""
+    demos = recordings.demonstrations
+    whole = demos.movements
+    told = {
+        "channels": None if demos.channels is None else channels_to_data(demos.channels),
+        "n_dims": demos.n_dims,
+        "dimensions": whole.dimensions,
+        "sources": [list(one) for one in recordings.sources],
+        "problems": [[one.file, one.line, one.reason] for one in recordings.problems],
+    }
+    recorded = demos.positions if demos.channels is None else demos.recorded
+    with path.open("wb") as file:
+        np.savez(
+            file,
+            told=np.frombuffer(json.dumps(told).encode(), np.uint8),
+            recorded=recorded,
+            offsets=demos.offsets,
+            durations=demos.durations,
+            stamps=whole.stamps,
+        )
+
+
+def load(path: Path) -> Recordings:
+    """The inverse.
+
+    Raises
+    ------
+    DataError
+        An archive that `save` did not write.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in ("recorded", "offsets", "durations", "stamps")}
+            told = json.loads(archive["told"].tobytes())
+        return _recordings(arrays, told)
+    except (KinemeError, OSError, ValueError, LookupError, TypeError) as error:
+        raise DataError(f"expected the file as it was read, got something else ({error}); send it again") from error
+
+
+def _recordings(arrays: dict[str, Any], told: dict[str, Any]) -> Recordings:
+    sources = tuple(Source(*one) for one in told["sources"])
+    names = tuple(f"{one.path}#{one.place}" if one.place else one.path for one in sources)
+    dimensions = None if told["dimensions"] is None else tuple(told["dimensions"])
+    parts = (arrays["recorded"], arrays["offsets"], arrays["durations"], arrays["stamps"], None, names, dimensions)
+    whole = Movements(*parts)
+    if told["channels"] is not None:
+        whole = of_channels(whole, channels_from_data(told["channels"], told["n_dims"]))
+    problems = tuple(Problem(*one) for one in told["problems"])
+    return Recordings(Demonstrations.of_movements(whole), sources, problems, ())
+
+
+def _limit_memory(beyond: int) -> None:
+    """Allow so many bytes beyond what the process has; where the system knows no such limit, there is none."""
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return
+    import resource
+
+    sizes = [line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmSize")]
+    most = int(sizes[0]) * 1024 + beyond
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def main() -> None:
+    """Read the file that the arguments name."""
+    path, result, beyond = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    options = json.load(sys.stdin)
+    _limit_memory(beyond)
+    try:
+        save(read_recordings(path, **options), result)
+    except (KinemeError, MemoryError) as error:
+        result.write_text(str(error) or "expected a file that fits into memory, got a larger one", encoding="utf-8")
+        sys.exit(REFUSED)
+
+
+if __name__ == "__main__":
+    main()

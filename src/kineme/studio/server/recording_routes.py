@@ -1,0 +1,136 @@
+"""Recordings that clients send: what they hold, what happens when in them, and learning it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Header, Request
+from starlette.concurrency import run_in_threadpool
+
+from kineme.errors import SpecificationError
+from kineme.files.annotations.label_table import LabelRow
+from kineme.files.annotations.labeled_pieces import labeled_pieces
+from kineme.files.annotations.read_labels import LabelTable
+from kineme.files.merge_files import Recordings
+from kineme.library.learning.recordings import learn_recordings
+from kineme.library.recognition.annotate import annotate
+from kineme.movements.channels.channel import recorded_names
+from kineme.movements.trajectories.movements import axis_names
+from kineme.sampling import evenly_spaced
+from kineme.studio.server.plain import numbers
+from kineme.studio.server.recording_records import LearnSpans, Span, SpottedOut, Spotting, UploadOut
+from kineme.studio.server.records import Learned
+from kineme.studio.server.studio import Reads, Studio, Writes
+
+router = APIRouter(prefix="/api/recordings", tags=["recordings"])
+
+_PLOTTED = 1000  # samples of a column
+
+
+@router.post(
+    "",
+    response_model=UploadOut,
+    summary="Send a recording",
+    openapi_extra={"requestBody": {"content": {"application/octet-stream": {}}, "required": True}},
+)
+async def send(
+    studio: Reads, request: Request, x_file_name: Annotated[str, Header(max_length=2000)] = "recording.csv"
+) -> dict[str, Any]:
+    """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
+    key = await studio.uploads.receive(x_file_name, request.stream())
+    read = await run_in_threadpool(studio.uploads.recordings, key)
+    plots = [_plot(read, k) for k in range(len(read))]
+    return {
+        "recording": key,
+        "tables": [_table(read, k) for k in range(len(read))],
+        "problems": [str(one) for one in read.problems],
+        "plot": plots[0],
+        "plots": plots,
+    }
+
+
+@router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
+def spotted(studio: Reads, key: str, asked: Spotting) -> dict[str, Any]:
+    """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample."""
+    one = _one(studio, key, asked.table, asked.channels)
+    found = annotate(studio.library.store, one, asked.error_rate)
+    if found.problems:
+        raise SpecificationError(found.problems[0].what)
+    spans = [
+        {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": numbers(each.p_value)}
+        for each in found.annotations
+    ]
+    return {"spans": spans, "rests": _rests(spans, float(one.demonstrations.durations[0]))}
+
+
+@router.post("/{key}/learn", response_model=Learned, summary="Learn stretches of a recording")
+def learn(studio: Writes, key: str, asked: LearnSpans) -> dict[str, Any]:
+    """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one."""
+    one = _one(studio, key, asked.table, asked.channels)
+    pieces = labeled_pieces(
+        one, LabelTable("of the spans", tuple(map(_row, range(len(asked.spans)), asked.spans)), True)
+    )
+    options = {"columns": list(asked.channels)} if asked.channels else None
+    report = learn_recordings(studio.library.store, pieces, options)
+    return {"ids": report.ids.tolist(), "version": report.version}
+
+
+def _row(k: int, span: Span) -> LabelRow:
+    return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
+
+
+def _one(studio: Studio, key: str, table: str | None, channels: list[str] | None) -> Recordings:
+    """One table of a recording, in the columns that are asked for, or those of the library where it has them."""
+    read = studio.uploads.recordings(key, channels or ())
+    ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
+    if not channels and ours and list(ours) != _columns(read) and set(ours) <= set(_columns(read)):
+        read = studio.uploads.recordings(key, ours)
+    names = [_name(read, k) for k in range(len(read))]
+    k = 0 if table is None else names.index(table) if table in names else -1
+    if k < 0:
+        raise SpecificationError(f"expected one of the tables {', '.join(names[:20])}, got {table!r}")
+    return replace(read, demonstrations=read.demonstrations[k : k + 1], sources=read.sources[k : k + 1])
+
+
+def _name(read: Recordings, k: int) -> str:
+    return read.sources[k].place or read.sources[k].path
+
+
+def _columns(read: Recordings) -> list[str]:
+    demos = read.demonstrations
+    return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
+
+
+def _table(read: Recordings, k: int) -> dict[str, Any]:
+    demos, duration = read.demonstrations, float(read.demonstrations.durations[k])
+    n = int(demos.offsets[k + 1] - demos.offsets[k])
+    channels = [
+        {"name": name, "kind": "position", "columns": [name], "unit": None} for name in axis_names(demos.n_dims)
+    ]
+    if demos.channels is not None:
+        channels = [
+            {"name": one.name, "kind": one.kind, "columns": list(one.columns), "unit": one.unit}
+            for one in demos.channels
+        ]
+    rate = numbers((n - 1) / duration)
+    return {"name": _name(read, k), "channels": channels, "duration": duration, "rate": rate, "n_samples": n}
+
+
+def _plot(read: Recordings, k: int) -> dict[str, Any]:
+    """At most 1,000 samples of each column, over seconds since the first one."""
+    demos = read.demonstrations
+    rows = slice(demos.offsets[k], demos.offsets[k + 1])
+    values = (demos.positions if demos.channels is None else demos.recorded)[rows]
+    times = demos.movements.stamps[rows]
+    kept = evenly_spaced(len(times), _PLOTTED)
+    columns = [{"name": name, "values": numbers(values[kept, j])} for j, name in enumerate(_columns(read))]
+    return {"times": numbers(times[kept] - times[0]), "columns": columns}
+
+
+def _rests(spans: list[dict[str, Any]], duration: float) -> list[dict[str, float]]:
+    """What lies between the spans."""
+    ends = np.array([0.0, *(one["end"] for one in spans)])
+    begins = np.array([*(one["begin"] for one in spans), duration])
+    return [{"begin": float(begin), "end": float(end)} for begin, end in zip(ends, begins, strict=True) if end > begin]

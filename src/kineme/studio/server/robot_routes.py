@@ -1,0 +1,110 @@
+"""Arms that execute movements, and what is checked before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter
+
+from kineme.errors import KinemeError, SpecificationError
+from kineme.primitives.generation.learned import Learned
+from kineme.robots.checks.check import Preflight
+from kineme.robots.models.load import load
+from kineme.robots.models.robot import Robot
+from kineme.robots.models.table import MODELS
+from kineme.robots.planning.generate_at import generate_at
+from kineme.robots.planning.move import move as move_arm
+from kineme.robots.planning.refusal import InfeasibleError
+from kineme.robots.planning.robot_movement import RobotMovement
+from kineme.robots.planning.roles import space_of
+from kineme.robots.view.scene_data import scene_data
+from kineme.robots.view.shapes import shapes_of
+from kineme.studio.server.plain import numbers
+from kineme.studio.server.robot_records import ArmMoved, ArmsOut, ArmWanted
+from kineme.studio.server.rollouts import learned_as
+from kineme.studio.server.studio import Reads
+
+router = APIRouter(prefix="/api/robots", tags=["robots"])
+
+
+@router.get("", response_model=ArmsOut, summary="Which arms there are")
+def robots(studio: Reads) -> dict[str, Any]:
+    """Those that come with kineme; without the extra `robot`, why there are none."""
+    try:
+        load(next(iter(MODELS)))
+    except KinemeError as error:
+        return {"available": False, "why": str(error), "robots": []}
+    return {"available": True, "why": None, "robots": list(MODELS)}
+
+
+@router.post("/move", response_model=ArmMoved, summary="What an arm does to execute a movement")
+def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
+    """Joints, and every check; a movement that must not be executed is refused, with how it could be."""
+    robot = _robot(asked.robot)
+    learned = learned_as(studio, asked)
+    space = space_of(learned.primitive.channels, learned.example, robot)
+    if asked.goal is not None and asked.at is None and space != "joints":
+        raise SpecificationError("expected `at` with a goal: where the movement starts in the frame of the robot")
+    generated = generate_at(
+        learned,
+        asked.at,
+        asked.goal,
+        asked.duration,
+        scale=None if asked.size is None or space == "joints" else asked.size / _extent(learned),
+        joints=space == "joints",
+        plane=asked.plane,
+    )
+    try:
+        made = move_arm(
+            generated.movement,
+            robot,
+            space=space,
+            plane=asked.plane,
+            place="as given" if asked.at is not None or space == "joints" else "free",
+            timing="slowed" if asked.slow_down else "generated",
+            steps=generated.steps,
+        )
+    except InfeasibleError as error:
+        return {**_answer(robot, error.preflight), "refusal": str(error), "scene": None}
+    return {**_answer(robot, made.preflight), "refusal": None, "scene": _scene(made)}
+
+
+def _robot(name: str) -> Robot:
+    """An arm that comes with kineme: clients name no files."""
+    if name not in MODELS:
+        raise SpecificationError(f"expected one of the arms {', '.join(MODELS)}, got {name[:80]!r}")
+    return load(name)
+
+
+def _extent(learned: Learned) -> float:
+    """The largest extent of the movement, in its unit."""
+    shown = learned.example
+    return float(np.ptp(shown, axis=0).max()) or 1.0
+
+
+def _answer(robot: Robot, preflight: Preflight | None) -> dict[str, Any]:
+    checks = [] if preflight is None else preflight.checks
+    joints = zip(robot.joints, numbers(robot.lower), numbers(robot.upper), strict=True)
+    return {
+        "passed": preflight is not None and preflight.passed,
+        "checks": [
+            {
+                "what": one.what,
+                "where": one.where,
+                "worst": numbers(one.worst),
+                "limit": numbers(one.limit),
+                "unit": one.unit,
+                "time": numbers(one.time),
+                "passed": bool(one.passed),
+            }
+            for one in checks
+        ],
+        "unchecked": [] if preflight is None else list(preflight.unchecked),
+        "assumed": list(robot.assumed),
+        "joints": [{"name": name, "low": low, "high": high} for name, low, high in joints],
+    }
+
+
+def _scene(made: RobotMovement) -> dict[str, Any]:
+    return scene_data(made, shapes_of(made.robot))

@@ -1,0 +1,203 @@
+"""Files that are sent to the studio: read apart, searched, learned."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from studio_samples import drawing
+
+from kineme import ActionLibrary
+from kineme.errors import DataError
+from kineme.files.recordings import read_recordings
+from kineme.studio.server import bodies, read_upload, uploads
+from kineme.studio.server.refusals import MissingError
+
+
+def _table(*kinds, rest=0.6, heads="t,x,y"):
+    """A recording of drawings with rests between, and when each begins and ends."""
+    times, rows, spans, now, at = [], [], [], 0.0, np.zeros(2)
+    for k in kinds:
+        still = np.arange(0, rest, 0.025)
+        times += list(now + still)
+        rows += [at] * len(still)
+        now += rest
+        t, x = drawing(k, seed=50)
+        spans.append((now, now + t[-1]))
+        times += list(now + t)
+        rows += list(at + x - x[0])
+        now, at = now + t[-1] + 0.025, at + x[-1] - x[0]
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack((times, rows)), "%.6f", ",", header=heads, comments="")
+    return text.getvalue().encode(), spans
+
+
+def _send(client, data, name="drawn.csv"):
+    return client.post("/api/recordings", content=data, headers={"X-File-Name": name})
+
+
+def test_a_recording_is_read_searched_corrected_and_learned(client):
+    data, spans = _table(0, 2, 1)
+    read = _send(client, data, "my%20drawing%20%E2%82%AC.csv")
+    assert read.status_code == 200, read.text
+    read = read.json()
+    assert (len(read["tables"]), read["problems"]) == (1, [])
+    table = read["tables"][0]
+    assert [one["name"] for one in table["channels"]] == ["x", "y"]
+    assert table["rate"] == pytest.approx(40, rel=0.1)
+    assert [one["name"] for one in read["plot"]["columns"]] == ["x", "y"]
+    assert len(read["plot"]["times"]) == len(read["plot"]["columns"][0]["values"]) <= 1000
+    found = client.post(f"/api/recordings/{read['recording']}/spotted", json={}).json()
+    known = [one for one in found["spans"] if one["label"]]
+    assert {one["label"] for one in known} <= {"kind 0", "kind 1", "kind 2"}
+    assert len(known) >= 2
+    assert all(0 <= one["begin"] < one["end"] <= table["duration"] + 1e-9 for one in found["spans"])
+    assert found["rests"]
+    corrected = [{"begin": a, "end": b, "label": "mine"} for a, b in spans[:2]]
+    corrected += [{"begin": spans[2][0], "end": spans[2][1], "label": None}]
+    body = {"table": table["name"], "channels": ["x", "y"], "spans": corrected}
+    learned = client.post(f"/api/recordings/{read['recording']}/learn", json=body)
+    assert learned.status_code == 200, learned.text
+    assert len(learned.json()["ids"]) == 3
+    shown = client.get("/api/library").json()
+    assert {one["name"]: one["n_members"] for one in shown["symbols"]}["mine"] == 2
+    assert shown["unlabeled"] == 1
+    again = client.post(f"/api/recordings/{read['recording']}/learn", json=body).json()
+    assert again["ids"] == learned.json()["ids"]
+
+
+def test_other_columns_are_read_where_they_are_asked_for(client):
+    data, _ = _table(0, 1, heads="t,a,b")
+    key = _send(client, data).json()["recording"]
+    spotted = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["a", "b"]})
+    assert spotted.status_code == 200
+    one = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["a"]})
+    assert one.status_code == 400
+    wrong = client.post(f"/api/recordings/{key}/spotted", json={"channels": ["none"]})
+    assert wrong.status_code == 400
+    assert "none" in wrong.json()["error"]
+    assert client.post(f"/api/recordings/{key}/spotted", json={"table": "none"}).status_code == 400
+
+
+def test_what_is_read_apart_is_what_is_read_here(tmp_path):
+    for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses())):
+        path = tmp_path / name
+        path.write_bytes(data)
+        direct = read_recordings(path)
+        read_upload.save(direct, tmp_path / "there.npz")
+        again = read_upload.load(tmp_path / "there.npz")
+        for a, b in zip(direct.demonstrations, again.demonstrations, strict=True):
+            assert np.array_equal(a.positions, b.positions)
+            assert np.array_equal(a.times, b.times)
+            assert np.array_equal(a.recorded, b.recorded)
+            assert a.channels == b.channels
+        assert direct.sources == again.sources
+
+
+def _poses():
+    t, x = drawing(1)
+    q = np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1))
+    q[:, 1] = np.linspace(0, 0.5, len(t))
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack((t, x, q)), "%.9f", ",", header="t,x,y,qw,qx,qy,qz", comments="")
+    return text.getvalue().encode()
+
+
+FILES = {
+    "empty.csv": b"",
+    "text.csv": b"hello\nworld\n",
+    "zeros.mat": bytes(1000),
+    "bomb.npz": b"PK\x03\x04" + bytes(100),
+    "deep.json": b"[" * 200_000,
+    "x.exe": b"MZ",
+    "none": b"1,2,3\n",
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_that_hold_no_movement_are_refused_in_a_sentence(client, name):
+    answer = _send(client, FILES[name], name)
+    assert answer.status_code == 400
+    assert "expected" in answer.json()["error"]
+    assert "/tmp" not in answer.json()["error"]
+    assert client.get("/api/library").status_code == 200
+
+
+NAMES = ["../../etc/passwd", "..%2f..%2fx.csv", "C:\\x.csv", ".hidden.csv", "a\x01b.csv", "-rf.csv", "%00.csv", "", " "]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_files_lead_nowhere(name):
+    plain = uploads.plain_name(name)
+    assert Path(plain).name == plain
+    assert plain not in {"", ".", ".."}
+    assert not plain.startswith((".", "-"))
+    assert "\0" not in plain
+
+
+def test_reading_ends_where_it_takes_too_long_or_too_much(tmp_path):
+    data, _ = _table(0, 1)
+    for options, words in (({"seconds": 0.05}, "read within 0.05 s"), ({"memory": 1000}, "expected|ended with code")):
+        files = uploads.Uploads(**options)
+        key = _received(files, data)
+        with pytest.raises(DataError, match=words):
+            files.recordings(key)
+        files.close()
+
+
+def _received(files, data, name="a.csv"):
+    import asyncio
+
+    async def chunks():
+        yield data
+
+    return asyncio.run(files.receive(name, chunks()))
+
+
+def test_the_last_eight_are_kept():
+    files = uploads.Uploads()
+    keys = [_received(files, b"x") for _ in range(10)]
+    with pytest.raises(MissingError, match="one of the last 8 recordings"):
+        files.recordings(keys[0])
+    assert len(list(Path(files._folder.name).rglob("*.csv"))) == 8
+    files.close()
+    assert not Path(files._folder.name).exists()
+
+
+def test_recordings_of_others_are_not_there(client):
+    for key in ("x", "..", "0" * 16):
+        assert client.post(f"/api/recordings/{key}/spotted", json={}).status_code == 404
+
+
+def test_a_recording_that_is_too_large_is_refused(client, monkeypatch):
+    monkeypatch.setattr(bodies, "FILE_BYTES", 1000)
+
+    def parts():
+        for _ in range(10):
+            yield b"1,2\n" * 100
+
+    assert _send(client, b"1,2\n" * 1000).status_code == 413
+    assert _send(client, parts()).status_code == 413
+    folder = Path(client.app.state.studio.uploads._folder.name)
+    assert not [one for one in folder.rglob("*") if one.is_file()]
+
+
+def test_recordings_are_read_but_not_learned_for_reading_only(folder, open_studio):
+    client = open_studio(folder, read_only=True)
+    data, spans = _table(0)
+    key = _send(client, data).json()["recording"]
+    assert client.post(f"/api/recordings/{key}/spotted", json={}).status_code == 200
+    body = {"spans": [{"begin": spans[0][0], "end": spans[0][1], "label": "x"}]}
+    assert client.post(f"/api/recordings/{key}/learn", json=body).status_code == 403
+
+
+def test_spans_outside_of_the_recording_are_refused(client):
+    key = _send(client, _table(0)[0]).json()["recording"]
+    for span in ({"begin": 90, "end": 99}, {"begin": 1.0, "end": 0.5}, {"begin": 0, "end": 1e-6}):
+        answer = client.post(f"/api/recordings/{key}/learn", json={"spans": [{**span, "label": "x"}]})
+        assert answer.status_code == 400, answer.text
+    with ActionLibrary(client.app.state.studio.library.folder, read_only=True) as library:
+        assert "x" not in library

@@ -1,0 +1,71 @@
+"""Arms in the studio."""
+
+from __future__ import annotations
+
+import pytest
+
+from kineme.errors import DataError
+from kineme.studio.server import robot_routes
+
+SIZE = 0.15  # meters on the arm
+
+
+@pytest.fixture
+def symbol(client):
+    return client.get("/api/library").json()["symbols"][0]["id"]
+
+
+@pytest.fixture
+def arms(client):
+    pytest.importorskip("pinocchio")
+    found = client.get("/api/robots").json()
+    assert (found["available"], found["why"]) == (True, None)
+    return found["robots"]
+
+
+def _move(client, symbol, **wanted):
+    body = {"what": {"symbol": symbol}, "robot": "panda", "size": SIZE, "slow_down": True, **wanted}
+    return client.post("/api/robots/move", json=body)
+
+
+def test_an_arm_executes_a_symbol_with_its_checks_and_what_draws_it(client, symbol, arms):
+    assert "panda" in arms
+    made = _move(client, symbol)
+    assert made.status_code == 200, made.text
+    made = made.json()
+    assert (made["passed"], made["refusal"]) == (True, None)
+    assert {"velocity", "acceleration", "position"} <= {one["what"] for one in made["checks"]}
+    assert all(one["passed"] for one in made["checks"])
+    assert len(made["joints"]) == 7
+    assert made["joints"][0]["low"] < made["joints"][0]["high"]
+    scene = made["scene"]
+    assert len(scene["times"]) == len(scene["positions"]) == len(scene["executed"])
+    assert "<robot" in scene["urdf"]
+
+
+def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, symbol, arms):
+    made = _move(client, symbol, duration=0.2, slow_down=False).json()
+    assert (made["passed"], made["scene"]) == (False, None)
+    assert "cannot execute" in made["refusal"] or "expected" in made["refusal"]
+    assert not made["checks"] or not all(one["passed"] for one in made["checks"])
+
+
+@pytest.mark.parametrize("robot", ["/etc/passwd", "x.urdf", "", "../panda.urdf"])
+def test_no_file_of_the_server_is_an_arm(client, symbol, robot):
+    answer = _move(client, symbol, robot=robot)
+    assert answer.status_code == 400
+    assert "expected one of the arms panda" in answer.json()["error"]
+
+
+def test_a_goal_without_a_start_is_refused(client, symbol, arms):
+    assert _move(client, symbol, goal=[0.5, 0.0, 0.4]).status_code == 400
+
+
+def test_without_the_extra_it_says_what_to_install(client, monkeypatch):
+    def load(name):
+        raise DataError("expected the package pin for arms; pip install 'kineme[robot]'")
+
+    monkeypatch.setattr(robot_routes, "load", load)
+    found = client.get("/api/robots").json()
+    assert (found["available"], found["robots"]) == (False, [])
+    assert "kineme[robot]" in found["why"]
