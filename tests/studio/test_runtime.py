@@ -294,7 +294,7 @@ WRONG = {
     "rollout.js": [
         ("HANDOVER = 0.2", "HANDOVER = 0.201", worst_rollouts),
         ("0.18134189", "0.18134289", worst_rollouts),
-        ("0.23723379", "0.23823379", worst_rollouts),
+        ("0.23723379", "0.24723379", worst_rollouts),
     ],
 }
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kineme import DMP, TrajectoryError
-from kineme.styles import average, average_by_label
+from kineme import DMP, RhythmicDMP, TrajectoryError
+from kineme.styles import average, average_by_label, learn_styles
 
 any_seed = given(seed=st.integers(0, 10**6))
 
@@ -190,3 +190,12 @@ def test_errors_say_what_came(demonstrate):
         average(learned).deviation(1)
     with pytest.raises(ValueError, match=r"n to be a whole number of at least 1, got 0"):
         average(learned).sample(0, 0)
+
+
+def test_movements_are_learned_by_the_default_specification(demonstrate):
+    demonstrations = demonstrate(4, 31)
+    learned = DMP().learn(demonstrations)
+    np.testing.assert_array_equal(average(demonstrations).factor, average(learned).factor)
+    np.testing.assert_array_equal(learn_styles(demonstrations, 2).mean, learn_styles(learned, 2).mean)
+    with pytest.raises(TrajectoryError, match=r"expected kineme.Primitives, got RhythmicPrimitives"):
+        average(RhythmicDMP(aperiodic="accept").learn(demonstrations))

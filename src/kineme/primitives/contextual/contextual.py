@@ -11,12 +11,11 @@ from sklearn.utils.validation import check_is_fitted
 
 from kineme.errors import SpecificationError
 from kineme.movements.trajectories.movements_like import MovementsLike
-from kineme.primitives.batch import Batch
 from kineme.primitives.contextual.smoothers import Smoother, candidates, solve
 from kineme.primitives.contextual.task_parameters import check_range, demonstrated_parameters, task_parameters
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.styles.parameters import (
-    check_primitives,
+    as_primitives,
     from_numbers,
     map_rows,
     path_matrix,
@@ -173,13 +172,10 @@ class Contextual(BaseEstimator):
                 check_number(name, getattr(self, name), above=0.0)
 
     def _learned(self, movements: Primitives | MovementsLike) -> Primitives:
-        if not isinstance(movements, Primitives):
-            if isinstance(movements, Batch):
-                check_primitives(movements)
-            return (DMP() if self.dmp is None else self.dmp).learn(movements)
-        if self.dmp is not None and movements.dmp != self.dmp:
-            raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {movements.dmp}")
-        return movements
+        primitives = as_primitives(movements, self.dmp)
+        if self.dmp is not None and primitives.dmp != self.dmp:
+            raise SpecificationError(f"expected primitives of the specification {self.dmp}, got {primitives.dmp}")
+        return primitives
 
 
 def _compressed_paths(primitives: Primitives) -> Array:

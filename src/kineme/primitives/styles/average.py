@@ -22,7 +22,7 @@ from kineme.primitives.styles.conditioning import updated
 from kineme.primitives.styles.likelihood import log_likelihoods, unexplained_noise
 from kineme.primitives.styles.observations import as_observation_times, as_observations
 from kineme.primitives.styles.parameters import (
-    check_primitives,
+    as_primitives,
     from_numbers,
     map_rows,
     path_matrix,
@@ -271,7 +271,7 @@ def _primitive_of(other: Any) -> Primitives:
     return other.primitive
 
 
-def average(primitives: Primitives, weights: ArrayLike | None = None) -> AveragePrimitive:
+def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:
     """Mean and covariance of a batch of primitives, as if they were several demonstrations of one movement.
 
     The mean of theta = [W, x0, g, tau v0] is the movement whose path is the mean of the demonstrations' paths at
@@ -281,8 +281,9 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
 
     Parameters
     ----------
-    primitives : Primitives
-        One movement shown n times. One demonstration gives itself, with no spread.
+    primitives : Primitives, or movements as `DMP.learn` takes them
+        One movement shown n times; what is not learned yet is learned as ``DMP()`` does. One demonstration gives
+        itself, with no spread.
     weights : array_like of shape (n,), optional
         How much each demonstration counts, 0 or more; only their ratios matter. By default all count alike.
 
@@ -294,9 +295,10 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
     Raises
     ------
     TrajectoryError
-        No primitive, or weights of the wrong number, negative, not finite, or all zero.
+        No primitive, movements that cannot be learned, or weights of the wrong number, negative, not finite, or all
+        zero.
     """
-    check_primitives(primitives)
+    primitives = as_primitives(primitives)
     p = _shares(weights, len(primitives))
     tempo = np.log(primitives.durations / primitives.durations[0])
     numbers = to_numbers(primitives)
@@ -315,7 +317,7 @@ def average(primitives: Primitives, weights: ArrayLike | None = None) -> Average
     return AveragePrimitive(one, factor[:, :-1].reshape(len(factor), *shape), factor[:, -1], noise)
 
 
-def average_by_label(primitives: Primitives) -> dict[Any, AveragePrimitive]:
+def average_by_label(primitives: Primitives | MovementsLike) -> dict[Any, AveragePrimitive]:
     """One `average` for each label, in sorted order.
 
     Raises
@@ -323,7 +325,7 @@ def average_by_label(primitives: Primitives) -> dict[Any, AveragePrimitive]:
     TrajectoryError
         Primitives without labels.
     """
-    check_primitives(primitives)
+    primitives = as_primitives(primitives)
     if primitives.labels is None:
         raise TrajectoryError(
             "expected labeled primitives, got none with a label; learn them from demonstrations with labels, "

@@ -16,15 +16,20 @@ from __future__ import annotations
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.styles.metrics import METRICS, compared
 from kineme.primitives.styles.model import StyleModel
-from kineme.primitives.styles.parameters import check_primitives, shared_label, shared_recording, to_numbers
+from kineme.primitives.styles.parameters import as_primitives, shared_label, shared_recording, to_numbers
 from kineme.validation import Array, check_choice, check_count, check_number
 
 
 def learn_styles(
-    primitives: Primitives, n_styles: int | None = None, *, variance: float | None = None, metric: str = "path"
+    primitives: Primitives | MovementsLike,
+    n_styles: int | None = None,
+    *,
+    variance: float | None = None,
+    metric: str = "path",
 ) -> StyleModel:
     """Find the J directions in which the demonstrations differ most.
 
@@ -33,8 +38,8 @@ def learn_styles(
 
     Parameters
     ----------
-    primitives : Primitives
-        n demonstrations of one movement.
+    primitives : Primitives, or movements as `DMP.learn` takes them
+        n demonstrations of one movement; what is not learned yet is learned as ``DMP()`` does.
     n_styles : int, optional
         Number J of style parameters.
     variance : float, optional
@@ -55,7 +60,7 @@ def learn_styles(
     SpecificationError
         More styles than the demonstrations can tell apart; both `n_styles` and `variance`; a parameter out of range.
     """
-    check_primitives(primitives)
+    primitives = as_primitives(primitives)
     check_choice("metric", metric, list(METRICS))
     if len(primitives) < 2:
         raise TrajectoryError(f"expected at least 2 demonstrations to learn styles from, got {len(primitives)}")

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.trajectories.labels import label_array
+from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.primitives.batch import Batch
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.operators import decoder
 from kineme.primitives.discrete.response import Response
@@ -44,6 +46,13 @@ def check_primitives(primitives: Any) -> None:
             f"expected kineme.Primitives, got {type(primitives).__name__}; learn movements first, "
             "kineme.DMP().learn(movements), and take the tangent of pose primitives"
         )
+
+
+def as_primitives(movements: Primitives | MovementsLike, dmp: DMP | None = None) -> Primitives:
+    """Primitives as they are; movements as `dmp`, by default ``DMP()``, learns them. Rhythms and poses are refused."""
+    if isinstance(movements, Batch):
+        check_primitives(movements)
+    return movements if isinstance(movements, Primitives) else (dmp or DMP()).learn(movements)
 
 
 def from_numbers(
