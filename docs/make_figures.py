@@ -208,7 +208,7 @@ def via_points() -> Figure:
 def arm() -> Figure:
     """A handwritten shape as a Panda executes it."""
     from kineme import robots
-    from kineme.robots.figure import draw_robot_movement
+    from kineme.robots.view.figure import draw_robot_movement
 
     shape = kineme.load_lasa(["GShape"])[:1][0]
     positions = 0.004 * (shape.positions - shape.positions.mean(axis=0))

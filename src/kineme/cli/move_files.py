@@ -87,7 +87,7 @@ def write_files(made: Any, options: dict[str, Any]) -> None:
             writer(path, trajectory)
     if options["plot"]:
         from kineme.output.figures import save_figure
-        from kineme.robots.figure import draw_robot_movement
+        from kineme.robots.view.figure import draw_robot_movement
 
         save_figure(draw_robot_movement(made), options["plot"])
     if options["lerobot"]:

@@ -17,10 +17,10 @@ from kineme.robots.export.columns import write_joints as write_joints
 from kineme.robots.export.bag import write_bag as write_bag
 from kineme.robots.export.action_goal import write_action_goal as write_action_goal
 from kineme.robots.export.lerobot import write_lerobot as write_lerobot
-from kineme.robots.figure import draw_robot_movement as draw_robot_movement
+from kineme.robots.view.figure import draw_robot_movement as draw_robot_movement
 from kineme.robots.view.write_view import write_view as write_view
 
 # Live
-from kineme.robots.arm_controller import ArmController as ArmController
-from kineme.robots.arm_state import ArmState as ArmState
-from kineme.robots.arm_state import ArmStatus as ArmStatus
+from kineme.robots.live.arm_controller import ArmController as ArmController
+from kineme.robots.live.arm_state import ArmState as ArmState
+from kineme.robots.live.arm_state import ArmStatus as ArmStatus

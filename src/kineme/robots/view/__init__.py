@@ -1,1 +1,1 @@
-"""A movement of an arm as one HTML page that needs no other file, no server and no network."""
+"""A movement of an arm as one HTML page that needs no other file, no server and no network; and as a picture."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from kineme.robots.kinematics.braking import Braking, Range, Reasons, brakeable
 from kineme.robots.kinematics.descent import POSTURE_COST
 from kineme.robots.kinematics.inverse import InverseKinematics, is_partial
+from kineme.robots.live.braking import Braking, Range, Reasons, brakeable
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 

@@ -1,0 +1,1 @@
+"""An arm that follows a movement under live control, step by step."""
