@@ -88,6 +88,7 @@ EXEMPT = {
     "primitives.discrete.dmp.DMP.choose": "one specification for the whole batch; see test_choose.py",
     "primitives.styles.average.average": "a mean of the batch; see test_order_of_training.py",
     "primitives.styles.average.AveragePrimitive.log_likelihood": "one by one, too, in test_likelihood.py",
+    "primitives.styles.parameters.as_primitives": "`DMP.learn`, or what it is given",
     "primitives.styles.parameters.shared_recording": "what a whole batch was recorded as; see test_recorded_as.py",
     "primitives.styles.blending.encoded": "of `AveragePrimitive.blend`, one average",
     "primitives.styles.average.average_by_label": "means of the batch, by `average`",

@@ -67,7 +67,7 @@ class Running:
         )
         guard = threading.Timer(60, self.process.kill)
         guard.start()
-        self.line = self.process.stdout.readline()
+        self.line = self.process.stdout.readline() + self.process.stdout.readline()  # its address, and how to stop it
         guard.cancel()
         found = re.search(r"(http://\S+?)/\?token=(\S+)", self.line)
         assert found, self.process.communicate()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from studio_samples import LIVE, asked, samples
 from kineme import ActionLibrary
 from kineme.errors import TrajectoryError
 from kineme.studio.server.live_session import parsed_samples
+from kineme.studio.server.live_socket import _Client
 
 
 def _said(socket, kind):
@@ -191,3 +194,24 @@ def test_samples_are_numbers_in_rows():
     assert parsed_samples([[0, 1.5, 2]]).tolist() == [[0.0, 1.5, 2.0]]
     with pytest.raises(TrajectoryError, match="rows of different lengths"):
         parsed_samples([[0, 1], [0, 1, 2]])
+
+
+def test_a_client_that_does_not_read_delays_nobody_and_is_told_the_newest_version_in_the_end():
+    async def told() -> list[str]:
+        sent: list[str] = []
+        reads = asyncio.Event()
+
+        async def send_text(text: str) -> None:
+            await reads.wait()
+            sent.append(text)
+
+        client = _Client(SimpleNamespace(send_text=send_text), None)
+        for version in (3, 4, 5):
+            client.tell_of(version)  # returns at once: the next client is told
+            await asyncio.sleep(0)
+        reads.set()
+        while not sent or sent[-1] != '{"changed": 5}':
+            await asyncio.sleep(0)
+        return sent
+
+    assert asyncio.run(told()) == ['{"changed": 3}', '{"changed": 5}']

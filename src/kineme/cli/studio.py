@@ -49,8 +49,7 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
 
 def _say(folder: Path, address: str, read_only: bool) -> None:
     only = ", for reading only" if read_only else ""
-    write(f"{printable(folder)} is open{only} at {address}")
-    write("stop it with Ctrl-C")
+    write(f"{printable(folder)} is open{only} at {address}\nstop it with Ctrl-C")  # in one: it may be stopped at once
     sys.stdout.flush()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -13,7 +13,7 @@ from kineme.studio.server.studio import Studio
 
 PERIOD = 0.25  # seconds between looks at the version, for changes by other processes
 
-Tell = Callable[[int], Awaitable[None]]
+Tell = Callable[[int], object]  # must not wait
 
 
 class Changes:
@@ -52,7 +52,7 @@ class Changes:
             return
         self.version = version
         for tell in list(self._listeners):
-            await tell(version)
+            tell(version)
         self.studio.warm_up()
 
 

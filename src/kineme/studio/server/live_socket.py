@@ -36,6 +36,7 @@ async def live(socket: WebSocket) -> None:
             await client.answer_all()
     finally:
         changes.leave(client.tell_of)
+        client.leave()
         reading.cancel()
 
 
@@ -58,11 +59,26 @@ class _Client:
         self._waiting: asyncio.Queue[_Told] = asyncio.Queue(_WAITING)
         self._held: _Told | None = None
         self._turn = asyncio.Lock()
+        self._version = -1  # of the library, that the client is to know
+        self._telling: asyncio.Task[None] | None = None
 
-    async def tell_of(self, version: int) -> None:
-        """Send the version that the library has now."""
+    def tell_of(self, version: int) -> None:
+        """Send the version that the library has now, without waiting for a client that does not read."""
+        self._version = version
+        if self._telling is None or self._telling.done():
+            self._telling = asyncio.create_task(self._tell())
+
+    def leave(self) -> None:
+        """Tell nothing more."""
+        if self._telling is not None:
+            self._telling.cancel()
+
+    async def _tell(self) -> None:
+        told = -1
         with suppress(WebSocketDisconnect, RuntimeError):
-            await self._send({"changed": version})
+            while told != self._version:
+                told = self._version
+                await self._send({"changed": told})
 
     async def read(self) -> None:
         """Queue what arrives, and an empty one at the end."""
