@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bench.rows import Row
+from bench.simulated_panda import tracking
 from kineme import DMP, Trajectory
 from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, InverseKinematics, Robot, load, move
@@ -28,15 +29,16 @@ def measure(quick: bool) -> list[Row]:
     for name in ("panda", "ur5e", "wam"):
         robot = load(name)
         rows += [_accuracy(robot), _whole(robot, repeats), *_steps(robot, 100 if quick else 600)]
-    return rows
+    panda = load("panda")
+    return [*rows, *tracking(stroke(panda, SECONDS / 4), panda)]  # too fast: it is slowed down
 
 
-def stroke(robot: Robot) -> Trajectory:
+def stroke(robot: Robot, seconds: float = SECONDS) -> Trajectory:
     """An S, 20 cm tall, with the velocity of least jerk."""
     u = np.linspace(0.0, 1.0, N_SAMPLES)
     s = 10 * u**3 - 15 * u**4 + 6 * u**5
     shape = np.column_stack((0 * s, 0.4 * (s - 0.5), SIZE / 2 * np.sin(2 * np.pi * s)))
-    return Trajectory(times=SECONDS * u, positions=InverseKinematics(robot).tip_position + shape)
+    return Trajectory(times=seconds * u, positions=InverseKinematics(robot).tip_position + shape)
 
 
 def _accuracy(robot: Robot) -> Row:
