@@ -18,9 +18,7 @@ MOST_OFF = 10.0  # mm
 POSITION = np.array(
     [3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0]
 )  # [Nm/rad], as libfranka's examples set them
-EFFORT = np.array(
-    [600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0]
-)  # [Nm/rad], of torque control in franka_ros
+EFFORT = np.array([600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0])  # [Nm/rad], of torque control in franka_ros
 _DAMPED = 1.4  # damping over the square root of the stiffness: of a unit inertia 0.7 of the critical one
 _INERTIAS = '<mujoco><compiler fusestatic="false" balanceinertia="true" boundmass="1e-3" boundinertia="1e-6"/></mujoco>'
 _RATE = 1000.0  # samples and steps of the simulation per second
