@@ -39,7 +39,7 @@ def within_limits(
     SpecificationError
         Limits of the wrong shape or order; a start, goal or via point outside; a movement that cannot stay inside.
     """
-    low, high = _limits(limits, movement.starts.shape[1])
+    low, high = as_limits(limits, movement.starts.shape[1])
     dmp = movement.primitives.dmp
     rounding = _ROUNDING * movement.primitives.extents.max(axis=1)[:, None]  # (1 or n, 1)
     held_at = {"start": movement.starts[:, None], "goal": movement.arrivals[:, None], "via points": points}
@@ -70,7 +70,14 @@ def within_limits(
     return replace(movement, change=Change(dense, np.eye(dmp.n_basis)))
 
 
-def _limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, Array]:
+def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, Array]:
+    """Limits (low, high), each (d,), of numbers or arrays.
+
+    Raises
+    ------
+    SpecificationError
+        No two numbers or (d,) arrays, or low that is not below high.
+    """
     try:
         low, high = (np.broadcast_to(as_numbers(one, "position_limits"), n_dims) for one in limits)
     except (TypeError, ValueError) as error:

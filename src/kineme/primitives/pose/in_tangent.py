@@ -11,10 +11,11 @@ from kineme.movements.rotations.rotation_vectors import log, nearest
 from kineme.primitives.discrete.extrapolation import Measured
 from kineme.primitives.discrete.modulate import path_at
 from kineme.primitives.discrete.per_movement import broadcast_length, per_movement
+from kineme.primitives.discrete.position_limits import as_limits
 from kineme.primitives.discrete.rollout import Rollout
 from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.primitives.pose.rates import rotation_vector_rate
-from kineme.validation import Array, as_numbers
+from kineme.validation import Array
 
 _RADIAN = 1.0  # an orientation within it is no mistake of unit or frame, however little the movement turns
 _ROUNDING = 1e-9  # of the largest position: so far is no way
@@ -131,7 +132,7 @@ def limits_of_positions(
     Raises
     ------
     SpecificationError
-        Limits of orientations alone; limits that are no two numbers, or (p,) of p positions.
+        Limits of orientations alone; limits that are no two numbers, or (p,) of p positions; low not below high.
     """
     if limits is None:
         return None
@@ -139,12 +140,7 @@ def limits_of_positions(
         raise SpecificationError(
             "expected position_limits of movements with positions, got orientations alone, which have none"
         )
-    try:
-        low, high = (np.broadcast_to(as_numbers(one, "position_limits"), n_positions) for one in limits)
-    except (TypeError, ValueError) as error:
-        raise SpecificationError(
-            f"expected position_limits=(low, high), each a number or {n_positions} of them, got {limits!r}"
-        ) from error
+    low, high = as_limits(limits, n_positions)
     free = np.full(n_dims - n_positions, np.inf)
     return np.append(low, -free), np.append(high, free)
 
