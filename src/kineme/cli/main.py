@@ -9,7 +9,6 @@ from typing import Any
 
 import click
 
-from kineme import __version__
 from kineme.cli.anchor import anchor
 from kineme.cli.annotate import annotate
 from kineme.cli.evaluate import evaluate
@@ -59,7 +58,7 @@ def _say_compiling() -> None:
 
 
 @click.group(cls=_OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__)
+@click.version_option(package_name="kineme")
 def main() -> None:
     """Learn movements as Dynamical Movement Primitives, recognize them, move again."""
 

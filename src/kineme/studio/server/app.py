@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from importlib.metadata import version
 from pathlib import Path
 
 import anyio.to_thread
 from fastapi import FastAPI
 
-from kineme import __version__
 from kineme.studio.server import (
     change_routes,
     library_routes,
@@ -64,7 +64,7 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
     studio = Studio(Path(folder), read_only)
     app = FastAPI(
         title="kineme studio",
-        version=__version__,
+        version=version("kineme"),
         description="An action library: what movements are, what they are called, and how they go on.",
         openapi_url="/api/openapi.json",
         docs_url=None,  # these pages load scripts from elsewhere
