@@ -17,7 +17,7 @@ sys.path.append(str(DOCS))  # for `site`, the extensions of these pages
 
 project = "kineme"
 author = "The kineme developers"
-copyright = f"2026, {author}"
+project_copyright = f"2026, {author}"
 version = release = kineme.__version__
 
 extensions = [

@@ -1,4 +1,4 @@
-"""The default fit is the one that ``python -m bench --only dmp_defaults`` chooses; docs/guide/moving-again.md shows why."""
+"""The default fit is what ``python -m bench --only dmp_defaults`` chooses; docs/guide/moving-again.md shows why."""
 
 from __future__ import annotations
 
