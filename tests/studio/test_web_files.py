@@ -29,7 +29,8 @@ def test_there_is_a_page_its_tokens_and_its_modules():
 
 FINDING = """
 import { found } from "./parts/find.js";
-const symbols = Array.from({ length: 20 }, (_, k) => ({ name: `Place it on shelf ${k}`, description: k === 3 ? "Careful" : null }));
+const described = (k) => ({ name: `Place it on shelf ${k}`, description: k === 3 ? "Careful" : null });
+const symbols = Array.from({ length: 20 }, (_, k) => described(k));
 const field = { value: "SHELF  17", hidden: true };
 const names = (some) => some.map((one) => one.name);
 const last = [names(found(field, symbols)), names(found({ value: "careful" }, symbols)), field.hidden];
