@@ -71,7 +71,9 @@ def test_a_name_that_was_pointed_here_is_refused(client, host):
         assert "expected the address that kineme studio printed" in answer.json()["error"]
 
 
-@pytest.mark.parametrize("host", ["localhost", "localhost:9000", "127.0.0.1", "[::1]:8420", "LOCALHOST:8420", "127.0.0.2", "[0:0::1]"])
+@pytest.mark.parametrize(
+    "host", ["localhost", "localhost:9000", "127.0.0.1", "[::1]:8420", "LOCALHOST:8420", "127.0.0.2", "[0:0::1]"]
+)
 def test_every_name_of_the_loopback_is_ours(client, host):
     assert client.get("/api/library", headers={"Host": host}).status_code == 200
 

@@ -126,7 +126,18 @@ def test_files_that_hold_no_movement_are_refused_in_a_sentence(client, name):
     assert client.get("/api/library").status_code == 200
 
 
-NAMES = ["../../etc/passwd", "..%2f..%2fx.csv", "C:\\x.csv", ".hidden.csv", "a\x01b.csv", "-rf.csv", "%00.csv", "", " ", "\u540d" * 130 + ".csv"]
+NAMES = [
+    "../../etc/passwd",
+    "..%2f..%2fx.csv",
+    "C:\\x.csv",
+    ".hidden.csv",
+    "a\x01b.csv",
+    "-rf.csv",
+    "%00.csv",
+    "",
+    " ",
+    "\u540d" * 130 + ".csv",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -115,8 +115,8 @@ def _token() -> str:
     letters = token.isascii() and token.replace("-", "").replace("_", "").isalnum()
     if not letters or not _LEAST_TOKEN <= len(token) <= _MOST_TOKEN:
         raise SpecificationError(
-            f"expected {TOKEN} to be at least {_LEAST_TOKEN} letters, digits, - and _, and at most {_MOST_TOKEN:,}, got "
-            f"another one of {len(token):,}; choose another one, or leave it out"
+            f"expected {TOKEN} to be at least {_LEAST_TOKEN} letters, digits, - and _, and at most {_MOST_TOKEN:,}, "
+            f"got another one of {len(token):,}; choose another one, or leave it out"
         )
     return token
 
