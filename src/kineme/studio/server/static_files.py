@@ -39,8 +39,8 @@ class StaticFile(NamedTuple):
 class StaticFiles:
     """Answer for the files of the page at once, and pass everything else on.
 
-    The page is made of some fifty modules. Answering for them before routes are searched, and without a thread for each,
-    is a large part of a short first view.
+    The page is made of some fifty modules. Answering for them before routes are searched, and without a thread for
+    each, is a large part of a short first view.
     """
 
     def __init__(self, app: ASGIApp) -> None:
