@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import httpx
 import pytest
@@ -21,6 +22,8 @@ from websockets.sync.client import connect
 
 from kineme import ActionLibrary, Trajectory
 from kineme.cli import main
+from kineme.errors import SpecificationError
+from kineme.studio.server import serve
 
 
 @pytest.fixture(scope="module")
@@ -194,16 +197,33 @@ def test_a_port_that_is_taken_is_refused(folder):
     assert (code, "choose another --port" in said) == (1, True)
 
 
+@pytest.mark.parametrize("token", ["", "a" * 15, "a" * 1001, "\u00e4" * 20, "a token with spaces in it"])
+def test_tokens_are_long_enough_and_fit_into_a_cookie(monkeypatch, token):
+    monkeypatch.setenv("KINEME_STUDIO_TOKEN", token)
+    with pytest.raises(SpecificationError, match="at most 1,000"):
+        serve._token()
+
+
+def test_an_empty_host_is_not_every_address():
+    with pytest.raises(SpecificationError, match="an empty --host"):
+        serve._listening(serve.Options(Path("none"), host=""))
+
+
 def test_a_token_that_is_too_short_is_refused(folder, monkeypatch):
     monkeypatch.setenv("KINEME_STUDIO_TOKEN", "short")
     code, said = _refused(folder)
     assert (code, "at least 16 letters" in said) == (1, True)
 
 
-def test_on_a_network_and_for_reading_only_it_says_what_that_means(folder):
+def test_on_a_network_and_for_reading_only_it_says_so_and_leaves_nothing_with_a_terminal_that_closes(
+    folder, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     one = Running(folder, "--host", "0.0.0.0", "--read-only")
     assert "for reading only" in one.line
     port = one.address.rpartition(":")[2]
     assert httpx.post(f"http://127.0.0.1:{port}/api/library/undo", headers=BEARER).status_code == 403
-    _, _, err = one.end(signal.SIGTERM)
+    assert list(tmp_path.glob("kineme-studio-*"))
+    _, _, err = one.end(signal.SIGHUP)
     assert "give it to those you trust" in err
+    assert not list(tmp_path.glob("kineme-studio-*"))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from kineme.studio.server.records import Change, Ids, Name, Point
+from kineme.studio.server.records import Change, Ids, Name, Point, Times
 
 
 class NewMovement(Change):
     """A movement to be stored."""
 
-    times: Point
+    times: Times
     positions: list[Point]
     label: Name | None = Field(None, description="Name of its symbol, which is made if needed.")
     group: Name | None = Field(None, description="Who showed it.")

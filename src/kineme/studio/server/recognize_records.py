@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from kineme.studio.server.records import Number, Point, Sent
+from kineme.studio.server.records import Number, Point, Sent, Times
 
 
 class Asked(Sent):
     """A movement to be recognized."""
 
-    times: Point
+    times: Times
     positions: list[Point]
     error_rate: Number = Field(0.05, gt=0, lt=1)
 

@@ -10,6 +10,7 @@ Name = Annotated[str, Field(min_length=1, max_length=10_000)]
 Ids = Annotated[list[int], Field(min_length=1, max_length=1_000_000)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]
+Times = Annotated[list[Number], Field(min_length=1, max_length=1_000_000)]
 Points = list[list[float | None]]
 
 
