@@ -51,7 +51,8 @@ napoleon_use_rtype = False
 
 #: Chapters in the order of the flow; others come behind them.
 _CHAPTERS = (
-    "movements", "recognition", "primitives", "modulation", "adapting", "control", "rhythm_and_poses", "kernels", "anchoring", "robots"
+    "movements", "recognition", "primitives", "modulation", "adapting", "control", "rhythm_and_poses", "kernels",
+    "anchoring", "robots",
 )  # fmt: skip
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",

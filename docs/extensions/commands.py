@@ -11,9 +11,9 @@ from walk_through import pages as written_pages
 from kineme.cli import main
 
 #: Of commands that no page shows.
-_EXAMPLES = {
+EXAMPLES = {
     "kineme library merge": ["kineme library merge wave greeting --into wave --library actions/"],
-    "kineme library split": ["kineme library split wave --library actions/"],
+    "kineme library split": ["kineme library split wave --movement 4 --movement 7 --into greeting --library actions/"],
     "kineme library schema": ["kineme library schema > grounding.schema.json"],
     "kineme reproduce": ["kineme reproduce --out out/"],
 }
@@ -50,7 +50,7 @@ def _command(command: click.Command, path: str, rule: str, examples: dict[str, l
         return lines
     usage = " ".join([path, *command.collect_usage_pieces(context)])
     lines += [*_text(command.help or ""), ".. code-block:: text", "", f"   {usage}", ""]
-    shown = examples.get(path) or _EXAMPLES[path]
+    shown = examples.get(path) or EXAMPLES[path]
     lines += ["**As in**", "", ".. code-block:: bash", "", *(f"   {one}" for one in shown[:_MOST]), ""]
     return [*lines, f".. program:: {path}", "", *_options(command, context)]
 

@@ -11,7 +11,7 @@ from extensions.typeset import NoFormulaError, to_tex
 _CODE = re.compile(r"(``.+?``|`[^`]+`)")
 _INDENTED = re.compile(r"(?:(?<=\n\n)|\A)((?: {4}\S.*\n?|\n(?= {4}\S))+)(?=\n|\Z)")
 _HEADING = re.compile(r"\n\n(?=[A-Z][A-Za-z ]+\n-{3,}\n)")
-_IS_FORMULA = re.compile(r"[=+^/~<>]|\w \w| - ")
+_IS_FORMULA = re.compile(r" [-=+~<>]|[\^/]|\w \w")
 
 
 def to_rest(docstring: str) -> str:

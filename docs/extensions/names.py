@@ -42,7 +42,8 @@ def _file(title: str) -> str:
 def _page(one: Public) -> str:
     head = f"{one.name}\n{'=' * len(one.name)}\n\n.. currentmodule:: {one.module}\n\n"
     value = one.value
-    foot = f"\nDefined in ``{one.home}``.\n"
+    gallery = f".. minigallery:: {one.path}\n   :add-heading: In the gallery\n   :heading-level: -\n"
+    foot = f"\nDefined in ``{one.home}``.\n\n{gallery}"
     if isinstance(value, type):
         return f"{head}.. autoclass:: {one.name}\n   :members:\n   :inherited-members:\n{foot}"
     if inspect.isroutine(value):
