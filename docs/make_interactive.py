@@ -24,9 +24,9 @@ _CONTROLS = """\
 <button type="button" data-act="spring">the spring alone</button>
 <button type="button" data-act="again">as it was shown</button>
 </div>
-<p class="said">Drag the star or a bar, or draw a movement of your own: the encode matrix learns it as you lift the pen.
-With the keyboard: Tab to the star or a bar, then the arrow keys; Home makes a weight 0. Arrows at the dot, half as long as
-the terms over K are: the goal-attractor (green) and the shape-attractor (orange, dashed).</p>
+<p class="said">Drag the star or a bar, or draw a movement of your own: the encode matrix learns it as you lift the
+pen. With the keyboard: Tab to the star or a bar, then the arrow keys; Home makes a weight 0. Arrows at the dot,
+half as long as the terms over K are: the goal-attractor (green) and the shape-attractor (orange, dashed).</p>
 """
 
 
