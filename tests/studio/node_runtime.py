@@ -22,7 +22,7 @@ def ask(snapshot, questions, runtime=RUNTIME):
     """What the runtime answers to each question; an error is raised."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "questions.json"
-        path.write_text(json.dumps({"snapshot": json.loads(snapshot.to_json()), "questions": questions}))
+        path.write_text(f'{{"snapshot": {snapshot.to_json()}, "questions": {json.dumps(questions)}}}')
         done = subprocess.run([NODE, DRIVER, runtime, path], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     answers = json.loads(done.stdout)

@@ -410,6 +410,12 @@ def test_drawing_does_not_move_anything_else(opened, served_letters):
     page.mouse.up()
     wait_until(page, "document.getElementById('verdict').textContent !== '…'")
     assert page.evaluate(where) == before
+    draw(page, letters("Sine")[SHOWN], share=0.6)
+    page.keyboard.press("Escape")
+    page.mouse.move(300, 300)
+    page.mouse.up()
+    assert page.inner_text("#verdict-kind") == "Nothing drawn yet"
+    assert page.is_visible("#draw-empty")
 
 
 def test_movements_in_space_turn(opened, studio, tmp_path):

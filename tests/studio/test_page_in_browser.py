@@ -127,6 +127,11 @@ def test_keys_do_what_the_mouse_does(opened):
     wait_until(page, "kineme.state.played === kineme.state.moving.positions.length - 1")
     page.locator("#stage").press("Escape")
     assert page.evaluate("kineme.state.moving") is None
+    draw(page, until=0.5)
+    page.keyboard.press("Escape")
+    page.mouse.move(300, 300)
+    page.mouse.up()
+    assert page.locator("#verdict").inner_text() == "What is it?"
 
 
 def test_a_scribble_is_unknown_and_a_dot_is_asked_again(opened):

@@ -249,4 +249,10 @@ def test_the_interface_is_described(client):
         for method, one in methods.items():
             assert one.get("summary"), (method, path)
             assert one.get("description"), (method, path)
+            assert all(given.get("description") for given in one.get("parameters", [])), (method, path)
+            assert set(one["responses"]) == {"200", "4XX", "5XX"}, (method, path)
+            assert one["responses"]["200"]["content"], (method, path)
+    refused = client.post("/api/recognize", json={}).json()
+    assert set(refused) == set(described["components"]["schemas"]["Refusal"]["properties"])
+    assert described["security"] == [{name: []} for name in described["components"]["securitySchemes"]]
     assert BEARER["Authorization"].split()[1] not in json.dumps(described)

@@ -16,6 +16,7 @@ PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
 MAX_FILE = 300
 NODE = shutil.which("node")
+needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
 
 def _name(path):
@@ -38,21 +39,94 @@ console.log(JSON.stringify([...last, found(field, symbols.slice(0, 5)).length, f
 """
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed")
-def test_symbols_are_found_by_words_where_there_are_many():
-    asked = subprocess.run(
-        [NODE, "--input-type=module"], input=FINDING, cwd=WEB, capture_output=True, text=True, check=True
-    )
-    assert json.loads(asked.stdout) == [["Place it on shelf 17"], ["Place it on shelf 3"], False, 5, ""]
+def _in_node(program, *arguments, options=()):
+    """What a module prints as JSON."""
+    command = [NODE, *options, "--input-type=module", "-e", program, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed")
-@pytest.mark.parametrize("path", SCRIPTS, ids=_name)
-def test_a_module_parses(path):
-    checked = subprocess.run(
-        [NODE, "--input-type=module", "--check"], input=path.read_text(), capture_output=True, text=True, check=False
-    )
-    assert checked.returncode == 0, checked.stderr
+PARSES = """import { readFileSync } from "node:fs";
+import { SourceTextModule } from "node:vm";
+const wrong = {};
+for (const path of process.argv.slice(1)) {
+  try { new SourceTextModule(readFileSync(path, "utf8")); } catch (error) { wrong[path] = String(error); }
+}
+console.log(JSON.stringify(wrong));"""
+
+
+@needs_node
+def test_every_module_parses(tmp_path):
+    (tmp_path / "wrong.js").write_text("export const = 1;")
+    found = _in_node(PARSES, tmp_path / "wrong.js", *SCRIPTS, options=["--experimental-vm-modules"])
+    assert list(found) == [str(tmp_path / "wrong.js")]
+
+
+@pytest.fixture
+def modules(tmp_path):
+    """The modules where node knows them as such."""
+    folder = shutil.copytree(WEB, tmp_path / "web")
+    (folder / "package.json").write_text('{"type": "module"}')
+    return folder
+
+
+HEIGHTS = """const [folder, ...libraries] = process.argv.slice(1);
+const { refresh } = await import(`${folder}/parts/library_state.js`);
+const { canvasHeight } = await import(`${folder}/draw/scale.js`);
+const heights = [];
+for (const [version, symbols] of libraries.entries()) {
+  globalThis.fetch = async () => new Response(`{"version": ${version + 1}, "symbols": ${symbols}}`);
+  await refresh();
+  heights.push(canvasHeight());
+}
+console.log(JSON.stringify(heights));"""
+
+
+@needs_node
+def test_the_canvas_is_as_high_as_the_movements_of_the_library_in_powers_of_ten(modules):
+    sides = [[], [1.0], [0.3], [40.0], [0.002], [40.0, 50.0, 1e6], [0.0, 40.0], [1.7], [1.8]]
+    symbols = [[{"path": [[3, 5], [3 + side, 5 + side / 2]]} for side in several] for several in sides]
+    for several in symbols:
+        several.append({"path": None})
+    symbols[6][0]["path"] = [[3, 5], [3, 5]]  # it does not move
+    heights = _in_node(HEIGHTS, modules, *map(json.dumps, symbols))
+    assert heights == [1, 1, 1, 100, 0.01, 100, 100, 1, 10]
+
+
+REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
+let [version, asked, fails] = [1, 0, false];
+const told = [];
+onLibrary((known) => told.push(known.version));
+globalThis.fetch = async () => {
+  const [now, refused] = [version, fails];
+  asked += 1;
+  await new Promise((done) => setTimeout(done, 5));
+  if (refused) return new Response('{"error": "busy"}', { status: 503 });
+  return new Response(`{"version": ${now}, "symbols": []}`);
+};
+const first = refresh();
+await Promise.resolve();
+version = 2;
+const seen = (await Promise.all([first, refresh(), refresh()])).map((one) => one.version);
+fails = true;
+const failing = refresh().catch((error) => error.message);
+await Promise.resolve();
+[fails, version] = [false, 3];
+const after = (await refresh()).version;
+console.log(JSON.stringify({ seen, asked, told, refused: await failing, after, now: library().version }));"""
+
+
+@needs_node
+def test_what_is_asked_after_a_change_is_answered_with_that_change(modules):
+    assert _in_node(REFRESHES, modules) == {
+        "seen": [1, 2, 2],
+        "asked": 4,
+        "told": [1, 2, 3],
+        "refused": "busy",
+        "after": 3,
+        "now": 3,
+    }
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=_name)

@@ -109,7 +109,7 @@ function bars(ranked) {
 }
 
 function clear() {
-  Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "" });
+  Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "", pointer: null, held: null });
   select(null);
   bars([]);
   showAnswer();

@@ -24,6 +24,7 @@ from kineme.studio.server import (
 from kineme.studio.server.access import Guard
 from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
+from kineme.studio.server.description import ABOUT, REFUSALS, Described
 from kineme.studio.server.refusals import answer_errors
 from kineme.studio.server.static_files import StaticFiles
 from kineme.studio.server.studio import Studio
@@ -62,10 +63,11 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
         The library cannot be opened.
     """
     studio = Studio(Path(folder), read_only)
-    app = FastAPI(
+    app = Described(
         title="kineme studio",
         version=version("kineme"),
-        description="An action library: what movements are, what they are called, and how they go on.",
+        description=ABOUT,
+        responses=REFUSALS,
         openapi_url="/api/openapi.json",
         docs_url=None,  # these pages load scripts from elsewhere
         redoc_url=None,

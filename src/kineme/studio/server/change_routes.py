@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 
 from kineme.errors import SpecificationError
 from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import AsOf, Learned, Version
+from kineme.studio.server.records import VERSION, AsOf, Learned, SymbolKey, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Studio, Writes
 
@@ -52,21 +52,21 @@ def merge(studio: Writes, asked: Merge) -> dict[str, Any]:
 
 
 @router.post("/symbols/{key}/rename", response_model=Version, summary="Rename a symbol")
-def rename(studio: Writes, key: str, asked: Rename) -> dict[str, Any]:
+def rename(studio: Writes, key: SymbolKey, asked: Rename) -> dict[str, Any]:
     """Its id stays."""
     studio.library.rename(studio.symbol(key, asked.version).name, asked.name)
     return _version(studio)
 
 
 @router.post("/symbols/{key}/describe", response_model=Version, summary="Describe a symbol")
-def describe(studio: Writes, key: str, asked: Describe) -> dict[str, Any]:
+def describe(studio: Writes, key: SymbolKey, asked: Describe) -> dict[str, Any]:
     """In words of your own."""
     studio.library.annotate(studio.symbol(key, asked.version).name, asked.text)
     return _version(studio)
 
 
 @router.post("/symbols/{key}/split", response_model=Version, summary="Make a new symbol of some members")
-def split(studio: Writes, key: str, asked: Split) -> dict[str, Any]:
+def split(studio: Writes, key: SymbolKey, asked: Split) -> dict[str, Any]:
     """The others stay."""
     studio.check_movements(asked.ids, asked.version)
     studio.library.split(studio.symbol(key, asked.version).name, asked.ids, asked.name)
@@ -74,7 +74,9 @@ def split(studio: Writes, key: str, asked: Split) -> dict[str, Any]:
 
 
 @router.delete("/symbols/{key}", response_model=Version, summary="Delete a symbol; its movements stay")
-def delete_symbol(studio: Writes, key: str, version: int | None = None) -> dict[str, Any]:
+def delete_symbol(
+    studio: Writes, key: SymbolKey, version: Annotated[int | None, Query(description=VERSION)] = None
+) -> dict[str, Any]:
     """They belong to none then."""
     studio.library.delete(studio.symbol(key, version).name)
     return _version(studio)

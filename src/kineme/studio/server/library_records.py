@@ -75,7 +75,7 @@ class MapPoint(BaseModel):
 
 
 class MapOut(BaseModel):
-    """At most 2,000 movements in the plane."""
+    """Some movements in the plane, equally many of each symbol."""
 
     points: list[MapPoint]
 
@@ -90,7 +90,7 @@ class VersionOut(BaseModel):
 
 
 class HistoryOut(BaseModel):
-    """All changes, the last one first."""
+    """The last 200 changes, the last one first, and how many there are in all."""
 
     versions: list[VersionOut]
     total: int

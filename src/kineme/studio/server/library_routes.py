@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hashlib import sha256
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
@@ -18,6 +18,7 @@ from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.library_records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
 from kineme.studio.server.plain import numbers, thumbnail
+from kineme.studio.server.records import MovementKey
 from kineme.studio.server.studio import Reads, Studio
 
 router = APIRouter(prefix="/api/library", tags=["library"])
@@ -38,10 +39,10 @@ def library(request: Request, studio: Reads) -> Response:
 @router.get("/movements", response_model=MovementsOut, summary="Movements, some at a time")
 def movements(
     studio: Reads,
-    symbol: str | None = None,
-    unlabeled: bool = False,
-    offset: int = Query(0, ge=0),
-    limit: int = Query(60, ge=1, le=500),
+    symbol: Annotated[str | None, Query(description="Those of the symbol of this id.")] = None,
+    unlabeled: Annotated[bool, Query(description="Those that belong to no symbol.")] = False,
+    offset: Annotated[int, Query(ge=0, description="How many to pass over.")] = 0,
+    limit: Annotated[int, Query(ge=1, le=500, description="How many at most.")] = 60,
 ) -> dict[str, Any]:
     """Those of a symbol, those without one, or all; in the order in which they were learned."""
     if symbol is not None:
@@ -52,7 +53,7 @@ def movements(
 
 
 @router.get("/movements/{key}", response_model=RecordingOut, summary="One whole movement")
-def movement(studio: Reads, key: int) -> dict[str, Any]:
+def movement(studio: Reads, key: MovementKey) -> dict[str, Any]:
     """Its times [s] and positions as they were recorded."""
     studio.check_movements([key])
     one = studio.library.movements(ids=[key])[0]

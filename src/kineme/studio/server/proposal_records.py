@@ -20,7 +20,6 @@ class ProposalOut(BaseModel):
     id: str
     members: list[int]
     medoid: int
-    suggested: str | None
     cohesion: float
     stability: float | None
     path: Points

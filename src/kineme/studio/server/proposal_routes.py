@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
+import numpy as np
 from fastapi import APIRouter
 
 from kineme.anchoring.proposals.proposals import Proposal
 from kineme.library.storage import read
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.proposal_records import Named, ProposalsOut
-from kineme.studio.server.records import AsOf, Version
+from kineme.studio.server.records import AsOf, ProposalKey, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio, Writes
 
@@ -26,14 +27,14 @@ def proposals(studio: Reads) -> dict[str, Any]:
 
 
 @router.post("/{key}/accept", response_model=Version, summary="Name a proposal")
-def accept(studio: Writes, key: str, asked: Named) -> dict[str, Any]:
+def accept(studio: Writes, key: ProposalKey, asked: Named) -> dict[str, Any]:
     """Its movements belong to that symbol from now on, which is made if needed; its medoid is the prototype."""
     studio.library.accept(_proposal(studio, key), asked.name, asked.description)
     return {"version": studio.library.version}
 
 
 @router.post("/{key}/reject", response_model=Version, summary="Propose it no more")
-def reject(studio: Writes, key: str, asked: AsOf | None = None) -> dict[str, Any]:
+def reject(studio: Writes, key: ProposalKey, asked: AsOf | None = None) -> dict[str, Any]:
     """Its movements stay without a name."""
     studio.library.reject(_proposal(studio, key))
     return {"version": studio.library.version}
@@ -59,12 +60,11 @@ def _key(one: Proposal) -> str:
 
 
 def _plain(studio: Studio, key: str, one: Proposal) -> dict[str, Any]:
-    medoid = read.movements(studio.library.store, one.members[one.members == one.medoid])[0]
+    medoid = read.movements(studio.library.store, np.array([one.medoid]))[0]
     return {
         "id": key,
         "members": one.members.tolist(),
         "medoid": one.medoid,
-        "suggested": None,
         "cohesion": one.cohesion,
         "stability": numbers(one.stability),
         "path": thumbnail(medoid.positions),

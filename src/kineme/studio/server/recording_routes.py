@@ -21,7 +21,7 @@ from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.plain import numbers
 from kineme.studio.server.recording_records import LearnSpans, Span, SpottedOut, Spotting, UploadOut
-from kineme.studio.server.records import Learned
+from kineme.studio.server.records import Learned, RecordingKey
 from kineme.studio.server.studio import Reads, Studio, Writes
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
@@ -36,7 +36,11 @@ _PLOTTED = 1000  # samples of a column
     openapi_extra={"requestBody": {"content": {"application/octet-stream": {}}, "required": True}},
 )
 async def send(
-    studio: Reads, request: Request, x_file_name: Annotated[str, Header(max_length=2000)] = "recording.csv"
+    studio: Reads,
+    request: Request,
+    x_file_name: Annotated[
+        str, Header(max_length=2000, description="Percent-encoded; its ending says the format.")
+    ] = "recording.csv",
 ) -> dict[str, Any]:
     """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
     key = await studio.uploads.receive(x_file_name, request.stream())
@@ -53,7 +57,7 @@ async def send(
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
-def spotted(studio: Reads, key: str, asked: Spotting) -> dict[str, Any]:
+def spotted(studio: Reads, key: RecordingKey, asked: Spotting) -> dict[str, Any]:
     """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample."""
     one = _one(studio, key, asked.table, asked.channels)
     found = annotate(studio.library.store, one, asked.error_rate)
@@ -67,7 +71,7 @@ def spotted(studio: Reads, key: str, asked: Spotting) -> dict[str, Any]:
 
 
 @router.post("/{key}/learn", response_model=Learned, summary="Learn stretches of a recording")
-def learn(studio: Writes, key: str, asked: LearnSpans) -> dict[str, Any]:
+def learn(studio: Writes, key: RecordingKey, asked: LearnSpans) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one."""
     one = _one(studio, key, asked.table, asked.channels)
     pieces = labeled_pieces(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 Name = Annotated[str, Field(min_length=1, max_length=10_000)]
@@ -12,6 +13,12 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]
 Times = Annotated[list[Number], Field(min_length=1, max_length=1_000_000)]
 Points = list[list[float | None]]
+SymbolKey = Annotated[str, Path(description="Id of a symbol, as in `/api/library`.")]
+MovementKey = Annotated[int, Path(description="Id of a movement, as in `/api/library/movements`.")]
+ProposalKey = Annotated[str, Path(description="Id of a proposal, as in `/api/proposals`.")]
+RecordingKey = Annotated[str, Path(description="What was answered when the recording was sent.")]
+
+VERSION = "The version that the client has seen; 409 if what is named is gone."
 
 
 class Sent(BaseModel):
@@ -23,7 +30,7 @@ class Sent(BaseModel):
 class Change(Sent):
     """What a change may say beside what it is."""
 
-    version: int | None = Field(None, description="The version that the client has seen; 409 if what is named is gone.")
+    version: int | None = Field(None, description=VERSION)
 
 
 class AsOf(Change):

@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import BaseModel, Field, model_validator
 
+from kineme.files.write_movement import WRITERS
 from kineme.studio.server.records import Number, Point, Points, Sent
 
 
@@ -51,14 +52,14 @@ class Wanted(Operated):
     goal: Point | None = None
     via: list[tuple[Number, Point]] = Field([], max_length=100)
     obstacles: list[Obstacle] = Field([], max_length=100)
-    duration: Number | None = Field(None, gt=0)
+    duration: Number | None = Field(None, gt=0, description="[s]")
     rate: Number | None = Field(None, gt=0, description="Samples per second; by default 200 in all.")
 
 
 class Exported(Wanted):
     """The same as a file."""
 
-    format: str = Field(description="csv, npz, json, parquet")
+    format: str = Field(description=f"One of {', '.join(WRITERS)}.")
 
 
 class Moved(BaseModel):

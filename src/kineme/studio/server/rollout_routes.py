@@ -11,6 +11,7 @@ from fastapi.responses import Response
 
 from kineme.files.write_movement import encode_movement
 from kineme.studio.server.plain import numbers
+from kineme.studio.server.records import SymbolKey
 from kineme.studio.server.rollout_records import Exported, Moved, Operated, OperatorsOut, StylesOut, Wanted
 from kineme.studio.server.rollouts import learned_as, make, operators, styles_of
 from kineme.studio.server.studio import Reads
@@ -46,14 +47,19 @@ def rollout_operators(studio: Reads, asked: Operated) -> dict[str, Any] | None:
 @router.get(
     "/library/symbols/{key}/styles", response_model=StylesOut, summary="In which ways members of a symbol differ"
 )
-def styles(studio: Reads, key: str) -> dict[str, Any]:
+def styles(studio: Reads, key: SymbolKey) -> dict[str, Any]:
     """The range of each direction; values of a rollout's style lie between."""
     model = styles_of(studio, key)
     ranges = {"lowest": model.lowest, "highest": model.highest, "explained": model.explained_variance}
     return {name: numbers(values) for name, values in ranges.items()}
 
 
-@router.post("/export", summary="A new movement as a file", response_class=Response)
+@router.post(
+    "/export",
+    summary="A new movement as a file",
+    response_class=Response,
+    responses={200: {"content": {"application/octet-stream": {}}, "description": "The file, with its name."}},
+)
 def export(studio: Reads, asked: Exported) -> Response:
     """With times, positions, velocities and accelerations, in each format that movements are written in."""
     made = make(studio, asked)

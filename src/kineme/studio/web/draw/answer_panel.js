@@ -79,10 +79,10 @@ export class AnswerPanel {
 
   /** Of the whole movement. @param {any} answer */
   final(answer) {
-    const ranked = answer.ranked.map((/** @type {any} */ one) => ({ name: one.name, value: one.p_value ?? answer.p_values?.[one.name] ?? one.share ?? 0 }));
+    const ranked = answer.ranked.map((/** @type {any} */ one) => ({ name: one.name, value: one.p_value ?? 0 }));
     const nearest = answer.nearest?.[0];
     const like = nearest ? `similarity ${nearest.similarity.toFixed(2)}` : "";
-    if (answer.label === null) this.words("The answer", "Unknown", `unlike everything that is known${answer.p_known === null || answer.p_known === undefined ? "" : `, p-value ${pValue(answer.p_known)}`}`, "unknown");
+    if (answer.label === null) this.words("The answer", "Unknown", `unlike everything that is known${answer.p_known === null ? "" : `, p-value ${pValue(answer.p_known)}`}`, "unknown");
     else {
       const p = ranked.find((/** @type {any} */ one) => one.name === answer.label)?.value;
       const sure = answer.calibrated ? `p-value ${pValue(p ?? 0)}` : "a guess until more is drawn";

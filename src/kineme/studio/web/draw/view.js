@@ -45,8 +45,8 @@ class Draw {
   listen() {
     const hear = {
       begins: (/** @type {string} */ kind) => this.begins(kind),
-      goes: (/** @type {number[][]} */ samples) => this.goes(samples),
-      ends: () => this.ends(),
+      goes: (/** @type {number[][]} */ samples) => this.drawing && this.goes(samples), // Escape ends it while the pen is down
+      ends: () => this.drawing && this.ends(),
       pen: (/** @type {number[]|null} */ at) => ((this.picture.pen = at), this.picture.board.draw()),
     };
     followPointer(byId("draw-canvas"), hear);

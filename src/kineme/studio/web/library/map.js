@@ -2,7 +2,7 @@
 import { get } from "../parts/api.js";
 import { Board, color } from "../parts/canvas.js";
 import { byId } from "../parts/elements.js";
-import { lookOf, symbolOf } from "../parts/library_state.js";
+import { library, lookOf, symbolOf } from "../parts/library_state.js";
 import { mark } from "../parts/lines.js";
 import { tried } from "../parts/toasts.js";
 
@@ -23,8 +23,9 @@ export class MovementMap {
   }
 
   async load() {
+    const { version } = library();
     const answer = await tried(() => get("/api/library/map"));
-    if (!answer) return;
+    if (!answer || version !== library().version) return;
     this.points = [...answer.points].sort((a, b) => a.x - b.x);
     this.at = -1;
     byId("map").closest("section").hidden = this.points.length < 3;

@@ -25,7 +25,6 @@ async function unlabeled() {
 function card(proposal, movements) {
   const chosen = new Set();
   const field = make("input", { type: "text", list: "names", maxlength: "200", placeholder: "Name", "aria-label": "Name of these movements", "data-key": `proposal ${proposal.medoid}` });
-  field.value = proposal.suggested ?? "";
   const yes = make("button", { class: "button main", type: "submit" });
   const label = () => (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
   label();
@@ -42,12 +41,12 @@ function card(proposal, movements) {
 }
 
 export async function showProposals() {
-  const { unlabeled: count } = library();
+  const { unlabeled: count, version } = library();
   byId("proposals").hidden = count === 0;
   if (!count) return;
   const answer = await tried(() => get("/api/proposals"));
   const movements = await tried(unlabeled);
-  if (!answer || !movements) return;
+  if (!answer || !movements || version !== library().version) return;
   const { proposals } = answer;
   byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${proposals.length > 1 ? `${proposals.length} groups of them may be a symbol each.` : proposals.length ? "One group of them may be a symbol." : "They form no clear groups yet; choose those that belong together under Show all."}`;
   keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));

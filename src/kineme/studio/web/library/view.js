@@ -25,10 +25,10 @@ async function mergeChosen() {
 
 async function showHistory() {
   if (!byId("history").open) return;
+  const { version } = library();
   const answer = await tried(() => get("/api/library/history"));
-  if (!answer) return;
-  const rows = [...answer.versions].sort((a, b) => b.number - a.number).slice(0, 200);
-  fill(byId("versions"), ...rows.map((one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
+  if (!answer || version !== library().version) return;
+  fill(byId("versions"), ...answer.versions.map((/** @type {any} */ one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
 }
 
 export function startLibrary() {

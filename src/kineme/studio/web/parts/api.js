@@ -56,10 +56,10 @@ export const remove = async (path) => (await request(path, { method: "DELETE" })
 /** Ask for a file and hand it to the person. @param {string} path @param {any} body @param {string} name */
 export async function download(path, body, name) {
   const response = await request(path, json(body));
-  const said = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "");
+  const said = /filename\*=UTF-8''([^;]+)/.exec(response.headers.get("Content-Disposition") ?? "");
   const link = document.createElement("a");
   link.href = URL.createObjectURL(await response.blob());
-  link.download = said ? said[1] : name;
+  link.download = said ? decodeURIComponent(said[1]) : name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   return link.download;

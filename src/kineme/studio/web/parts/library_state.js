@@ -10,7 +10,8 @@ let loaded = false;
 let tag = null;
 /** @type {Promise<any>|null} */
 let loading = null;
-let again = false;
+/** @type {Promise<any>|null} */
+let next = null;
 /** @type {((library: any) => void)[]} */
 const told = [];
 
@@ -23,26 +24,22 @@ export const isLoaded = () => loaded;
 /** @param {(library: any) => void} act Called after every change. */
 export const onLibrary = (act) => told.push(act);
 
-/** Ask anew; questions that come meanwhile are answered by one more. */
-export async function refresh() {
-  if (loading) {
-    again = true;
-    return loading;
-  }
-  loading = newer("/api/library", tag);
+/** The library as it is now: an answer that is under way may be older, and is followed by one more. @returns {Promise<any>} */
+export function refresh() {
+  if (!loading) return (loading = load().finally(() => (loading = null)));
+  next ??= loading.catch(() => null).then(() => {
+    next = null;
+    return refresh();
+  });
+  return next;
+}
+
+async function load() {
   const before = loaded ? known.version : -1;
-  try {
-    const answer = await loading;
-    if (answer) ({ body: known, tag } = answer);
-    loaded = true;
-  } finally {
-    loading = null;
-  }
+  const answer = await newer("/api/library", tag);
+  if (answer) ({ body: known, tag } = answer);
+  loaded = true;
   if (known.version !== before) for (const act of told) act(known);
-  if (again) {
-    again = false;
-    await refresh();
-  }
   return known;
 }
 

@@ -35,7 +35,7 @@ class Recordings {
     byId("drop").classList.add("small-drop");
     byId("recording-name").textContent = name;
     fill(byId("tables"), ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) => make("option", { value: String(k) }, one.name)));
-    fill(byId("problems"), ...(recording.problems ?? []).map((/** @type {any} */ one) => make("p", { class: "small" }, typeof one === "string" ? one : one.text)));
+    fill(byId("problems"), ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)));
     this.table();
     byId("spot").focus({ preventScroll: true });
   }

@@ -59,19 +59,13 @@ async function move(event) {
   if (answer.scene) showArm(answer.scene, answer.joints);
 }
 
-/** A server without the routes of arms says so in words. @param {any} error */
-function without(error) {
-  if (error.status !== 404) throw error;
-  return { available: false, why: "This studio moves no arms. The command kineme move does: a movement of the library on an arm, checked before anything moves.", robots: [] };
-}
-
 async function shown() {
   if (currentView() !== "robot") return;
   const { symbols } = library();
   const id = toMove(symbols);
   const movable = symbols.filter((/** @type {any} */ one) => one.path);
   fill(byId("robot-what"), ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
-  arms ??= await tried(() => get("/api/robots").catch(without));
+  arms ??= await tried(() => get("/api/robots"));
   if (!arms) return;
   const ready = arms.available && movable.length > 0;
   byId("robot-empty").hidden = ready;
