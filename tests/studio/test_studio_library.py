@@ -8,6 +8,7 @@ import pytest
 from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
+from kineme.errors import DataError
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -121,6 +122,42 @@ def test_symbols_are_renamed_described_split_merged_and_deleted(client):
     assert _symbols(client)["kind 0"]["id"] == key
 
 
+@pytest.mark.parametrize("fails", [True, False])
+def test_what_is_shown_is_made_again_if_the_library_changes_meanwhile(client, folder, fails):
+    studio, seen = client.app.state.studio, []
+
+    def make():
+        seen.append(studio.library.version)
+        if len(seen) == 1:
+            with ActionLibrary(folder) as other:
+                other.rename("kind 1", "elsewhere")
+            if fails:
+                raise DataError("what was looked for is gone")
+        return seen[-1]
+
+    assert studio.kept("seen", make) == studio.library.version == 2
+    assert seen == [1, 2]
+    assert studio.kept("seen", make) == 2
+    assert len(seen) == 2
+
+
+def test_of_many_things_the_last_200_are_kept(client):
+    studio, made = client.app.state.studio, []
+    for k in [*range(250), 249, 0]:
+        assert studio.kept_some("squares", str(k), lambda k=k: made.append(k) or k * k) == k * k
+    assert made == [*range(250), 0]
+    assert len(studio.kept("squares", dict)) == 200
+
+
+def test_a_library_that_another_process_writes_is_busy_not_wrong(client, folder):
+    client.app.state.studio.library.store.wait = 0.05
+    with ActionLibrary(folder) as other, other.store.writing("holds"):
+        answer = client.post("/api/library/movements", json=asked(7))
+    assert answer.status_code == 503
+    assert "try again when it has finished" in answer.json()["error"]
+    assert client.post("/api/library/movements", json=asked(7)).status_code == 200
+
+
 def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
     seen = client.get("/api/library").json()["version"]
     with ActionLibrary(folder) as other:
@@ -164,6 +201,13 @@ def test_the_answer_is_that_of_the_library(client, folder):
     assert [one["name"] for one in answer["ranked"]] == list(ours.ranked)
     assert [one["id"] for one in answer["nearest"]] == [one.index for one in ours.nearest]
     json.dumps(answer, allow_nan=False)
+
+
+def test_drawings_of_more_than_a_thousand_samples_are_taken(client):
+    times, positions = drawing(2, n=5000, seed=7)
+    long = {"times": times.tolist(), "positions": positions.tolist()}
+    assert client.post("/api/recognize", json=long).json()["label"] == "kind 2"
+    assert client.post("/api/library/movements", json={**long, "label": "kind 2"}).status_code == 200
 
 
 def _array(given):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sqlite3
 import time
 from types import SimpleNamespace
 
@@ -12,7 +13,8 @@ import pytest
 from studio_samples import LIVE, asked, samples
 
 from kineme import ActionLibrary
-from kineme.errors import TrajectoryError
+from kineme.errors import DataError, TrajectoryError
+from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import parsed_samples
 from kineme.studio.server.live_socket import _Client
 
@@ -147,6 +149,18 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
         assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
 
 
+def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
+    def fail(library):
+        raise DataError("expected a disk")
+
+    with client.websocket_connect(LIVE) as socket:
+        with monkeypatch.context() as broken:
+            broken.setattr(ActionLibrary, "stream", fail)
+            socket.send_json({"samples": samples(1)[:6]})
+            assert _said(socket, "error") == "expected a disk"
+        assert _draw(socket, 1)["ranked"][0]["name"] == "kind 1"
+
+
 def test_in_an_empty_library_drawings_are_taken_and_nothing_is_said(tmp_path, open_studio):
     client = open_studio(tmp_path / "new")
     with client.websocket_connect(LIVE) as socket:
@@ -215,3 +229,28 @@ def test_a_client_that_does_not_read_delays_nobody_and_is_told_the_newest_versio
         return sent
 
     assert asyncio.run(told()) == ['{"changed": 3}', '{"changed": 5}']
+
+
+def test_changes_are_told_again_after_the_library_could_not_be_read():
+    versions = iter([1, sqlite3.OperationalError("a lock of another kind"), DataError("gone"), 2])
+
+    class Library:
+        @property
+        def version(self):
+            if isinstance(now := next(versions, 2), Exception):
+                raise now
+            return now
+
+    async def told() -> list[int]:
+        heard: list[int] = []
+        changes = Changes(SimpleNamespace(library=Library(), warm_up=lambda: None), period=0.001)
+        changes.listen(heard.append)
+        watching = asyncio.create_task(changes.watch())
+        async with asyncio.timeout(10):
+            while not heard:
+                assert not watching.done()
+                await asyncio.sleep(0.001)
+        watching.cancel()
+        return heard
+
+    assert asyncio.run(told()) == [2]
