@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from studio_samples import asked, drawing, make_library
 
@@ -35,6 +36,7 @@ def test_the_library_is_shown(client, folder):
         first = library.movements(ids=[1])[0].positions
     assert shown["symbols"][0]["path"][0] == pytest.approx(first[0].tolist(), abs=1e-4)
     assert shown["symbols"][0]["path"][-1] == pytest.approx(first[-1].tolist(), abs=1e-4)
+    assert np.abs(np.array(shown["symbols"][0]["path"][1]) - first).max(axis=1).min() < 1e-4 * np.ptp(first)
 
 
 def test_a_new_library_is_made_and_learns_its_first_movement(tmp_path, open_studio):
@@ -199,6 +201,8 @@ def test_the_answer_is_that_of_the_library(client, folder):
     assert (answer["label"], answer["calibrated"]) == (ours.label, ours.calibrated)
     assert answer["p_values"] == pytest.approx(dict(ours.p_values))
     assert [one["name"] for one in answer["ranked"]] == list(ours.ranked)
+    assert [one["p_value"] for one in answer["ranked"]] == pytest.approx([ours.p_values[name] for name in ours.ranked])
+    assert (answer["confidence"], answer["p_known"]) == pytest.approx((ours.confidence, ours.p_known))
     assert [one["id"] for one in answer["nearest"]] == [one.index for one in ours.nearest]
     json.dumps(answer, allow_nan=False)
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from studio_samples import LIVE, asked, samples
+from studio_samples import LIVE, asked, make_library, samples
 
 from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
@@ -149,6 +149,11 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
         assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
 
 
+def test_eight_names_are_told_of_many(tmp_path, open_studio):
+    with open_studio(make_library(tmp_path / "many", symbols=10, members=1)).websocket_connect(LIVE) as socket:
+        assert len(_draw(socket, 2, step=30)["ranked"]) == 8
+
+
 def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
     def fail(library):
         raise DataError("expected a disk")
@@ -179,6 +184,15 @@ def test_changes_of_others_are_told_to_everyone(client, folder):
             other.rename("kind 1", "elsewhere")
         assert _said(one, "changed") == _said(two, "changed") == 2
         assert time.perf_counter() - start < 2.0
+
+
+def test_own_changes_are_looked_at_at_once(client):
+    changes = client.app.state.changes
+    changes.period = 60.0
+    with client.websocket_connect(LIVE) as socket:
+        for k in (20, 21):  # the first look may have begun with the old period
+            version = client.post("/api/library/movements", json=asked(k, label=str(k))).json()["version"]
+            assert _said(socket, "changed") == version
 
 
 def test_clients_that_leave_are_forgotten(client):
@@ -243,14 +257,18 @@ def test_changes_are_told_again_after_the_library_could_not_be_read():
 
     async def told() -> list[int]:
         heard: list[int] = []
-        changes = Changes(SimpleNamespace(library=Library(), warm_up=lambda: None), period=0.001)
+        warmed: list[None] = []
+        studio = SimpleNamespace(library=Library(), warm_up=lambda: warmed.append(None))
+        changes = Changes(studio, period=0.001)
         changes.listen(heard.append)
         watching = asyncio.create_task(changes.watch())
         async with asyncio.timeout(10):
             while not heard:
                 assert not watching.done()
                 await asyncio.sleep(0.001)
+        await asyncio.sleep(0.01)  # the same version is told once
         watching.cancel()
+        assert len(warmed) == 1
         return heard
 
     assert asyncio.run(told()) == [2]
