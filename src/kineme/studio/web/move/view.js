@@ -71,7 +71,7 @@ class Move {
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
-    for (const one of this.rollouts.values()) Object.assign(one, { path: null, operators: null, problem: "" });
+    for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
     byId("duration").value = "0";
     this.picture.paths = [];
     this.picture.fit();
@@ -85,10 +85,10 @@ class Move {
     await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
-  /** Another style moves; its operators are asked for once the slider rests. @param {number[]|null} values */
+  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values */
   style(values) {
     this.plan.style = values;
-    for (const one of this.rollouts.values()) one.operators = null;
+    for (const one of this.rollouts.values()) one.primitive = null;
     this.changed();
     clearTimeout(this.resting);
     this.resting = setTimeout(() => this.prepare(), 400);
