@@ -152,7 +152,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
 def test_the_path_follows_the_goal_without_asking_the_server(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
-    page.wait_for_timeout(1500)  # operators are asked for once
+    page.wait_for_timeout(1500)  # the primitive is asked for once
     page.route("**/api/rollout", lambda route: None)  # from now on it never answers
     x, y = center(page, ".handle.goal")
     page.mouse.move(x, y)

@@ -33,7 +33,7 @@ def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
 
 @router.post("/primitive", response_model=PrimitiveOut | None, summary="A primitive for the runtime of the page")
 def primitive(studio: Reads, asked: Operated) -> Response:
-    """To follow a hand without a request for each picture: ``/runtime/primitive.js`` lets it move. Null where it cannot."""
+    """To follow a hand without a request for each picture, by ``/runtime/primitive.js``; null where that cannot be."""
     key = asked.model_dump_json()
     document = studio.kept_some("primitive", key, lambda: primitive_document(studio, asked))
     return Response(document, media_type="application/json")

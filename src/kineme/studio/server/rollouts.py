@@ -20,7 +20,6 @@ from kineme.primitives.styles.model import StyleModel
 from kineme.studio.server.records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.primitive import snapshot_of_primitive
-from kineme.validation import Array
 
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched

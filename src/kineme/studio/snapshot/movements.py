@@ -16,7 +16,7 @@ from kineme.studio.snapshot.snapshot import Snapshot
 def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
     """Header and arrays of C primitives, one of each class, and of their specification.
 
-    `learns` says whether the matrices that fit other movements, and the same ones in other formulations, are among them.
+    `learns` says whether the matrices are among them that fit other movements, and the same ones in other formulations.
 
     Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
     no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`

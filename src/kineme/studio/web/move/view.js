@@ -24,6 +24,7 @@ class Move {
     this.plan = null;
     this.version = -1;
     this.dragging = false;
+    this.named = null;
     this.on = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map((one) => [one.name, new Rollouts(one.name, () => this.redraw())]));
     this.handles = new Handles(this.camera, { moving: (on) => this.moving(on) });
@@ -152,10 +153,18 @@ class Move {
     this.picture.board.draw();
     this.speed.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.velocities), look })));
     this.acceleration.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })));
-    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
+    this.legend(shown);
     const said = [...this.on].flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
     const text = [...new Set(said)].join(" ");
     if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
+  }
+
+  /** Not while a path follows the hand: it stays the same then. @param {any[]} shown */
+  legend(shown) {
+    const names = shown.map((one) => one.name).join();
+    if (this.named === names) return;
+    this.named = names;
+    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
   }
 
   /** @param {string} name @param {boolean} on */
