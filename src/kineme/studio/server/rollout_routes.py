@@ -10,7 +10,7 @@ from fastapi.responses import Response
 
 from kineme.files.write_movement import encode_movement
 from kineme.studio.server.plain import numbers
-from kineme.studio.server.records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
+from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
 from kineme.studio.server.rollouts import make, primitive_document, styles_of
 from kineme.studio.server.studio import Reads
 
