@@ -134,6 +134,13 @@ def test_the_path_follows_the_goal_without_asking_the_server(opened, served_lett
     assert page.evaluate(INKED, [x + 70, y - 90, 30]) > 20
     page.mouse.up()
     assert center(page, ".handle.goal") != (x, y)
+    page.click("#add-via")
+    for _ in range(4):
+        page.keyboard.press("Shift+ArrowUp")
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.evaluate(INKED, [*center(page, ".handle.via"), 30]) > 20
+    loaded = "performance.getEntriesByName(location.origin + '/api/library').map((one) => one.responseStatus)"
+    assert page.evaluate(loaded).count(200) == 1  # once, beside the modules
 
 
 def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):
