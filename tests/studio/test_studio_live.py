@@ -156,7 +156,7 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
 
 
 def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
-    def fail(library):
+    def fail(library, **_):
         raise DataError("expected a disk")
 
     with client.websocket_connect(LIVE) as socket:
