@@ -7,12 +7,12 @@ import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { lengths, Plot } from "../parts/plots.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, toMove } from "./chosen.js";
+import { chooseToMove, dragGoal, toMove } from "./chosen.js";
 import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";
 import { MovePicture } from "./picture.js";
-import { asShown, extent, question } from "./plan.js";
+import { asShown, draggedWay, extent, question } from "./plan.js";
 import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
 import { showStyles } from "./styles.js";
@@ -128,6 +128,7 @@ class Move {
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
     for (const name of this.on) this.rollouts.get(name).follow(this.plan);
     this.picture.board.draw();
+    dragGoal(this.plan.symbol, draggedWay(this.plan));
     if (!this.dragging) this.numbers();
   }
 
