@@ -362,6 +362,9 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
             break
     page.keyboard.press("Shift+ArrowRight")
     assert page.get_attribute(".handle.goal", "aria-label") != before
+    page.keyboard.press("Control+z")  # here it takes back the step, and not what was learned
+    assert page.get_attribute(".handle.goal", "aria-label") == before
+    assert "5 symbols" in page.inner_text("#library-count")
     page.keyboard.press("?")
     assert page.is_visible("#keys")
     page.keyboard.press("Escape")
