@@ -103,6 +103,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
     page.evaluate("location.hash = 'move'")
     wait_until(page, "document.getElementById('move-empty').checkVisibility()")
     assert page.is_hidden("#move-panel")
+    assert page.locator("#library-empty h2").count() == 1  # below the page's h1, where nothing else is
     page.click("#move-empty button")
     assert page.inner_text("#draw-empty-title") == "Nothing is known yet"
     assert "One drawing is enough" in page.inner_text("#draw-empty-text")
