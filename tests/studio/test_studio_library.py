@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 
 import pytest
 from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
+from kineme.library.storage.store import Store
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -130,6 +132,35 @@ def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
     assert "look at what has changed" in answer.json()["error"]
     assert client.post("/api/library/undo", json={"version": seen + 1}).json() == {"version": seen + 2}
     assert "kind 1" in _symbols(client)
+
+
+def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):
+    writing = Store.writing
+
+    @contextmanager
+    def followed(store, *options):
+        with writing(store, *options) as change:
+            yield change
+        with ActionLibrary(folder) as other:
+            monkeypatch.setattr(Store, "writing", writing)
+            other.annotate("kind 3", f"after {change.version}")
+            monkeypatch.setattr(Store, "writing", followed)
+
+    a, b = (_symbols(client)[f"kind {k}"]["id"] for k in (0, 1))
+    monkeypatch.setattr(Store, "writing", followed)
+    asking = [
+        (f"symbols/{a}/rename", {"name": "wave"}),
+        (f"symbols/{a}/describe", {"text": "a hand"}),
+        (f"symbols/{a}/split", {"ids": [1], "name": "half"}),
+        ("symbols/merge", {"ids": [a, b], "into": "both"}),
+        ("movements/assign", {"ids": [7], "symbol": "both"}),
+        ("movements/assign", {"ids": [7], "symbol": None}),
+        ("movements/delete", {"ids": [8]}),
+        ("undo", {}),
+    ]
+    versions = [client.post(f"/api/library/{path}", json=body).json()["version"] for path, body in asking]
+    versions.append(client.delete(f"/api/library/symbols/{_symbols(client)['half']['id']}").json()["version"])
+    assert versions == [2 + 2 * k for k in range(9)]
 
 
 def test_what_is_gone_meanwhile_is_a_conflict_and_what_never_was_is_missing(client, folder):
