@@ -217,7 +217,9 @@ def test_two_tabs_show_the_same_library_and_undo_takes_back(opened, studio, tmp_
     wait_until(one, "![...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
     assert sorted(one.locator(".card-name").all_inner_texts()) == sorted(LETTERS)
     one.evaluate("import('/parts/changes.js').then((changes) => changes.undo(5))")  # as the message about the renaming
-    wait_until(one, "document.querySelector('.toast.failed')?.textContent.includes('look at what has changed') ?? false")
+    wait_until(
+        one, "document.querySelector('.toast.failed')?.textContent.includes('look at what has changed') ?? false"
+    )
     one.evaluate("import('/parts/changes.js').then(({ undo }) => Promise.all([undo(), undo()]))")
     wait_until(one, "document.querySelectorAll('.card-open').length === 2")
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+import threading
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -222,3 +225,27 @@ def test_a_library_in_space(tmp_path, open_studio):
     assert shown["n_dims"] == 3
     assert len(shown["symbols"][0]["path"][0]) == 3
     assert client.post("/api/recognize", json=asked(1)).status_code == 400
+
+
+def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, folder):
+    client.app.state.studio.library.store.wait = 5.0
+    other = sqlite3.connect(folder / "library.sqlite", isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    versions = []
+
+    def learn(k):
+        versions.append(client.post("/api/library/movements", json=asked(20 + k)).json()["version"])
+
+    waiting = [threading.Thread(target=learn, args=(k,)) for k in range(9)]
+    for one in waiting:
+        one.start()
+    time.sleep(0.5)
+    start = time.perf_counter()
+    assert client.get("/api/library/history").status_code == 200
+    assert time.perf_counter() - start < 3
+    other.execute("ROLLBACK")
+    for one in waiting:
+        one.join()
+    other.close()
+    assert client.get("/api/library").json()["version"] == 10
+    assert len(versions) == 9

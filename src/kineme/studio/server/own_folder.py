@@ -43,7 +43,7 @@ def _delete_left(where: Path) -> None:
 
 
 def _locked(path: Path) -> int | None:
-    """A handle that locks a folder until it is closed; None where another process does, and where there are no locks."""
+    """A handle that locks a folder until it is closed; None where another process has it, or locks do not exist."""
     if os.name != "posix":
         return None
     import fcntl
