@@ -8,19 +8,9 @@ from fastapi import APIRouter
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes
+from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import (
-    AsOf,
-    Assign,
-    Chosen,
-    Describe,
-    Learned,
-    Merge,
-    NewMovement,
-    Rename,
-    Split,
-    Version,
-)
+from kineme.studio.server.records import AsOf, Learned, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Writes
 
