@@ -67,13 +67,16 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "min_reported_time": 1,
     "capture_repr": (),
-    "thumbnail_size": (400, 280),
+    "thumbnail_size": (480, 240),
+    "image_scrapers": ("gallery_style.scrape",),
+    "reset_modules": ("gallery_style.reset",),
+    "within_subsection_order": "FileNameSortKey",
 }
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kineme"
 html_static_path = ["static"]
-html_css_files = ["kineme.css"]
+html_css_files = ["kineme.css", "gallery.css"]
 html_favicon = html_logo = "static/kineme.svg"
 html_show_sourcelink = False
 html_copy_source = False
