@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from moving_picture import moving_picture
 from PIL import Image
 from walk_through import walk
 
@@ -272,6 +273,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
         (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
+    (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
     library_pictures(folder)
 
 
