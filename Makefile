@@ -120,12 +120,14 @@ docs: $(DEV)/ready
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
+	$(DEV)/bin/python docs/make_interactive.py
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py
 
 tables: $(DEV)/ready
 	$(DEV)/bin/python docs/make_tables.py
+	$(DEV)/bin/python docs/concept_tables.py
 
 # After another version: its numbers and sums in vendored.json, which tests compare.
 SCENE = src/kineme/robots/view/vendor
