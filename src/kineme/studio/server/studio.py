@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -15,11 +16,14 @@ from fastapi import Depends, Request
 from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
+from kineme.recognition.early.stream import Live
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.studio.server.uploads import Uploads
+from kineme.studio.snapshot.early import DRAWN
 
 Made = TypeVar("Made")
 
+_WRITERS = 4  # changes that are worked on at once; each holds a thread until it has its turn
 _KEPT = 200  # things of one kind
 
 
@@ -46,6 +50,7 @@ class Studio:
         self.read_only = read_only
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
         self.uploads = Uploads()
+        self.writers = asyncio.Semaphore(_WRITERS)
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
@@ -133,7 +138,11 @@ class Studio:
 
     def _prepare(self) -> None:
         with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
-            self.library.stream()
+            self.stream()
+
+    def stream(self) -> Live:
+        """What recognizes one movement under way, by the library as it is now; see `kineme.ActionLibrary.stream`."""
+        return self.library.stream(early=DRAWN)
 
 
 def studio_of(request: Request) -> Studio:
@@ -142,8 +151,8 @@ def studio_of(request: Request) -> Studio:
     return studio
 
 
-def writable_studio_of(request: Request) -> Studio:
-    """The same for a change.
+async def writable_studio_of(request: Request) -> AsyncIterator[Studio]:
+    """The same for a change, of which few are worked on at once: while another process writes, others still read.
 
     Raises
     ------
@@ -155,7 +164,8 @@ def writable_studio_of(request: Request) -> Studio:
         raise PermissionError(
             "this studio shows the library for reading only; start it without --read-only to change it"
         )
-    return studio
+    async with studio.writers:
+        yield studio
 
 
 Reads = Annotated[Studio, Depends(studio_of)]
