@@ -69,13 +69,14 @@ sphinx_gallery_conf = {
     "capture_repr": (),
     "image_scrapers": ("gallery_style.scrape",),
     "reset_modules": ("gallery_style.reset",),
-    "thumbnail_size": (400, 280),
+    "thumbnail_size": (480, 240),
+    "within_subsection_order": "FileNameSortKey",
 }
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kineme"
 html_static_path = ["static"]
-html_css_files = ["kineme.css"]
+html_css_files = ["kineme.css", "gallery.css"]
 html_favicon = html_logo = "static/kineme.svg"
 html_show_sourcelink = False
 html_copy_source = False
