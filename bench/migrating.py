@@ -17,17 +17,17 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGES = DOCS / "migrating"
 
 
-def _paths(names: dict[str, Any], shift: int) -> tuple[float, list[Any]]:
-    """Largest distance of two paths, in % of the extent; their path at 20 times.
+#: Both peers' rollouts are one step ahead of their stamps.
+AHEAD = 1
 
-    `shift` says by how many samples the peer's rollout is ahead of ours.
-    """
+
+def _paths(names: dict[str, Any]) -> tuple[float, list[Any]]:
+    """Largest distance of two paths, in % of the extent; the peer's path at 20 times, each with our index."""
     ours, theirs = names["ours"], names["theirs"]
-    n = min(len(ours) - shift, len(theirs))
-    apart = np.linalg.norm(ours[shift : shift + n] - theirs[:n], axis=1).max()
-    extent = np.ptp(ours, axis=0).max()
+    n = min(len(ours) - AHEAD, len(theirs))
+    apart = np.linalg.norm(ours[AHEAD : AHEAD + n] - theirs[:n], axis=1).max()
     picked = np.linspace(0, n - 1, 20).astype(int)
-    return 100 * float(apart / extent), [[int(k) + shift, *theirs[k].tolist()] for k in picked]
+    return 100 * float(apart / np.ptp(ours, axis=0).max()), [[int(k) + AHEAD, *theirs[k].tolist()] for k in picked]
 
 
 def _names(names: dict[str, Any]) -> tuple[float, list[Any]]:
@@ -36,16 +36,13 @@ def _names(names: dict[str, Any]) -> tuple[float, list[Any]]:
     return 100 * float(np.mean(same)), [str(name) for name in names["theirs"]]
 
 
-#: Page -> module of the peer, how the two are compared, what is measured, its unit and target. The rollouts of both
-#: peers are one step ahead of their stamps.
+_DISTANCE = ("largest distance of the paths", "% of the extent", ("<=", 1.0))
+#: Page -> module of the peer, how the two are compared, what is measured, its unit and target.
 COMPARED: dict[str, tuple[str, Callable[[dict[str, Any]], tuple[float, list[Any]]], str, str, tuple[str, float]]] = {
-    "movement_primitives": (
-        "movement_primitives", lambda names: _paths(names, 1), "largest distance of the paths", "% of the extent",
-        ("<=", 1.0),
-    ),
-    "pydmps": ("pydmps", lambda names: _paths(names, 1), "largest distance of the paths", "% of the extent", ("<=", 1.0)),
+    "movement_primitives": ("movement_primitives", _paths, *_DISTANCE),
+    "pydmps": ("pydmps", _paths, *_DISTANCE),
     "dollar": ("dollarpy", _names, "movements that are called the same", "%", (">=", 100.0)),
-}  # fmt: skip
+}
 
 
 def measure(_quick: bool) -> list[Row]:
