@@ -9,7 +9,8 @@
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
-# make reference  docs/reference.md, from the stubs that list the public names
+# make docs   the whole site, in out/docs/index.html; it needs no network
+# make reference  docs/reference/names.md, from the stubs that list the public names
 # make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
 # make scene  what draws the arm in the page of kineme move --view, from the npm packages; vendored.json names them
 # make lock   renew the pinned requirements
@@ -19,7 +20,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate figures reference tables scene lock clean
+.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -110,6 +111,10 @@ evaluate: .venv-rivals/ready
 
 .venv-rivals/ready: bench/rivals.txt pyproject.toml .venv-rivals/python
 	$(call environment,.venv-rivals,bench/rivals.txt)
+
+# Warnings are errors; all that is wrong is told. What Sphinx read is kept, so that the next build is short.
+docs: $(DEV)/ready
+	$(DEV)/bin/sphinx-build -b html -W --keep-going -j 2 --quiet -d out/doctrees docs out/docs
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
