@@ -118,6 +118,7 @@ docs: $(DEV)/ready
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
+	$(DEV)/bin/python docs/make_animation.py
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py
