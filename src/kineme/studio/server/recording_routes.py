@@ -40,7 +40,8 @@ async def send(
 ) -> dict[str, Any]:
     """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
     key = await studio.uploads.receive(x_file_name, request.stream())
-    read = await run_in_threadpool(studio.uploads.recordings, key)
+    async with studio.uploads.readers:
+        read = await run_in_threadpool(studio.uploads.recordings, key)
     plots = [_plot(read, k) for k in range(len(read))]
     return {
         "recording": key,
