@@ -1,7 +1,7 @@
 """Draw the moving picture of the landing page and the README: shown once, recognized under way, moved to other goals.
 
-``python docs/make_animation.py`` writes ``images/kineme.gif``; ``make figures`` runs it. All in it is computed: the bars are
-what a live stream answers, the paths are rollouts.
+``make figures`` runs it; it writes ``images/kineme.gif``. All in it is computed: the bars are what a live stream
+answers, the paths are rollouts.
 """
 
 from __future__ import annotations
