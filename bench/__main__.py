@@ -34,6 +34,7 @@ SUBJECTS = (
     "anchoring",
     "annotate",
     "page",
+    "migrating",
     "studio",
     "by_person",
     "nested",
