@@ -270,6 +270,19 @@ def test_samples_that_a_stream_skips_are_not_shown_and_of_a_long_movement_the_la
     assert len(page.news()[0]["samples"]) == len(Follower(sources).news()[0]["samples"]) == MOST
 
 
+def test_what_a_program_sends_last_is_told_although_it_has_gone():
+    sources = Sources()
+    source, page, late = sources.add(), Follower(sources), Follower(sources)
+    assert page.news()[0]["samples"] == []
+    source.update(np.array([[0.0, 1, 2]]), {})
+    source.end({"answer": None})
+    sources.remove(source)
+    last, gone = page.news()
+    assert (last["samples"], last["ended"]) == ([[0.0, 1, 2]], {"answer": None})
+    assert gone == {"id": 1, "gone": True}
+    assert page.news() == late.news() == []
+
+
 def test_a_movement_that_is_over_is_shown_until_the_next_one_begins():
     sources = Sources()
     source = sources.add()

@@ -7,7 +7,7 @@ slowly is told more at once, and nobody waits for it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -110,33 +110,42 @@ class Source:
         self._tell()
 
 
+class _Told(NamedTuple):
+    """What one page knows of a source."""
+
+    source: Source
+    movement: int = 0
+    samples: int = 0
+    changes: int = -1
+
+
 class Follower:
     """What one page was told of the sources."""
 
     def __init__(self, of: Sources) -> None:
         self._of = of
-        self._told: dict[int, tuple[int, int, int]] = {}  # movement, samples, changes
+        self._told: dict[int, _Told] = {}
 
     def news(self) -> list[dict[str, Any]]:
         """What it is to be told now; empty if it knows all."""
         gone = self._told.keys() - self._of.sources.keys()
-        for key in gone:
+        for key, source in self._of.sources.items():
+            self._told.setdefault(key, _Told(source))
+        news = [self._of_source(key, told) for key, told in self._told.items() if told.changes != told.source.changes]
+        for key in sorted(gone):  # after what they have sent last
+            news.append({"id": key, "gone": True})
             del self._told[key]
-        news: list[dict[str, Any]] = [{"id": key, "gone": True} for key in sorted(gone)]
-        return news + [self._of_source(key, one) for key, one in self._of.sources.items() if self._is_new(key, one)]
+        return news
 
-    def _is_new(self, key: int, source: Source) -> bool:
-        return key not in self._told or self._told[key][2] != source.changes
-
-    def _of_source(self, key: int, source: Source) -> dict[str, Any]:
-        movement, told, _ = self._told.get(key, (0, 0, 0))
-        new = source.samples[max(told - source.dropped, 0) if movement == source.movement else 0 :]
-        self._told[key] = source.movement, source.dropped + len(source.samples), source.changes
+    def _of_source(self, key: int, told: _Told) -> dict[str, Any]:
+        source = told.source
+        known = max(told.samples - source.dropped, 0) if told.movement == source.movement else 0
+        self._told[key] = _Told(source, source.movement, source.dropped + len(source.samples), source.changes)
         return {
             "id": key,
             "name": source.name,
             "movement": source.movement,
-            "samples": new,
+            "samples": source.samples[known:],
             "state": source.state,
             "ended": source.ended,
         }
