@@ -2,13 +2,15 @@
 # make test   formatter, linter, type checker, tests
 # make test-pythons  the same with every Python that is found here
 # make test-lowest   the tests with the lowest versions of what kineme depends on
+# make package   wheel and source archive in out/package, checked, and tried in an empty environment of every Python found
 # make ros2   messages of ROS 2 itself, in .venv-ros2; the tests that need them are skipped where it is not there
 # make soak   faults of the action library, many times: minutes
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
-# make reference  docs/reference.md, from the stubs that list the public names
+# make docs   the whole site, in out/docs/index.html; it needs no network
+# make reference  docs/reference/names.md, from the stubs that list the public names
 # make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
 # make scene  what draws the arm in the page of kineme move --view, from the npm packages; vendored.json names them
 # make lock   renew the pinned requirements
@@ -18,7 +20,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest ros2 always soak fuzz bench evaluate figures reference tables scene lock clean
+.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -42,6 +44,14 @@ test-pythons:
 
 test-lowest: .venv-lowest/ready
 	.venv-lowest/bin/pytest -p no:cacheprovider
+
+package: .venv-package/ready
+	.venv-package/bin/python -m release $(PYTHONS)
+
+.venv-package/ready: requirements/package.txt
+	$(PYTHON) -m venv --clear .venv-package
+	.venv-package/bin/pip install --quiet --require-hashes -r requirements/package.txt
+	touch $@
 
 ros2: .venv-ros2/ready
 
@@ -102,6 +112,10 @@ evaluate: .venv-rivals/ready
 .venv-rivals/ready: bench/rivals.txt pyproject.toml .venv-rivals/python
 	$(call environment,.venv-rivals,bench/rivals.txt)
 
+# Warnings are errors; all that is wrong is told. What Sphinx read is kept, so that the next build is short.
+docs: $(DEV)/ready
+	$(DEV)/bin/sphinx-build -b html -W --keep-going -j 2 --quiet -d out/doctrees docs out/docs
+
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
 
@@ -122,10 +136,11 @@ lock:
 	uv pip compile pyproject.toml --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
 	uv pip compile pyproject.toml --group dev --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/dev.txt
 	uv pip compile pyproject.toml --group lowest --resolution lowest-direct --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/lowest.txt
+	uv pip compile --group package --universal --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/package.txt
 	uv pip compile requirements/ros2.in --universal --python-version 3.11 --no-emit-package empy --generate-hashes --no-annotate --no-emit-index-url --no-header --quiet -o requirements/ros2.txt
 	uv pip compile bench/build.in -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/build.txt
 	uv pip compile bench/peers.in pyproject.toml --extra parquet --extra ros --extra robot --extra studio -c requirements/run.txt --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/peers.txt
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-ros2 .venv-bench .venv-rivals out
+	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals out

@@ -1,6 +1,6 @@
 """What `fit` and `n_basis` of `DMP` cost and give: replay, new goals, recognition, with and without noise.
 
-The default is chosen on every other shape of LASA; docs/moving-again.md shows the rest.
+The default is chosen on every other shape of LASA; docs/guide/moving-again.md shows the rest.
 """
 
 from __future__ import annotations

@@ -219,10 +219,10 @@ def arm() -> Figure:
 
 
 def simulated_panda() -> Figure:
-    """The simulation of docs/robots.md: the path of the tip, and how far it is off."""
+    """The simulation of docs/guide/robots.md: the path of the tip, and how far it is off."""
     names: dict[str, Any] = {}
     with TemporaryDirectory() as place:
-        for _ in walk(Path(__file__).parent / "robots.md", Path(place), names):
+        for _ in walk(Path(__file__).parent / "guide" / "robots.md", Path(place), names):
             pass
     goals, wanted, tips = (names[name] for name in ("goals", "wanted", "tips"))
     figure = new_figure(9.6, 3.6)
@@ -257,11 +257,11 @@ FIGURES = {
 
 def library_pictures(folder: Path) -> None:
     """Those of the tutorial, drawn by its own commands, in few colors so that they are small."""
-    page = Path(__file__).parent / "action-library.md"
+    page = Path(__file__).parent / "tutorials" / "action-library.md"
     with TemporaryDirectory() as place:
         for _ in walk(page, Path(place)):
             pass
-        for name in re.findall(r"\]\(images/library-(.+?)\.png\)", page.read_text(encoding="utf-8")):
+        for name in re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", page.read_text(encoding="utf-8")):
             with Image.open(next(Path(place).rglob(f"{name}.png"))) as picture:
                 few = picture.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
                 few.save(folder / f"library-{name}.png", optimize=True)

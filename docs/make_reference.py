@@ -1,4 +1,4 @@
-"""Write reference.md, the public names of kineme, from the stubs that list them: ``make reference``."""
+"""Write reference/names.md, the public names of kineme, from the stubs that list them: ``make reference``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from types import ModuleType
 import kineme
 from kineme._lazy import names_in
 
-PAGE = Path(__file__).with_name("reference.md")
+PAGE = Path(__file__).with_name("reference") / "names.md"
 MODULES = [kineme, *(one for name in kineme.__all__ if isinstance(one := getattr(kineme, name), ModuleType))]
 
 _HEAD = """# Reference

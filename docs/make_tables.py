@@ -191,6 +191,6 @@ def take_in(name: str, evaluated: Path) -> None:
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
         take_in(argument.partition("=")[0], Path(argument.partition("=")[2]))
-    path = DOCS / "recognition.md"
+    path = DOCS / "guide" / "recognition.md"
     path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
     print(path)

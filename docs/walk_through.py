@@ -19,6 +19,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
+DOCS = Path(__file__).parent
+GENERATED = ("gallery", "reference/generated")  #: folders that the build of the site writes; git ignores them
 OPTIONAL = ("mujoco",)
 _BLOCK = re.compile(r"^```(python|console)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _PRINTED = re.compile(r"^ *print\(.*?\)(?:  # (.+))?((?:\n *# .+)*)$", re.MULTILINE)
@@ -31,6 +33,17 @@ class Step(NamedTuple):
     shown: list[str]
     answer: list[str]
     status: int
+
+
+def pages() -> list[Path]:
+    """The README and every page of docs/ that is written by hand or kept in git, by their paths."""
+    written = [page for page in DOCS.rglob("*.md") if not page.relative_to(DOCS).as_posix().startswith(GENERATED)]
+    return [DOCS.parent / "README.md", *sorted(written)]
+
+
+def page_name(page: Path) -> str:
+    """A page as its path from the root of the project, which tests are named after."""
+    return page.relative_to(DOCS.parent).as_posix()
 
 
 def walk(page: Path, folder: Path, names: dict[str, Any] | None = None) -> Iterator[Step]:

@@ -6,31 +6,29 @@ import importlib
 import pkgutil
 import re
 import shlex
-from pathlib import Path
 
 import click
 import pytest
-from walk_through import otherwise, shown_by, walk
+from walk_through import DOCS, otherwise, page_name, pages, shown_by, walk
 
 import kineme
 from kineme.cli import main
 
-ROOT = Path(__file__).parents[1]
-TUTORIAL = ROOT / "docs" / "action-library.md"  # its blocks need its commands: test_tutorial.py runs both
-PAGES = [ROOT / "README.md", *sorted(set((ROOT / "docs").glob("*.md")) - {TUTORIAL})]
+TUTORIAL = DOCS / "tutorials" / "action-library.md"  # test_tutorial.py runs it, and looks at more
+PAGES = [page for page in pages() if page != TUTORIAL]
 MODULES = [
     module.name for module in pkgutil.walk_packages(kineme.__path__, "kineme.") if not module.name.endswith("__main__")
 ]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_pages_run_and_print_what_they_show(page, tmp_path):
     steps = list(walk(page, tmp_path))
     others = {step.source: answer for step in steps if (answer := otherwise(step)) is not None}
     assert not others
 
 
-@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=page_name)
 def test_pages_show_what_every_print_prints(page):
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     for block in blocks:
@@ -57,7 +55,7 @@ def test_a_page_that_shows_another_result_is_found_out(tmp_path):
 _COMMAND = re.compile(r"^    (?:.*\| )?kineme (.+?)(?:  +#.*| > .*)?$", re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_commands_and_options_of_pages_exist(page):
     """Commands that a page shows without their answer: they are parsed, not run."""
     for line in _COMMAND.findall(page.read_text(encoding="utf-8")):

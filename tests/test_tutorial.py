@@ -7,7 +7,7 @@ import pytest
 from walk_through import otherwise, walk
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "action-library.md"
+PAGE = DOCS / "tutorials" / "action-library.md"
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_every_answer_is_the_one_shown(walked):
 def test_every_picture_is_one_that_the_commands_draw(walked):
     """images/library-NAME.png is NAME.png of the walk; make figures copies them."""
     folder, _ = walked
-    pictures = re.findall(r"\]\(images/library-(.+?)\.png\)", PAGE.read_text(encoding="utf-8"))
+    pictures = re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", PAGE.read_text(encoding="utf-8"))
     assert pictures
     for name in pictures:
         assert list(folder.rglob(f"{name}.png")), name

@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from walk_through import page_name, pages
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = pages()
 _UNTYPED = "matplotlib.*,mujoco.*,numba.*,pandas.*,pyarrow.*,scipy.*,sklearn.*"
 # The package itself is checked with its own settings, elsewhere.
 _CONFIGURATION = f"[mypy]\nstrict = True\n[mypy-{_UNTYPED}]\nignore_missing_imports = True\n"
@@ -57,6 +58,11 @@ reveal_type(primitives.controller(0.01))
 """
 
 
+def _module(page):
+    """The name of the module that a page becomes."""
+    return f"{re.sub('[^a-z0-9]', '_', page_name(page).lower().removesuffix('.md'))}_page"
+
+
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory):
     """Lines of mypy about each page, by its name; all pages in one run."""
@@ -64,7 +70,7 @@ def checked(tmp_path_factory):
     (folder / "mypy.ini").write_text(_CONFIGURATION)
     for page in PAGES:
         blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-        (folder / f"{page.stem.replace('-', '_')}_page.py").write_text("\n".join(blocks), encoding="utf-8")
+        (folder / f"{_module(page)}.py").write_text("\n".join(blocks), encoding="utf-8")
     (folder / "results.py").write_text(RESULTS)
     command = [
         sys.executable,
@@ -83,11 +89,9 @@ def checked(tmp_path_factory):
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_the_python_of_pages_passes(checked, page):
-    assert not [
-        line for line in checked if line.startswith(f"{page.stem.replace('-', '_')}_page.py") and "error" in line
-    ]
+    assert not [line for line in checked if line.startswith(f"{_module(page)}.py") and "error" in line]
 
 
 def test_results_are_records_and_not_any(checked):

@@ -149,7 +149,7 @@ def test_lists_are_written_as_arrays_are(tmp_path):
 def test_the_page_lists_every_format():
     from kineme.files.formats import DATA_SETS, FORMATS
 
-    page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "guide" / "recordings.md").read_text(encoding="utf-8")
     table = page.partition("## What is read")[2].partition("\n## ")[0]
     assert [ending for ending in (*FORMATS, *(one.marker for one in DATA_SETS)) if f"`{ending}`" not in table] == []
 

@@ -1,4 +1,4 @@
-"""The tables of results in docs/recognition.md are those of the benchmark and of the evaluation."""
+"""The tables of results in docs/guide/recognition.md are those of the benchmark and of the evaluation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from make_tables import DEFAULTS, filled, tables
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "recognition.md"
+PAGE = ROOT / "docs" / "guide" / "recognition.md"
 
 
 def _measured():

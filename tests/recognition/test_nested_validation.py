@@ -1,4 +1,4 @@
-"""The nested validation of docs/recognition.md: its accuracies are those of `Recognizer`, and people stay apart."""
+"""Nested validation in docs/guide/recognition.md: accuracies are those of `Recognizer`, and people stay apart."""
 
 from __future__ import annotations
 

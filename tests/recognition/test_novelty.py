@@ -222,10 +222,10 @@ TABLE = {
 
 
 def test_the_page_shows_what_was_measured():
-    """docs/recognition.md against bench/results/open_set.json."""
+    """docs/guide/recognition.md against bench/results/open_set.json."""
     rows = json.loads((ROOT / "bench" / "results" / "open_set.json").read_text())["rows"]
     measured = {row["what"]: row["ours"] for row in rows}
-    page = " ".join((ROOT / "docs" / "recognition.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8").split())
     for name, title in TABLE.items():
         found = [[measured.get(f"{name}, {n} shown: {what}") for what in SHOWN] for n in (1, 2, 4, 8)]
         cells = ["-" if known is None else f"{known:.0f} % / {unknown:.0f} %" for known, unknown in found]

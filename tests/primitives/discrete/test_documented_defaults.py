@@ -17,7 +17,7 @@ from kineme.primitives.persistence import specification_from_dict, specification
 
 
 def test_the_path_is_fitted_with_forty_functions():
-    """The choice of ``python -m bench --only dmp_defaults``; docs/moving-again.md says what came of the others."""
+    """The choice of ``python -m bench --only dmp_defaults``; docs/guide/moving-again.md has the others."""
     assert DMP() == DMP("bio-inspired", fit="trajectory", n_basis=40)
     assert PoseDMP().dmp == Specification().dmp == DMPFeatures().fit([np.eye(5)]).dmp_ == DMP()
     assert RhythmicDMP().fit == DMP().fit

@@ -1,4 +1,4 @@
-"""The default fit is the one that ``python -m bench --only dmp_defaults`` chooses; docs/moving-again.md shows why."""
+"""The default fit is what ``python -m bench --only dmp_defaults`` chooses; docs/guide/moving-again.md shows why."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_the_default_is_the_one_chosen(bench):
 
 
 def test_the_page_shows_what_was_measured(bench):
-    assert _table(bench) in (ROOT / "docs" / "moving-again.md").read_text(encoding="utf-8")
+    assert _table(bench) in (ROOT / "docs" / "guide" / "moving-again.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["trajectory, 40", "forcing, 80"])

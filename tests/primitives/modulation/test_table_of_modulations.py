@@ -1,4 +1,4 @@
-"""The table of docs/modulation.md: what it says works does, and what it says does not is refused in words."""
+"""The table of docs/guide/modulation.md: what it says works does, and what it says does not is refused in words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kineme import KinemeError
 from kineme.orientation import PoseDMP, exp
 from kineme.styles import average
 
-PAGE = Path(__file__).parents[3] / "docs" / "modulation.md"
+PAGE = Path(__file__).parents[3] / "docs" / "guide" / "modulation.md"
 
 
 def table():

@@ -11,7 +11,7 @@ goal, at the end, and the velocity there. The forcing term acts on neither the s
 Source: Y. Zhou, J. Gao, T. Asfour, "Learning Via-Movement Primitives with Inter- and Extrapolation Capabilities",
 IROS 2019. There Sigma is the covariance of the demonstrations' weights. Our choice where there is one
 demonstration only, and beside those where there are few: Sigma is such that the change of the path has the least mean
-square acceleration (`smoothness_factor`), as a cubic spline has. See docs/modulation.md for what was measured.
+square acceleration (`smoothness_factor`), as a cubic spline has. See docs/guide/modulation.md for what was measured.
 """
 
 from __future__ import annotations
