@@ -1,0 +1,37 @@
+"""
+Recordings that do not belong
+=============================
+
+In a folder of a hundred recordings some are labeled wrong and some were cut short. `kineme.find_outliers` compares
+each with the others of its label.
+"""
+
+import matplotlib.pyplot as plt
+
+import kineme
+
+names = ["Angle", "CShape", "GShape", "Sine", "Spoon", "Worm"]
+demos = kineme.load_lasa(names)
+labels = demos.labels.copy()
+labels[9] = "Sine"  # a CShape under the wrong name
+movements = list(demos)
+cut = movements[30]
+movements[30] = kineme.Trajectory(cut.times[:450], cut.positions[:450], cut.label)  # the recording stopped too early
+
+found = kineme.find_outliers(movements, labels)
+for one in found.found:
+    print(f"movement {one.index}, labeled {one.label}, most like {one.label_of_most_like}: p = {one.p_value:.3f}")
+
+# %%
+# The label of the movement that it is most like tells a wrong name from a failed recording.
+figure, row = plt.subplots(1, len(names), figsize=(8, 2.1))
+outliers = [one.index for one in found.found]
+for axes, name in zip(row, names, strict=True):
+    for k, movement in enumerate(movements):
+        if labels[k] == name:
+            odd = k in outliers
+            axes.plot(*movement.positions.T, color="C1" if odd else "0.75", linewidth=2 if odd else 1, zorder=2 + odd)
+    axes.set(title=name, aspect="equal", adjustable="datalim")
+    axes.axis("off")
+figure.suptitle("gray: as the others of the label; orange: found", fontsize=9)
+plt.show()
