@@ -156,7 +156,7 @@ class _Client:
     async def _finish(self, source: Source | None) -> dict[str, Any]:
         try:
             run = asyncio.get_running_loop().run_in_executor
-            ended = {"answer": await run(self.studio.live, self.session.finish)}
+            ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
         except KinemeError as error:
             ended = {"error": str(error)}
         if source is not None:
