@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
+import signal
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +19,8 @@ from studio_samples import drawing
 from kineme import ActionLibrary
 from kineme.errors import DataError
 from kineme.files.recordings import read_recordings
-from kineme.studio.server import bodies, read_upload, uploads
+from kineme.studio.server import bodies, read_upload, recording_routes, uploads
+from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError
 
 
@@ -149,8 +157,6 @@ def test_reading_ends_where_it_takes_too_long_or_too_much(tmp_path):
 
 
 def _received(files, data, name="a.csv"):
-    import asyncio
-
     async def chunks():
         yield data
 
@@ -165,6 +171,65 @@ def test_the_last_eight_are_kept():
     assert len(list(Path(files._folder.name).rglob("*.csv"))) == 8
     files.close()
     assert not Path(files._folder.name).exists()
+
+
+def _gone(after):
+    """A request whose client goes after so many looks."""
+    looks = iter(range(1000))
+
+    async def is_disconnected():
+        return next(looks) >= after
+
+    return SimpleNamespace(is_disconnected=is_disconnected)
+
+
+def test_a_child_that_reads_is_ended_where_nobody_waits(tmp_path, monkeypatch):
+    monkeypatch.setattr(work_module, "PERIOD", 0.02)
+    files, children = uploads.Uploads(seconds=60), []
+    key = _received(files, b"t,x,y\n")
+    popen = subprocess.Popen
+    monkeypatch.setattr(uploads.sys, "executable", "sleep")
+    monkeypatch.setattr(
+        uploads.subprocess, "Popen", lambda command, **how: children.append(popen(["sleep", "60"], **how)) or children[0]
+    )
+    work = work_module.Work()
+    with ThreadPoolExecutor(1) as pool, pytest.raises(work_module.StoppedError):
+        start = time.perf_counter()
+        asyncio.run(
+            work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check))
+        )
+    assert time.perf_counter() - start < 10
+    assert children[0].returncode == -signal.SIGKILL
+    files.close()
+
+
+def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, monkeypatch):
+    key = _send(client, _table(0, 1)[0]).json()["recording"]
+    path = f"/api/recordings/{key}/spotted"
+    assert client.get(path).json() == {"share": None}
+    seen, begun = [], Event()
+    real = recording_routes.annotate
+
+    def slow(store, one, error_rate, progress):
+        if begun.is_set():
+            return real(store, one, error_rate, progress)
+        begun.set()
+        for k in range(1000):
+            progress(0.001 * k * one.demonstrations.durations[0])
+            seen.append(client.get(path).json()["share"])
+        raise AssertionError
+
+    monkeypatch.setattr(recording_routes, "annotate", slow)
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(client.post, path, json={})
+        begun.wait(20)
+        while len(seen) < 3:
+            time.sleep(0.01)
+        second = client.post(path, json={})
+        assert first.result(20).status_code == 499
+    assert second.status_code == 200
+    assert seen[:3] == pytest.approx([0, 0.001, 0.002])
+    assert client.get(path).json() == {"share": None}
 
 
 def test_recordings_of_others_are_not_there(client):

@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse
 from starlette.types import Scope, Send
 
 from kineme.errors import DataError, KinemeError
+from kineme.studio.server.work import StoppedError
 
 _LOG = logging.getLogger("kineme.studio")
 
@@ -56,6 +57,9 @@ def answer_errors(app: FastAPI) -> None:
     async def forbidden(_: Request, error: Any) -> JSONResponse:
         return answer(403, str(error))
 
+    async def stopped(_: Request, __: Any) -> JSONResponse:
+        return answer(499, "expected somebody to wait for the answer; it was stopped")
+
     async def invalid(_: Request, error: Any) -> JSONResponse:
         return answer(422, _first(error))
 
@@ -71,6 +75,7 @@ def answer_errors(app: FastAPI) -> None:
         (MissingError, missing),
         (ConflictError, conflict),
         (PermissionError, forbidden),
+        (StoppedError, stopped),
         (RequestValidationError, invalid),
         (HTTPException, other),
         (Exception, broken),

@@ -17,10 +17,12 @@ from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.studio.server.uploads import Uploads
+from kineme.studio.server.work import Works
 
 Made = TypeVar("Made")
 
 _KEPT = 200  # things of one kind
+_LONG = 4  # files that are read or searched at once; others wait
 
 
 class Shown(NamedTuple):
@@ -47,13 +49,17 @@ class Studio:
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
         self.uploads = Uploads()
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
+        self.long = ThreadPoolExecutor(_LONG, "kineme-long")
+        self.works = Works()
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
 
     def close(self) -> None:
         """Close the library, once what runs has ended."""
-        self.live.shutdown(wait=False, cancel_futures=True)
+        self.works.close()
+        for pool in (self.live, self.long):
+            pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
 

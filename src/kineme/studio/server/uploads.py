@@ -7,9 +7,11 @@ import re
 import secrets
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Sequence
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from contextlib import suppress
 from threading import Lock
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -21,8 +23,13 @@ from kineme.studio.server.refusals import MissingError
 
 SECONDS = 60.0  # to read one file
 BYTES = 2 * 2**30  # of memory
+PERIOD = 0.2  # seconds between looks whether anybody waits
 _KEPT = 8  # files
 _LONGEST = 120  # characters of a name
+
+
+def _go_on() -> None:
+    """Whoever asked still waits."""
 
 
 class Upload(NamedTuple):
@@ -65,8 +72,10 @@ class Uploads:
             one.unlink(missing_ok=True)
         return key
 
-    def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = _go_on) -> Recordings:
         """What a file holds, in these columns or in those that are found.
+
+        `check` is called again and again, and raises where nobody waits any more.
 
         Raises
         ------
@@ -82,28 +91,45 @@ class Uploads:
             )
         asked = tuple(columns)
         if asked not in upload.read:
-            upload.read[asked] = self._read(upload.path, {"columns": list(asked)} if asked else {})
+            upload.read[asked] = self._read(upload.path, {"columns": list(asked)} if asked else {}, check)
         return upload.read[asked]
 
-    def _read(self, path: Path, options: dict[str, object]) -> Recordings:
+    def _read(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
         command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result), str(self.memory)]
         try:
-            done = subprocess.run(
-                command, input=json.dumps(options), capture_output=True, text=True, timeout=self.seconds, check=False
-            )
-            if done.returncode == REFUSED:
+            code = _run(command, json.dumps(options), self.seconds, check)
+            if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
-            if done.returncode:
-                raise DataError(f"expected a recording, reading {path.name} ended with code {done.returncode}")
+            if code:
+                raise DataError(f"expected a recording, reading {path.name} ended with code {code}")
             return load(result)
-        except subprocess.TimeoutExpired:
+        except TimeoutError:
             raise DataError(
                 f"expected a recording that is read within {self.seconds:g} s, {path.name} takes longer; "
                 "send a part of it, or learn it with kineme learn"
             ) from None
         finally:
             result.unlink(missing_ok=True)
+
+
+def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:
+    """The exit code of a child process, which is ended after so many seconds (TimeoutError), or where `check` raises."""
+    end, pipe = time.monotonic() + seconds, subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as child:
+        try:
+            told: str | None = given
+            while child.returncode is None:
+                with suppress(subprocess.TimeoutExpired):
+                    child.communicate(told, timeout=min(PERIOD, max(end - time.monotonic(), 0.0)))
+                    break
+                told = None  # once: what was not written yet is kept
+                check()
+                if time.monotonic() >= end:
+                    raise TimeoutError
+            return child.returncode
+        finally:
+            child.kill()  # if it has not ended
 
 
 def plain_name(name: str) -> str:

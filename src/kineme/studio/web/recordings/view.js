@@ -1,5 +1,5 @@
 // Recordings: a file, its channels, what was found in it, corrected and learned.
-import { post } from "../parts/api.js";
+import { get, post } from "../parts/api.js";
 import { learnSpans } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
@@ -8,14 +8,18 @@ import { startDropping } from "./dropping.js";
 import { markRow, showSpans } from "./spans.js";
 import { Timeline } from "./timeline.js";
 
+const ASKED = 400; // how often it is asked how much is searched [ms]
+
 class Recordings {
   constructor() {
     this.read = null;
+    /** @type {AbortController|null} Of the search that is under way. */
+    this.search = null;
     const page = { choose: (/** @type {number} */ k) => this.choose(k), changed: () => this.changed() };
     this.page = page;
     this.timeline = new Timeline(page);
     startDropping((recording, name) => this.open(recording, name));
-    byId("spot").addEventListener("click", () => this.spot());
+    byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
     byId("tables").addEventListener("change", () => this.table());
@@ -25,6 +29,8 @@ class Recordings {
 
   /** @param {any} recording @param {string} name */
   open(recording, name) {
+    this.search?.abort();
+    this.over("");
     this.read = recording;
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
@@ -74,17 +80,33 @@ class Recordings {
   }
 
   async spot() {
-    byId("spot").disabled = true;
+    const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`;
+    const search = (this.search = new AbortController());
+    byId("spot").textContent = "Cancel";
     byId("spans-state").textContent = "Looking …";
-    const answer = await tried(() => post(`/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`, this.body()));
-    byId("spot").disabled = false;
-    byId("spans-state").textContent = "";
-    if (!answer) return;
+    const timer = setInterval(() => this.tell(path, search), ASKED);
+    const answer = await tried(() => post(path, this.body(), search.signal));
+    clearInterval(timer);
+    if (this.search === search) this.over(search.signal.aborted ? "Canceled; nothing was changed." : "");
+    if (!answer || search.signal.aborted) return;
     this.timeline.spans = answer.spans;
     this.choose(-1);
     this.changed();
     const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
     byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown`;
+  }
+
+  /** How much is searched. @param {string} path @param {AbortController} search */
+  async tell(path, search) {
+    const told = await get(path).catch(() => null);
+    if (this.search === search && told?.share) byId("spans-state").textContent = `Looking … ${Math.floor(100 * told.share)} %`;
+  }
+
+  /** @param {string} text */
+  over(text) {
+    this.search = null;
+    byId("spot").textContent = "Find movements";
+    byId("spans-state").textContent = text;
   }
 
   /** A span in the middle of what is shown. */
