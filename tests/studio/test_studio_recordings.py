@@ -190,14 +190,14 @@ def test_a_child_that_reads_is_ended_where_nobody_waits(tmp_path, monkeypatch):
     popen = subprocess.Popen
     monkeypatch.setattr(uploads.sys, "executable", "sleep")
     monkeypatch.setattr(
-        uploads.subprocess, "Popen", lambda command, **how: children.append(popen(["sleep", "60"], **how)) or children[0]
+        uploads.subprocess,
+        "Popen",
+        lambda command, **how: children.append(popen(["sleep", "60"], **how)) or children[0],
     )
     work = work_module.Work()
     with ThreadPoolExecutor(1) as pool, pytest.raises(work_module.StoppedError):
         start = time.perf_counter()
-        asyncio.run(
-            work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check))
-        )
+        asyncio.run(work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check)))
     assert time.perf_counter() - start < 10
     assert children[0].returncode == -signal.SIGKILL
     files.close()

@@ -161,9 +161,7 @@ def undo(folder: Path, expected: int | None, as_json: bool) -> None:
     with opened(folder, read_only=False) as actions:
         undone = actions.undo(expected)
         data = {"undone": undone.action, "to": undone.to, "version": undone.version}
-    say(
-        as_json, data, lambda: f"took back {data['undone']}; as at version {data['to']}; version {data['version']}"
-    )
+    say(as_json, data, lambda: f"took back {data['undone']}; as at version {data['to']}; version {data['version']}")
 
 
 @library.command(short_help="Check every byte of a library.")

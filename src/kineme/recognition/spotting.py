@@ -130,9 +130,7 @@ def _tell_nobody(share: float) -> None:
     """Nobody wants to know how far it is."""
 
 
-def _chosen(
-    known: Templates, windows: Windows, error_rate: float, progress: Progress
-) -> tuple[Rows, NDArray[np.intp]]:
+def _chosen(known: Templates, windows: Windows, error_rate: float, progress: Progress) -> tuple[Rows, NDArray[np.intp]]:
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)

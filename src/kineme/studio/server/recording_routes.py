@@ -110,9 +110,7 @@ def _row(k: int, span: Span) -> LabelRow:
     return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
 
 
-def _one(
-    studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = lambda: None
-) -> Recordings:
+def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = lambda: None) -> Recordings:
     """One table of a recording, in the columns that are asked for, or those of the library where it has them."""
     table, channels = asked.table, asked.channels
     read = studio.uploads.recordings(key, channels or (), check)
