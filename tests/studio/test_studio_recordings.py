@@ -188,16 +188,17 @@ def test_a_child_that_reads_is_ended_where_nobody_waits(tmp_path, monkeypatch):
     files, children = uploads.Uploads(seconds=60), []
     key = _received(files, b"t,x,y\n")
     popen = subprocess.Popen
-    monkeypatch.setattr(uploads.sys, "executable", "sleep")
-    monkeypatch.setattr(
-        uploads.subprocess,
-        "Popen",
-        lambda command, **how: children.append(popen(["sleep", "60"], **how)) or children[0],
-    )
-    work = work_module.Work()
-    with ThreadPoolExecutor(1) as pool, pytest.raises(work_module.StoppedError):
-        start = time.perf_counter()
-        asyncio.run(work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check)))
+
+    def sleeping(command, **how):
+        children.append(popen(["sleep", "60"], **how))
+        return children[0]
+
+    monkeypatch.setattr(uploads.subprocess, "Popen", sleeping)
+    work, start = work_module.Work(), time.perf_counter()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check))
+        with pytest.raises(work_module.StoppedError):
+            asyncio.run(waiting)
     assert time.perf_counter() - start < 10
     assert children[0].returncode == -signal.SIGKILL
     files.close()

@@ -9,9 +9,9 @@ import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from contextlib import suppress
 from threading import Lock
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -114,20 +114,19 @@ class Uploads:
 
 
 def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:
-    """The exit code of a child process, which is ended after so many seconds (TimeoutError), or where `check` raises."""
+    """The exit code of a child process; it is ended after so many seconds (TimeoutError), and where `check` raises."""
     end, pipe = time.monotonic() + seconds, subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as child:
         try:
             told: str | None = given
-            while child.returncode is None:
+            while True:
                 with suppress(subprocess.TimeoutExpired):
                     child.communicate(told, timeout=min(PERIOD, max(end - time.monotonic(), 0.0)))
-                    break
+                    return child.returncode
                 told = None  # once: what was not written yet is kept
                 check()
                 if time.monotonic() >= end:
                     raise TimeoutError
-            return child.returncode
         finally:
             child.kill()  # if it has not ended
 
