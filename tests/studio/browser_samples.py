@@ -118,6 +118,16 @@ PIXELS = """() => {
   return pixels.reduce((sum, value, k) => (sum * 31 + value * (k % 9973)) % 2147483647, 7);
 }"""
 
+#: Drop a file with a name and a text on the page, wherever it is.
+DROP = """([name, text]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  for (const kind of ["dragover", "drop"]) {
+    const event = new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true });
+    if (document.body.dispatchEvent(event)) throw new Error("the browser would open the file");
+  }
+}"""
+
 #: How many pixels of the stage of Move are of the drawn path, around a point of the screen: its color is the token's.
 INKED = """([x, y, r]) => {
   const canvas = document.getElementById("move-canvas");

@@ -38,6 +38,24 @@ def test_the_address_with_the_token_sets_a_cookie_that_scripts_and_other_sites_c
     assert client.get("/api/library", headers=bare).status_code == 200  # the client kept it
 
 
+@pytest.mark.parametrize(("site", "status"), [("cross-site", 200), (None, 200), ("none", 303), ("same-origin", 303)])
+def test_a_link_on_another_page_opens_it_too(client, site, status):
+    """A browser that another site led here does not send the cookie along a redirect, but from a page of our own."""
+    headers = {"Authorization": "", "Accept": "text/html,*/*"} | ({} if site is None else {"Sec-Fetch-Site": site})
+    answer = client.get("/", params={"token": TOKEN}, headers=headers, follow_redirects=False)
+    assert answer.status_code == status
+    assert answer.headers.get("refresh", "0; url=/") == "0; url=/"
+    assert ("refresh" in answer.headers) == (status == 200)
+    assert (answer.headers["cache-control"], answer.content) == ("no-store", b"")
+    assert "SameSite=Strict" in answer.headers["set-cookie"]
+
+
+def test_addresses_with_many_fields_are_refused_as_others_are(client):
+    fields = "&".join(f"a{k}=1" for k in range(30))
+    assert client.get(f"/?{fields}", headers={"Authorization": ""}).status_code == 401
+    assert client.get(f"/?{fields}").status_code == 200
+
+
 def test_tokens_in_addresses_open_nothing_but_the_page(client):
     assert client.get("/api/library", params={"token": TOKEN}, headers={"Authorization": ""}).status_code == 401
 
@@ -53,7 +71,9 @@ def test_a_name_that_was_pointed_here_is_refused(client, host):
         assert "expected the address that kineme studio printed" in answer.json()["error"]
 
 
-@pytest.mark.parametrize("host", ["localhost", "localhost:9000", "127.0.0.1", "[::1]:8420", "LOCALHOST:8420"])
+@pytest.mark.parametrize(
+    "host", ["localhost", "localhost:9000", "127.0.0.1", "[::1]:8420", "LOCALHOST:8420", "127.0.0.2", "[0:0::1]"]
+)
 def test_every_name_of_the_loopback_is_ours(client, host):
     assert client.get("/api/library", headers={"Host": host}).status_code == 200
 

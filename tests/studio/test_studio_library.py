@@ -166,6 +166,13 @@ def test_the_answer_is_that_of_the_library(client, folder):
     json.dumps(answer, allow_nan=False)
 
 
+def test_drawings_of_more_than_a_thousand_samples_are_taken(client):
+    times, positions = drawing(2, n=5000, seed=7)
+    long = {"times": times.tolist(), "positions": positions.tolist()}
+    assert client.post("/api/recognize", json=long).json()["label"] == "kind 2"
+    assert client.post("/api/library/movements", json={**long, "label": "kind 2"}).status_code == 200
+
+
 def _array(given):
     from kineme import Trajectory
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sqlite3
 import time
 from types import SimpleNamespace
 
@@ -12,7 +13,8 @@ import pytest
 from studio_samples import LIVE, asked, samples
 
 from kineme import ActionLibrary
-from kineme.errors import TrajectoryError
+from kineme.errors import DataError, TrajectoryError
+from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import parsed_samples
 from kineme.studio.server.live_socket import _Client
 from kineme.studio.server.live_sources import MOST, Follower, Sources
@@ -326,3 +328,28 @@ def test_a_page_that_does_not_read_delays_no_program_and_is_told_all_of_it_in_th
     assert messages[-1]["source"]["state"] == {"k": 499}
     rows = [row for one in messages for row in one["source"]["samples"]]
     assert rows == [[k, 1.0, 2.0] for k in range(500)]
+
+
+def test_changes_are_told_again_after_the_library_could_not_be_read():
+    versions = iter([1, sqlite3.OperationalError("a lock of another kind"), DataError("gone"), 2])
+
+    class Library:
+        @property
+        def version(self):
+            if isinstance(now := next(versions, 2), Exception):
+                raise now
+            return now
+
+    async def told() -> list[int]:
+        heard: list[int] = []
+        changes = Changes(SimpleNamespace(library=Library(), warm_up=lambda: None), period=0.001)
+        changes.listen(heard.append)
+        watching = asyncio.create_task(changes.watch())
+        async with asyncio.timeout(10):
+            while not heard:
+                assert not watching.done()
+                await asyncio.sleep(0.001)
+        watching.cancel()
+        return heard
+
+    assert asyncio.run(told()) == [2]

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import httpx
 import pytest
@@ -21,6 +22,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from kineme import ActionLibrary, Trajectory
+from kineme.errors import SpecificationError
+from kineme.studio.server import serve
 
 
 @pytest.fixture(scope="module")
@@ -202,10 +205,16 @@ def test_fifty_clients_draw_at_once(studio):
     assert answers == {who: f"kind {who % 4}" for who in range(50)}
 
 
-def test_for_reading_only_it_says_so_and_writes_nothing(folder):
+def test_for_reading_only_it_says_so_and_writes_nothing_and_leaves_nothing_with_a_terminal_that_closes(
+    folder, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     with running(folder, "--read-only") as studio:
         assert "for reading only" in studio.line
         assert httpx.post(f"{studio.address}/api/library/undo", headers=BEARER).status_code == 403
+        assert list(tmp_path.glob("kineme-studio-*"))
+        studio.end(signal.SIGHUP)
+        assert not list(tmp_path.glob("kineme-studio-*"))
 
 
 REFUSED = [
@@ -228,6 +237,18 @@ def test_a_port_that_is_taken_is_refused(folder):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         done = _kineme("studio", "--no-open", "-l", folder, "--port", taken.getsockname()[1])
     assert (done.returncode, "choose another --port" in done.stderr) == (1, True)
+
+
+@pytest.mark.parametrize("token", ["", "a" * 15, "a" * 1001, "\u00e4" * 20, "a token with spaces in it"])
+def test_tokens_are_long_enough_and_fit_into_a_cookie(monkeypatch, token):
+    monkeypatch.setenv("KINEME_STUDIO_TOKEN", token)
+    with pytest.raises(SpecificationError, match="at most 1,000"):
+        serve._token()
+
+
+def test_an_empty_host_is_not_every_address():
+    with pytest.raises(SpecificationError, match="an empty --host"):
+        serve._listening(serve.Options(Path("none"), host=""))
 
 
 def test_a_token_that_is_too_short_is_refused(folder, monkeypatch):

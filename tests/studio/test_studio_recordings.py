@@ -134,7 +134,18 @@ def test_files_that_hold_no_movement_are_refused_in_a_sentence(client, name):
     assert client.get("/api/library").status_code == 200
 
 
-NAMES = ["../../etc/passwd", "..%2f..%2fx.csv", "C:\\x.csv", ".hidden.csv", "a\x01b.csv", "-rf.csv", "%00.csv", "", " "]
+NAMES = [
+    "../../etc/passwd",
+    "..%2f..%2fx.csv",
+    "C:\\x.csv",
+    ".hidden.csv",
+    "a\x01b.csv",
+    "-rf.csv",
+    "%00.csv",
+    "",
+    " ",
+    "\u540d" * 130 + ".csv",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -144,6 +155,7 @@ def test_names_of_files_lead_nowhere(name):
     assert plain not in {"", ".", ".."}
     assert not plain.startswith((".", "-"))
     assert "\0" not in plain
+    assert len(plain.encode()) < 255
 
 
 def test_reading_ends_where_it_takes_too_long_or_too_much(tmp_path):
@@ -231,6 +243,28 @@ def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, m
     assert second.status_code == 200
     assert seen[:3] == pytest.approx([0, 0.001, 0.002])
     assert client.get(path).json() == {"share": None}
+
+
+def test_a_disk_that_is_full_is_said():
+    files = uploads.Uploads()
+    files.close()  # the folder is gone: nothing can be kept in it
+    with pytest.raises(DataError, match="free some space there"):
+        _received(files, b"x")
+
+
+def test_what_was_read_is_held_up_to_a_limit_and_read_again_then(monkeypatch):
+    files = uploads.Uploads(held=20_000)
+    small, large = (_received(files, _table(*kinds)[0]) for kinds in ((0,), range(12)))
+    a = files.recordings(small)
+    assert files.recordings(small) is a
+    b = files.recordings(small, ("x", "y"))
+    monkeypatch.setattr(files, "held", 3000)
+    with pytest.raises(DataError, match="MB of numbers"):
+        files.recordings(large)
+    monkeypatch.setattr(files, "held", 4000)
+    assert files.recordings(small, ("y", "x")).demonstrations.n_dims == 2
+    assert b not in files._read.values()
+    files.close()
 
 
 def test_recordings_of_others_are_not_there(client):

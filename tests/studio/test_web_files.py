@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -24,6 +25,25 @@ def _name(path):
 def test_there_is_a_page_its_tokens_and_its_modules():
     assert {"index.html", "arm.html", "tokens.css", "style.css", "app.js"} <= {path.name for path in WEB.iterdir()}
     assert len(SCRIPTS) > 20
+
+
+FINDING = """
+import { found } from "./parts/find.js";
+const described = (k) => ({ name: `Place it on shelf ${k}`, description: k === 3 ? "Careful" : null });
+const symbols = Array.from({ length: 20 }, (_, k) => described(k));
+const field = { value: "SHELF  17", hidden: true };
+const names = (some) => some.map((one) => one.name);
+const last = [names(found(field, symbols)), names(found({ value: "careful" }, symbols)), field.hidden];
+console.log(JSON.stringify([...last, found(field, symbols.slice(0, 5)).length, field.value]));
+"""
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+def test_symbols_are_found_by_words_where_there_are_many():
+    asked = subprocess.run(
+        [NODE, "--input-type=module"], input=FINDING, cwd=WEB, capture_output=True, text=True, check=True
+    )
+    assert json.loads(asked.stdout) == [["Place it on shelf 17"], ["Place it on shelf 3"], False, 5, ""]
 
 
 @pytest.mark.skipif(NODE is None, reason="node is not installed")

@@ -12,6 +12,7 @@ import hmac
 import ipaddress
 import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -35,7 +36,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, token: str, hosts: tuple[str, ...] = ()) -> None:
         self.app, self.token = app, token
-        self.names = {"localhost", "127.0.0.1", "::1", *map(str.lower, hosts)}
+        self.names = {"localhost", *map(str.lower, hosts)}
         self.any_address = bool(hosts)
         self.cookie = "kineme_" + hashlib.sha256(token.encode()).hexdigest()[:12]  # two studios on one machine
 
@@ -49,7 +50,7 @@ class Guard:
         if refusal := self._refusal(scope, headers):
             await refuse(scope, guarded, *refusal)
         elif self._opens(scope):
-            await self._set_cookie(guarded)
+            await self._set_cookie(guarded, headers)
         else:
             await self.app(scope, receive, guarded)
 
@@ -68,7 +69,8 @@ class Guard:
             name = (urlsplit(f"//{host}").hostname or "").lower()
         except ValueError:
             return False
-        return name in self.names or (self.any_address and _is_address(name))
+        address = _address(name)
+        return name in self.names or (address is not None and (self.any_address or address.is_loopback))
 
     def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
         kind, _, bearer = headers.get("authorization", "").partition(" ")
@@ -81,10 +83,12 @@ class Guard:
     def _opens(self, scope: Scope) -> bool:
         return scope["type"] == "http" and scope["path"] == "/" and "token" in _query(scope)
 
-    async def _set_cookie(self, send: Send) -> None:
+    async def _set_cookie(self, send: Send, asked: Mapping[str, str]) -> None:
         cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-        headers = [(b"location", b"/"), (b"set-cookie", cookie.encode()), (b"content-length", b"0")]
-        await send({"type": "http.response.start", "status": 303, "headers": headers})
+        status, way = (200, (b"refresh", b"0; url=/")) if _is_linked(asked) else (303, (b"location", b"/"))
+        headers = [way, (b"set-cookie", cookie.encode()), (b"content-length", b"0"), (b"cache-control", b"no-store")]
+        headers.append((b"content-type", b"text/html"))
+        await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": b""})
 
 
@@ -94,13 +98,17 @@ def own_names(host: str) -> tuple[str, ...]:
     return host, name, f"{name}.local", socket.getfqdn()
 
 
-def _is_address(name: str) -> bool:
-    """Whether a host is an address, which nobody can point elsewhere."""
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """The address that a host is, which nobody can point elsewhere; None if it is a name."""
     try:
-        ipaddress.ip_address(name)
+        return ipaddress.ip_address(name)
     except ValueError:
-        return False
-    return True
+        return None
+
+
+def _is_linked(headers: Mapping[str, str]) -> bool:
+    """Whether a page of another site may have led a browser here, so that it follows a redirect without the cookie."""
+    return "text/html" in headers.get("accept", "") and headers.get("sec-fetch-site") not in {"none", "same-origin"}
 
 
 def _same_origin(scope: Scope, headers: Mapping[str, str]) -> bool:
@@ -120,7 +128,9 @@ def _cookies(text: str) -> dict[str, str]:
 
 
 def _query(scope: Scope) -> dict[str, list[str]]:
-    return parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=20)
+    with suppress(ValueError):  # too many fields
+        return parse_qs(scope["query_string"].decode("latin-1"), max_num_fields=20)
+    return {}
 
 
 def _with_headers(send: Send, scope: Scope, host: str) -> Send:

@@ -26,7 +26,7 @@ from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
 from kineme.studio.server.live_sources import Sources
 from kineme.studio.server.refusals import answer_errors
-from kineme.studio.server.static_files import static_routes
+from kineme.studio.server.static_files import StaticFiles
 from kineme.studio.server.studio import Studio
 
 _THREADS = 8  # requests that are worked on at once, beside movements under way
@@ -76,9 +76,9 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
     answer_errors(app)
     for router in ROUTERS:
         app.include_router(router)
-    app.router.routes.extend(static_routes())
     app.add_middleware(LooksAfterChanges)
     app.add_middleware(LimitedBodies)
+    app.add_middleware(StaticFiles)
     app.add_middleware(Guard, token=token, hosts=hosts)
     return app
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -43,7 +44,7 @@ class Changes:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._look.wait(), self.period)
             self._look.clear()
-            with suppress(KinemeError):  # a disk that cannot be read now: it is looked at again
+            with suppress(KinemeError, sqlite3.Error):  # what cannot be read now: it is looked at again
                 await self._compare()
 
     async def _compare(self) -> None:

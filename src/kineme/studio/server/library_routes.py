@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from hashlib import sha256
+from typing import Any, NamedTuple
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 
 from kineme.anchoring.figures.symbol_map import classical_scaling
 from kineme.anchoring.grounding.space import conceptual_space
@@ -26,9 +27,12 @@ _VERSIONS = 200  # of the history
 
 
 @router.get("", response_model=LibraryOut, summary="What the library holds")
-def library(studio: Reads) -> dict[str, Any]:
+def library(request: Request, studio: Reads) -> Response:
     """Symbols with the path of their prototype, and how many movements have none."""
-    return studio.kept("library", lambda: _library(studio))
+    document = studio.kept("library", lambda: _document(studio))
+    same = request.headers.get("if-none-match") == document.tag
+    body = None if same else document.body
+    return Response(body, 304 if same else 200, {"ETag": document.tag}, media_type="application/json")
 
 
 @router.get("/movements", response_model=MovementsOut, summary="Movements, some at a time")
@@ -79,6 +83,18 @@ def history(studio: Reads) -> dict[str, Any]:
             for one in every[: -_VERSIONS - 1 : -1]
         ],
     }
+
+
+class _Document(NamedTuple):
+    """An answer that is made once for each version, and a tag that is another one when the answer is."""
+
+    body: bytes
+    tag: str
+
+
+def _document(studio: Studio) -> _Document:
+    body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
+    return _Document(body, f'"{sha256(body).hexdigest()[:20]}"')
 
 
 def _library(studio: Studio) -> dict[str, Any]:

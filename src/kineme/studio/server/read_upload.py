@@ -1,7 +1,7 @@
 """Read a file that somebody sent, in a process of its own with little memory, which can be ended.
 
-Run as ``python -m kineme.studio.server.read_upload FILE RESULT BYTES``, with the options of the reader as JSON on the
-standard input. The result is an archive of plain arrays and JSON, or the text of a refusal.
+Run as ``python -m kineme.studio.server.read_upload FILE RESULT BYTES SECONDS``, with the options of the reader as JSON
+on the standard input. The result is an archive of plain arrays and JSON, or the text of a refusal.
 """
 
 from __future__ import annotations
@@ -77,8 +77,11 @@ def _recordings(arrays: dict[str, Any], told: dict[str, Any]) -> Recordings:
     return Recordings(Demonstrations.of_movements(whole), sources, problems, ())
 
 
-def _limit_memory(beyond: int) -> None:
-    """Allow so many bytes beyond what the process has; where the system knows no such limit, there is none."""
+def _limit(beyond: int, seconds: int) -> None:
+    """Allow so many bytes beyond what the process has, and so much work: nobody ends it once the studio was killed.
+
+    Where the system knows no such limits, there are none.
+    """
     status = Path("/proc/self/status")
     if not status.exists():
         return
@@ -87,13 +90,14 @@ def _limit_memory(beyond: int) -> None:
     sizes = [line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmSize")]
     most = int(sizes[0]) * 1024 + beyond
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
 
 
 def main() -> None:
     """Read the file that the arguments name."""
-    path, result, beyond = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    path, result, beyond, seconds = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     options = json.load(sys.stdin)
-    _limit_memory(beyond)
+    _limit(beyond, seconds)
     try:
         save(read_recordings(path, **options), result)
     except (KinemeError, MemoryError) as error:

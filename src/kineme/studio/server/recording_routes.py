@@ -50,7 +50,8 @@ async def send(
     """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
     key = await studio.uploads.receive(x_file_name, request.stream())
     work = Work()
-    read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
+    async with studio.uploads.readers:
+        read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
     plots = [_plot(read, k) for k in range(len(read))]
     return {
         "recording": key,

@@ -10,6 +10,7 @@ Name = Annotated[str, Field(min_length=1, max_length=10_000)]
 Ids = Annotated[list[int], Field(min_length=1, max_length=1_000_000)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]
+Times = Annotated[list[Number], Field(min_length=1, max_length=1_000_000)]
 Points = list[list[float | None]]
 
 
@@ -28,7 +29,7 @@ class Change(Sent):
 class NewMovement(Change):
     """A movement to be stored."""
 
-    times: Point
+    times: Times
     positions: list[Point]
     label: Name | None = Field(None, description="Name of its symbol, which is made if needed.")
     group: Name | None = Field(None, description="Who showed it.")
@@ -80,7 +81,7 @@ class AsOf(Change):
 class Asked(Sent):
     """A movement to be recognized."""
 
-    times: Point
+    times: Times
     positions: list[Point]
     error_rate: Number = Field(0.05, gt=0, lt=1)
 

@@ -8,6 +8,7 @@ import ipaddress
 import logging
 import os
 import secrets
+import signal
 import socket
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -19,7 +20,7 @@ from kineme.errors import DataError, SpecificationError
 LOOPBACK = "127.0.0.1"
 PORT = 8420  # unless it is taken
 TOKEN = "KINEME_STUDIO_TOKEN"  # in the environment: one that stays when the studio is started again
-_LEAST_TOKEN = 16
+_LEAST_TOKEN, _MOST_TOKEN = 16, 1000  # characters; browsers keep no cookie of more than 4,096 bytes
 _MESSAGE = 2**20  # bytes of one message of a websocket
 _GRACE = 2.0  # seconds for what runs when it is stopped
 
@@ -75,7 +76,7 @@ def serve(options: Options, ready: Callable[[str], object]) -> None:
 def is_loopback(host: str) -> bool:
     """Whether only this machine reaches a host."""
     try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+        return host.lower() == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
 
@@ -87,6 +88,7 @@ def _server(config: Any, ready: Callable[[], object]) -> Any:
     class Server(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
+            _end_with_the_terminal(self)
             ready()
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -94,25 +96,38 @@ def _server(config: Any, ready: Callable[[], object]) -> Any:
                 async with asyncio.timeout(_GRACE):
                     await super().shutdown(sockets)
             except TimeoutError:
+                config.app.state.studio.uploads.close()
                 os._exit(0)  # a thread that computes cannot be ended otherwise; the library loses nothing
 
     return Server(config)
+
+
+def _end_with_the_terminal(server: Any) -> None:
+    """Stop when the terminal is closed as when it is interrupted, unless that is ignored, as after `nohup`."""
+    if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, lambda: setattr(server, "should_exit", True))
 
 
 def _token() -> str:
     token = os.environ.get(TOKEN)
     if token is None:
         return secrets.token_urlsafe(24)
-    if len(token) < _LEAST_TOKEN or not token.isascii() or not token.replace("-", "").replace("_", "").isalnum():
+    letters = token.isascii() and token.replace("-", "").replace("_", "").isalnum()
+    if not letters or not _LEAST_TOKEN <= len(token) <= _MOST_TOKEN:
         raise SpecificationError(
-            f"expected {TOKEN} to be at least {_LEAST_TOKEN} letters, digits, - and _, got another one of "
-            f"{len(token)}; choose a longer one, or leave it out"
+            f"expected {TOKEN} to be at least {_LEAST_TOKEN} letters, digits, - and _, and at most {_MOST_TOKEN:,}, "
+            f"got another one of {len(token):,}; choose another one, or leave it out"
         )
     return token
 
 
 def _listening(options: Options) -> socket.socket:
     """A socket that listens; on the usual port if that is free."""
+    if not options.host:  # to the system that is every address
+        raise SpecificationError(
+            "expected an address to listen at, got an empty --host; leave it out for this machine alone, or write "
+            "0.0.0.0 for every address"
+        )
     if options.port is None:
         with suppress(OSError):
             return _bound(options.host, PORT)
@@ -128,7 +143,10 @@ def _listening(options: Options) -> socket.socket:
 
 def _bound(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    return socket.create_server((host, port), family=family)
+    bound = socket.create_server((host, port), family=family)
+    # Connections inherit it. Without it the body of an answer waits 40 ms for the receipt of its head to be confirmed.
+    bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return bound
 
 
 def _name(host: str) -> str:

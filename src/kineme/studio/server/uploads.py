@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import math
 import re
 import secrets
+import shutil
 import subprocess
 import sys
 import time
@@ -13,7 +16,6 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Lock
-from typing import NamedTuple
 from urllib.parse import unquote
 
 from kineme.errors import DataError
@@ -22,30 +24,27 @@ from kineme.studio.server.read_upload import REFUSED, load
 from kineme.studio.server.refusals import MissingError
 
 SECONDS = 60.0  # to read one file
-BYTES = 2 * 2**30  # of memory
+BYTES = 2 * 2**30  # of memory for it
+HELD = 2**30  # bytes of what was read from all files
 PERIOD = 0.2  # seconds between looks whether anybody waits
+_READERS = 2  # files that are read at once
 _KEPT = 8  # files
-_LONGEST = 120  # characters of a name
+_LONGEST = 200  # bytes of a name
 
 
 def _go_on() -> None:
     """Whoever asked still waits."""
 
 
-class Upload(NamedTuple):
-    """A file that was sent, and what it held, by the columns that were asked for."""
-
-    path: Path
-    read: dict[tuple[str, ...], Recordings]
-
-
 class Uploads:
     """The last few files that were sent; forgotten when the studio ends."""
 
-    def __init__(self, seconds: float = SECONDS, memory: int = BYTES) -> None:
-        self.seconds, self.memory = seconds, memory
+    def __init__(self, seconds: float = SECONDS, memory: int = BYTES, held: int = HELD) -> None:
+        self.seconds, self.memory, self.held = seconds, memory, held
+        self.readers = asyncio.Semaphore(_READERS)
         self._folder = TemporaryDirectory(prefix="kineme-studio-", ignore_cleanup_errors=True)
-        self._kept: dict[str, Upload] = {}
+        self._kept: dict[str, Path] = {}
+        self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the columns that were asked for
         self._turn = Lock()
 
     def close(self) -> None:
@@ -53,23 +52,32 @@ class Uploads:
         self._folder.cleanup()
 
     async def receive(self, name: str, chunks: AsyncIterator[bytes]) -> str:
-        """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format."""
+        """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format.
+
+        Raises
+        ------
+        DataError
+            The disk is full.
+        """
         key = secrets.token_hex(8)
         path = Path(self._folder.name) / key / plain_name(name)
-        path.parent.mkdir()
         try:
+            path.parent.mkdir()
             with path.open("wb") as file:
                 async for chunk in chunks:
                     file.write(chunk)
-        except BaseException:  # refused as too large, or the client has gone
-            path.unlink()
+        except BaseException as error:  # refused as too large, or the client has gone
+            shutil.rmtree(path.parent, ignore_errors=True)
+            if isinstance(error, OSError):
+                raise DataError(
+                    f"expected to keep the file in {self._folder.name}, got: {error.strerror}; free some space there, "
+                    "or set TMPDIR to another folder before the studio is started"
+                ) from error
             raise
         with self._turn:
-            self._kept[key] = Upload(path, {})
-            old = list(self._kept)[:-_KEPT]
-            gone = [self._kept.pop(one).path for one in old]
-        for one in gone:
-            one.unlink(missing_ok=True)
+            self._kept[key] = path
+            for old in list(self._kept)[:-_KEPT]:
+                self._forget(old)
         return key
 
     def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = _go_on) -> Recordings:
@@ -84,25 +92,45 @@ class Uploads:
         DataError
             It cannot be read, takes too long or too much memory.
         """
-        upload = self._kept.get(key)
-        if upload is None:
+        path, asked = self._kept.get(key), tuple(columns)
+        if path is None:
             raise MissingError(
                 f"expected one of the last {_KEPT} recordings that were sent, got another; send it again"
             )
-        asked = tuple(columns)
-        if asked not in upload.read:
-            upload.read[asked] = self._read(upload.path, {"columns": list(asked)} if asked else {}, check)
-        return upload.read[asked]
+        read = self._read.get((key, asked))
+        if read is None:
+            read = self._read_apart(path, {"columns": list(asked)} if asked else {}, check)
+            with self._turn:
+                if key in self._kept:
+                    self._hold((key, asked), read)
+        return read
 
-    def _read(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
+    def _hold(self, which: tuple[str, tuple[str, ...]], read: Recordings) -> None:
+        """Keep what was read for the next question; what was read long ago is read again if it is too much in all."""
+        self._read[which] = read
+        while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
+            self._read.pop(next(iter(self._read)))
+
+    def _forget(self, key: str) -> None:
+        shutil.rmtree(self._kept.pop(key).parent, ignore_errors=True)
+        for which in [one for one in self._read if one[0] == key]:
+            self._read.pop(which)
+
+    def _read_apart(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
-        command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result), str(self.memory)]
+        command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result)]
+        command += [str(self.memory), str(math.ceil(2 * self.seconds))]
         try:
             code = _run(command, json.dumps(options), self.seconds, check)
             if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
             if code:
                 raise DataError(f"expected a recording, reading {path.name} ended with code {code}")
+            if result.stat().st_size > self.held:
+                raise DataError(
+                    f"expected a recording of at most {self.held / 2**20:.0f} MB of numbers, {path.name} holds more; "
+                    "send a part of it, or learn it with kineme learn"
+                )
             return load(result)
         except TimeoutError:
             raise DataError(
@@ -131,8 +159,13 @@ def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[],
             child.kill()  # if it has not ended
 
 
+def _bytes(read: Recordings) -> int:
+    whole = read.demonstrations.movements
+    return sum(one.nbytes for one in (whole.positions, whole.times, whole.recorded) if one is not None)
+
+
 def plain_name(name: str) -> str:
     """The name of a file without folders and without what a file system may not take."""
     last = re.split(r"[/\\]", unquote(name))[-1]
-    plain = re.sub(r"[^\w.\-()+ ]", "_", last).strip(" ")[-_LONGEST:]
+    plain = re.sub(r"[^\w.\-()+ ]", "_", last).strip(" ").encode()[-_LONGEST:].decode(errors="ignore")
     return f"_{plain}" if plain.startswith((".", "-")) or not plain else plain

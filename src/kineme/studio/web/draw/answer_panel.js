@@ -86,12 +86,12 @@ export class AnswerPanel {
     else {
       const p = ranked.find((/** @type {any} */ one) => one.name === answer.label)?.value;
       const sure = answer.calibrated ? `p-value ${pValue(p ?? 0)}` : "a guess until more is drawn";
-      this.words("This is", answer.label, [sure, like].filter(Boolean).join(", "), "known");
+      this.words(answer.calibrated ? "This is" : "Most like", answer.label, [sure, like].filter(Boolean).join(", "), answer.calibrated ? "known" : "open");
     }
     this.progress(1);
     this.kind("p-value of each name");
     this.list(ranked, null, pValue);
-    this.speak(answer.label === null ? "Unknown. Give it a name." : `This is ${answer.label}.`);
+    this.speak(answer.label === null ? "Unknown. Give it a name." : `${answer.calibrated ? "This is" : "Most like"} ${answer.label}.`);
   }
 
   /** To a screen reader, once each. @param {string} text */

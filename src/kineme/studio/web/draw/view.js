@@ -133,7 +133,7 @@ class Draw {
   /** One movement has a name: too few to say what is unlike it. */
   cannotCompare() {
     const names = library().symbols.map((/** @type {any} */ one) => one.name);
-    this.panel.words("Too few to compare", "?", names.length ? `Is it ${names[0]}, or something new? Name it.` : "Give it a name.", "unknown");
+    this.panel.words("Too few to compare", "?", names.length ? `Only ${names[0]} is known. Draw something else and name it, too: two names can be told apart.` : "Give it a name.", "unknown");
     this.panel.progress(1);
     this.panel.speak("Give it a name.");
     this.naming.allow(true, names.slice(0, 3));
@@ -195,7 +195,8 @@ class Draw {
     this.naming.empty();
     this.naming.allow(false);
     byId("draw-move").disabled = name === null;
-    if (name !== null) this.panel.words("Learned", name, "Draw it again, anywhere and in any size.", "known");
+    const alone = library().symbols.length < 2;
+    if (name !== null) this.panel.words("Learned", name, alone ? "Now draw something else and name it: two names can be told apart." : "Draw it again, anywhere and in any size.", "known");
     byId("sources").classList.remove("waits");
     byId("draw-canvas").focus({ preventScroll: true });
   }

@@ -1,5 +1,6 @@
 // The symbols as cards: a picture, a name, how many movements; a box to choose several.
 import { byId, counted, fill, make } from "../parts/elements.js";
+import { found } from "../parts/find.js";
 import { keepingFocus } from "../parts/keep_focus.js";
 import { library } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
@@ -15,7 +16,7 @@ function card(symbol, page) {
     "button",
     { class: "card-open", type: "button", "aria-current": symbol.id === page.opened ? "true" : null, "data-key": `open ${symbol.id}`, on: { click: () => page.open(symbol.id) } },
     thumbnail(symbol.path),
-    make("span", { class: "card-name" }, symbol.name),
+    make("span", { class: "card-name", title: symbol.name }, symbol.name),
     make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
   );
   return make("li", { class: "card" }, open, box);
@@ -25,5 +26,7 @@ function card(symbol, page) {
 export function showCards(page) {
   const { symbols } = library();
   for (const id of chosen) if (!symbols.some((/** @type {any} */ one) => one.id === id)) chosen.delete(id);
-  keepingFocus(() => fill(byId("cards"), ...symbols.map((/** @type {any} */ one) => card(one, page))));
+  const shown = found(byId("find-symbol"), symbols);
+  byId("none-found").textContent = symbols.length && !shown.length ? "No symbol has these words in its name or description." : "";
+  keepingFocus(() => fill(byId("cards"), ...shown.map((/** @type {any} */ one) => card(one, page))));
 }

@@ -31,7 +31,7 @@ function card(proposal, movements) {
   label();
   const shown = [proposal.medoid, ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid)].slice(0, SHOWN);
   const grid = make("div", { class: "members", role: "group", "aria-label": "Its movements; choose some to name those alone" }, ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)));
-  const form = make("form", { class: "naming" }, field, yes, make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "No symbol"));
+  const form = make("form", { class: "naming" }, field, yes, make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "Not a symbol"));
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const name = field.value.trim();
@@ -49,6 +49,6 @@ export async function showProposals() {
   const movements = await tried(unlabeled);
   if (!answer || !movements) return;
   const { proposals } = answer;
-  byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${proposals.length ? `${counted(proposals.length, "group")} of them may be a symbol each.` : "They form no clear groups yet."}`;
+  byId("proposals-text").textContent = `${counted(count, "movement")} without a name. ${proposals.length > 1 ? `${proposals.length} groups of them may be a symbol each.` : proposals.length ? "One group of them may be a symbol." : "They form no clear groups yet; choose those that belong together under Show all."}`;
   keepingFocus(() => fill(byId("proposal-cards"), ...proposals.map((/** @type {any} */ one) => card(one, movements))));
 }

@@ -52,9 +52,12 @@ function actions(symbol, members) {
   return [...made, button("Delete", drop, "danger")];
 }
 
-/** The side panel of a symbol, or of the movements without one. */
+/** The side panel of a symbol, or of the movements without one; in a narrow window a sheet at the lower edge, which closes. */
 export class SymbolPanel {
-  constructor() {
+  /** @param {(id: string) => void} closed */
+  constructor(closed) {
+    this.closed = closed;
+    byId("symbol").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => event.key === "Escape" && this.close());
     /** @type {string|null} Id; "" for the movements without a symbol. */
     this.opened = null;
     this.version = -1;
@@ -65,8 +68,14 @@ export class SymbolPanel {
     this.opened = id;
     this.version = -1;
     this.show();
-    if (focus && matchMedia("(max-width: 60rem)").matches) byId("symbol").scrollIntoView({ block: "nearest" });
+    byId("symbol").scrollTop = 0;
     if (focus) byId("symbol").focus({ preventScroll: true });
+  }
+
+  close() {
+    const id = this.opened ?? "";
+    this.hint(byId("symbol"));
+    this.closed(id);
   }
 
   show() {
@@ -75,13 +84,17 @@ export class SymbolPanel {
     if (this.opened === null || (this.opened !== UNLABELED && !symbol) || (this.opened === UNLABELED && !library().unlabeled)) return this.hint(panel);
     if (this.version === library().version) return;
     this.version = library().version;
-    const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" });
+    panel.classList.add("opened");
     const count = make("p", { class: "soft small", role: "status" }, "Choose movements to split, rename or delete them.");
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
-      fill(bar, ...(members.ids().length ? actions(symbol, members) : []));
+      for (const one of acts) one.disabled = library().read_only || !members.ids().length;
       count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : "Choose movements to split, rename or delete them.";
     });
-    fill(panel, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), count, bar, members.element);
+    const acts = actions(symbol, members);
+    for (const one of acts) one.disabled = true;
+    const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" }, ...acts);
+    const close = make("button", { class: "button quiet square sheet-close", type: "button", "aria-label": "Close", on: { click: () => this.close() } }, "×");
+    fill(panel, close, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), count, bar, members.element);
   }
 
   /** @param {any} symbol */
@@ -98,6 +111,7 @@ export class SymbolPanel {
   /** @param {Element} panel */
   hint(panel) {
     this.opened = null;
-    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, "Its movements are shown here; they can be renamed, split, moved to another symbol or deleted, and everything can be undone.")));
+    panel.classList.remove("opened");
+    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.")));
   }
 }

@@ -3,6 +3,7 @@ import { get } from "../parts/api.js";
 import { merge } from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
+import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
@@ -31,16 +32,21 @@ async function showHistory() {
 }
 
 export function startLibrary() {
-  const panel = new SymbolPanel();
+  const panel = new SymbolPanel((id) => (marked(null), /** @type {any} */ (document.querySelector(`[data-key="${CSS.escape(`open ${id}`)}"]`))?.focus()));
   const map = new MovementMap((id) => open(id));
   const chose = () => {
-    byId("chosen-count").textContent = chosen.size ? `${chosen.size} chosen` : "";
+    byId("merging").hidden = library().symbols.length < 2;
+    byId("chosen-count").textContent = chosen.size > 1 ? `${chosen.size} chosen` : chosen.size ? "1 chosen; tick another" : "Tick two or more";
     byId("merge").disabled = chosen.size < 2 || library().read_only;
   };
   const cards = () => showCards({ open, opened: panel.opened, chose });
+  /** @param {string|null} id The one that is open. */
+  function marked(id) {
+    for (const one of document.querySelectorAll(".card-open")) one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
+  }
   function open(/** @type {string} */ id) {
     panel.open(id, true);
-    for (const one of document.querySelectorAll(".card-open")) one.setAttribute("aria-current", String(/** @type {any} */ (one).dataset.key === `open ${id}`));
+    marked(id);
   }
   const all = () => {
     if (currentView() !== "library" || shown === library().version) return;
@@ -55,6 +61,7 @@ export function startLibrary() {
     showProposals();
     showHistory();
   };
+  startFinding(byId("find-symbol"), cards, () => document.querySelector(".card-open"));
   byId("merge").addEventListener("click", mergeChosen);
   byId("show-unlabeled").addEventListener("click", () => open(""));
   byId("history").addEventListener("toggle", showHistory);

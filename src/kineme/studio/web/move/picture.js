@@ -31,6 +31,13 @@ export class MovePicture {
     return [...around, ...this.paths.flatMap(({ path: drawn }) => drawn.positions.filter(near))];
   }
 
+  /** The recorded path alone, until it is known how it moves. @param {number[][]} path */
+  sketch(path) {
+    this.paths = [];
+    this.plan = { path, start: path[0], goal: path[path.length - 1], via: [], obstacles: [] };
+    this.fit();
+  }
+
   /** Show the whole movement. */
   fit() {
     if (!this.plan) return;

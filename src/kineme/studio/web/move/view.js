@@ -2,6 +2,7 @@
 import { download, post } from "../parts/api.js";
 import { Camera } from "../parts/camera.js";
 import { byId, fill, make } from "../parts/elements.js";
+import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { lengths, Plot } from "../parts/plots.js";
 import { say, tried } from "../parts/toasts.js";
@@ -43,6 +44,8 @@ class Move {
       event.preventDefault();
       this.play();
     });
+    const pick = () => showPick(this.plan?.symbol ?? null, (chosen) => this.choose(chosen));
+    startFinding(byId("find-pick"), pick, () => byId("move-pick").querySelector("input"));
     onShow("move", () => this.shown());
     onLibrary(() => this.shown());
   }
@@ -55,7 +58,7 @@ class Move {
     const formats = library().formats?.map((/** @type {string} */ one) => one.replace(/^\./, "")) ?? FORMATS;
     if (!byId("export-format").children.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
     byId("move-empty").hidden = id !== null;
-    byId("pick-part").hidden = id === null;
+    for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = id === null;
     for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
     showPick(id, (chosen) => this.choose(chosen));
     if (id === null) this.plan = this.picture.plan = null;
@@ -68,6 +71,10 @@ class Move {
     if (!symbol) return;
     chooseToMove(symbol.id);
     this.version = library().version;
+    this.plan = null;
+    this.handles.set([]);
+    this.picture.sketch(symbol.path);
+    byId("move-name").textContent = symbol.name;
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
@@ -146,6 +153,7 @@ class Move {
 
   /** New paths are there. */
   redraw() {
+    if (!this.plan) return;
     const shown = FORMULATIONS.filter((one) => this.on.has(one.name) && this.rollouts.get(one.name).path).map((one) => ({ ...one, path: this.rollouts.get(one.name).path }));
     this.picture.paths = shown;
     this.keepInSight();
@@ -217,6 +225,7 @@ class Move {
   }
 
   async save() {
+    if (!this.plan) return;
     const format = byId("export-format").value;
     const name = [...this.on][0] ?? FORMULATIONS[0].name;
     const saved = await tried(() => download("/api/export", { ...question(this.plan, name), format }, `movement.${format}`));

@@ -28,12 +28,21 @@ export async function request(path, options = {}) {
     if (error.name === "AbortError") throw error;
     throw new Refused("The server does not answer. Start it again; nothing is lost.", 0);
   }
-  if (!response.ok) throw new Refused(await sentence(response), response.status);
+  if (!response.ok && response.status !== 304) throw new Refused(await sentence(response), response.status);
   return response;
 }
 
 /** @param {string} path @returns {Promise<any>} */
 export const get = async (path) => (await request(path)).json();
+
+/**
+ * What is there now and its tag; null where it is what the page has.
+ * @param {string} path @param {string|null} tag Of the answer before. @returns {Promise<{body: any, tag: string|null}|null>}
+ */
+export async function newer(path, tag) {
+  const response = await request(path, tag ? { headers: { "If-None-Match": tag } } : {});
+  return response.status === 304 ? null : { body: await response.json(), tag: response.headers.get("ETag") };
+}
 
 /** @param {any} body @returns {RequestInit} */
 const json = (body) => ({ method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });

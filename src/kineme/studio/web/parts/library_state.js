@@ -1,11 +1,13 @@
 // What the page knows of the library; views are told when it changes, whoever changed it.
-import { get } from "./api.js";
+import { newer } from "./api.js";
 
 const EMPTY = { folder: "", version: 0, n_movements: 0, n_dims: null, channels: null, read_only: false, can_undo: false, symbols: [], unlabeled: 0 };
 
 /** @type {any} */
 let known = EMPTY;
 let loaded = false;
+/** @type {string|null} */
+let tag = null;
 /** @type {Promise<any>|null} */
 let loading = null;
 let again = false;
@@ -27,10 +29,11 @@ export async function refresh() {
     again = true;
     return loading;
   }
-  loading = get("/api/library");
+  loading = newer("/api/library", tag);
   const before = loaded ? known.version : -1;
   try {
-    known = await loading;
+    const answer = await loading;
+    if (answer) ({ body: known, tag } = answer);
     loaded = true;
   } finally {
     loading = null;

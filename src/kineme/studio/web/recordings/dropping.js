@@ -1,17 +1,22 @@
 // A file from the person to the server: dropped on the page or chosen.
 import { request } from "../parts/api.js";
-import { byId } from "../parts/elements.js";
-import { tried } from "../parts/toasts.js";
-import { currentView } from "../parts/views.js";
+import { byId, counted } from "../parts/elements.js";
+import { currentView, show } from "../parts/views.js";
 
 /** @param {File} file @returns {Promise<any>} */
 async function send(file) {
   byId("drop-state").textContent = `Reading ${file.name} …`;
-  byId("drop").classList.add("busy");
-  const response = await tried(() => request("/api/recordings", { method: "POST", body: file, headers: { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" } }));
-  byId("drop").classList.remove("busy");
-  byId("drop-state").textContent = response ? "" : "It could not be read. The command kineme learn reads whole folders.";
-  return response?.json();
+  byId("drop-state").classList.remove("went-wrong");
+  const headers = { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" };
+  try {
+    const response = await request("/api/recordings", { method: "POST", body: file, headers });
+    byId("drop-state").textContent = "";
+    return await response.json();
+  } catch (error) {
+    byId("drop-state").textContent = error.status === undefined ? `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.` : error.message;
+    byId("drop-state").classList.add("went-wrong");
+    return undefined;
+  }
 }
 
 /** @param {(recording: any, name: string) => void} read */
@@ -21,16 +26,18 @@ export function startDropping(read) {
     if (!file) return;
     const recording = await send(file);
     if (recording) read(recording, file.name);
+    if (recording && files.length > 1) byId("drop-state").textContent = `One file at a time: ${file.name} is shown, ${counted(files.length - 1, "other")} not read.`;
   };
   byId("file").addEventListener("change", (/** @type {any} */ event) => take(event.target.files).finally(() => (event.target.value = "")));
   const over = (/** @type {DragEvent} */ event) => {
-    if (currentView() !== "recordings") return;
-    event.preventDefault();
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault(); // else the browser leaves the studio for the file
     byId("drop").classList.toggle("over", event.type === "dragover");
+    if (event.type === "dragover" && currentView() !== "recordings") show("recordings");
   };
   for (const name of ["dragover", "dragleave"]) document.addEventListener(name, /** @type {any} */ (over));
   document.addEventListener("drop", (event) => {
     over(event);
-    if (currentView() === "recordings") take(event.dataTransfer?.files);
+    if (event.dataTransfer?.files.length) take(event.dataTransfer.files);
   });
 }

@@ -7,7 +7,7 @@ import { lookOf, symbolNamed } from "../parts/library_state.js";
 const BAND = 40; // height of the spans [px]
 const SIDE = 12;
 const AXIS = 22;
-const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
+export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
 
 /** @typedef {{begin: number, end: number, label: string|null, p: number|null}} Span */
 
@@ -54,7 +54,7 @@ export class Timeline {
       const low = Math.min(...column.values);
       const span = Math.max(...column.values) - low || 1;
       const points = this.plot.times.map((/** @type {number} */ t, /** @type {number} */ i) => [this.x(t), 8 + lane * (1 - (column.values[i] - low) / span)]);
-      line(context, points.filter(([x]) => x > -50 && x < this.board.width + 50), { color: color(COLORS[k % COLORS.length]), width: 1.7 });
+      line(context, points.filter(([x]) => x > -50 && x < this.board.width + 50), { color: color(column.color ?? COLORS[k % COLORS.length]), width: 1.7 });
     });
     this.paintAxis();
     this.placeEdges();
@@ -154,7 +154,7 @@ export class Timeline {
     this.board.draw();
   }
 
-  zoom(/** @type {number} */ factor, /** @type {number} */ around) {
+  zoom(/** @type {number} */ factor, around = (this.range[0] + this.range[1]) / 2) {
     const [low, high] = this.whole;
     const length = Math.min(Math.max((this.range[1] - this.range[0]) * factor, (high - low) / 2000), high - low);
     const share = (around - this.range[0]) / (this.range[1] - this.range[0]);
@@ -165,6 +165,8 @@ export class Timeline {
 
   /** @param {WheelEvent} event */
   wheel(event) {
+    const whole = this.range[0] === this.whole[0] && this.range[1] === this.whole[1];
+    if (whole && event.deltaY > Math.abs(event.deltaX)) return; // nothing is left to show: the page scrolls
     if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.pan((event.deltaX / this.board.width) * (this.range[1] - this.range[0]));
     else this.zoom(1.0015 ** event.deltaY, this.time(event.offsetX));
     event.preventDefault();
@@ -172,9 +174,8 @@ export class Timeline {
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    const middle = (this.range[0] + this.range[1]) / 2;
-    if (event.key === "+" || event.key === "=") this.zoom(0.7, middle);
-    else if (event.key === "-") this.zoom(1 / 0.7, middle);
+    if (event.key === "+" || event.key === "=") this.zoom(0.7);
+    else if (event.key === "-") this.zoom(1 / 0.7);
     else if (event.key === "ArrowLeft" || event.key === "ArrowRight") this.page.choose(Math.min(Math.max(this.chosen + (event.key === "ArrowRight" ? 1 : -1), 0), this.spans.length - 1));
     else return;
     event.preventDefault();

@@ -5,9 +5,11 @@ import { byId, counted, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { startDropping } from "./dropping.js";
+import { columnCount, fitting, mismatch } from "./fitting.js";
 import { markRow, showSpans } from "./spans.js";
-import { Timeline } from "./timeline.js";
+import { COLORS, Timeline } from "./timeline.js";
 
+const SHORT = 10; // a recording of one movement [s]
 const ASKED = 400; // how often it is asked how much is searched [ms]
 
 class Recordings {
@@ -22,6 +24,7 @@ class Recordings {
     byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
+    for (const [id, factor] of /** @type {[string, number][]} */ ([["zoom-in", 0.6], ["zoom-out", 1 / 0.6]])) byId(id).addEventListener("click", () => this.timeline.zoom(factor));
     byId("tables").addEventListener("change", () => this.table());
     byId("channels").addEventListener("change", () => this.columns());
     onLibrary(() => (this.allow(), this.timeline.board.draw()));
@@ -47,7 +50,12 @@ class Recordings {
     const table = this.read.tables[k];
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
     byId("recording-facts").textContent = `${table.duration.toFixed(1)} s, ${counted(table.channels.length, "channel")}${rate}`;
-    const box = (/** @type {any} */ channel) => make("label", { class: "check" }, make("input", { type: "checkbox", checked: true, value: channel.name }), make("span", {}, channel.name, make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", "))));
+    const chosen = fitting(table.channels, library());
+    const box = (/** @type {any} */ channel, /** @type {number} */ k) => {
+      const key = make("span", { class: "key" });
+      key.style.borderColor = `var(${COLORS[columnCount(table.channels.slice(0, k)) % COLORS.length]})`;
+      return make("label", { class: "check" }, make("input", { type: "checkbox", checked: chosen.has(channel.name), value: channel.name }), key, make("span", {}, channel.name, make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", "))));
+    };
     fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
     this.timeline.spans = [];
     this.columns();
@@ -66,13 +74,14 @@ class Recordings {
     const plot = this.read.plots?.[k] ?? (k === 0 ? this.read.plot : { times: [0, this.read.tables[k].duration], columns: [] });
     const names = new Set(this.chosenChannels());
     const wanted = new Set(this.read.tables[k].channels.filter((/** @type {any} */ one) => names.has(one.name)).flatMap((/** @type {any} */ one) => one.columns ?? [one.name]));
-    const columns = plot.columns.filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
+    const columns = plot.columns.map((/** @type {any} */ one, /** @type {number} */ at) => ({ ...one, color: COLORS[at % COLORS.length] })).filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));
     return { ...plot, columns };
   }
 
   columns() {
     this.timeline.plot = this.shownPlot();
     this.timeline.board.draw();
+    this.allow();
   }
 
   body() {
@@ -82,7 +91,7 @@ class Recordings {
   async spot() {
     const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`;
     const search = (this.search = new AbortController());
-    byId("spot").textContent = "Cancel";
+    this.allow();
     byId("spans-state").textContent = "Looking …";
     const timer = setInterval(() => this.tell(path, search), ASKED);
     const answer = await tried(() => post(path, this.body(), search.signal));
@@ -93,7 +102,7 @@ class Recordings {
     this.choose(-1);
     this.changed();
     const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
-    byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown`;
+    byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${answer.spans.length ? " Choose one to drag its edges." : ""}`;
   }
 
   /** How much is searched. @param {string} path @param {AbortController} search */
@@ -105,14 +114,15 @@ class Recordings {
   /** @param {string} text */
   over(text) {
     this.search = null;
-    byId("spot").textContent = "Find movements";
+    this.allow();
     byId("spans-state").textContent = text;
   }
 
-  /** A span in the middle of what is shown. */
+  /** A span in the middle of what is shown; the first one of a short recording is all of it. */
   add() {
     const [from, to] = this.timeline.range;
-    this.timeline.spans.push({ begin: from + 0.4 * (to - from), end: from + 0.6 * (to - from), label: null, p: null });
+    const aside = !this.timeline.spans.length && to - from < SHORT ? 0 : 0.4 * (to - from);
+    this.timeline.spans.push({ begin: from + aside, end: to - aside, label: null, p: null });
     this.changed();
     this.choose(this.timeline.spans.length - 1);
     byId("spans").querySelector("tr:last-child input[type=text]").focus();
@@ -133,6 +143,13 @@ class Recordings {
   }
 
   allow() {
+    if (!this.read) return;
+    const table = this.read.tables[Number(byId("tables").value)];
+    const names = new Set(this.chosenChannels());
+    const wrong = mismatch(table.channels.filter((/** @type {any} */ one) => names.has(one.name)), library());
+    byId("channels-note").textContent = wrong;
+    byId("spot").textContent = this.search ? "Cancel" : "Find movements";
+    byId("spot").disabled = wrong !== "" && !this.search;
     byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((one) => one.label !== null);
   }
 

@@ -6,6 +6,9 @@ import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chooseToMove, toMove } from "../move/chosen.js";
 
+/** @type {any} What the server answered about arms. */
+let arms = null;
+
 /** @param {any} scene @param {any} joints Show the arm in a frame of its own: each movement gets a new one. */
 function showArm(scene, joints) {
   const frame = make("iframe", { src: "/arm.html", title: "The arm moves", class: "arm-frame" });
@@ -16,6 +19,7 @@ function showArm(scene, joints) {
   };
   window.addEventListener("message", ready);
   fill(byId("arm"), frame);
+  if (matchMedia("(max-width: 60rem)").matches) byId("arm").scrollIntoView({ block: "start" });
 }
 
 const number = (/** @type {number|null} */ value, /** @type {string} */ unit) => (value === null || value === undefined ? "–" : `${Number(Number(value).toPrecision(4))} ${unit ?? ""}`);
@@ -65,14 +69,17 @@ async function shown() {
   if (currentView() !== "robot") return;
   const { symbols } = library();
   const id = toMove(symbols);
-  fill(byId("robot-what"), ...symbols.filter((/** @type {any} */ one) => one.path).map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
-  if (byId("robot-arm").children.length) return;
-  const robots = await tried(() => get("/api/robots").catch(without));
-  if (!robots) return;
-  byId("robot-empty").hidden = robots.available;
-  byId("robot-main").hidden = !robots.available;
-  byId("robot-why").textContent = robots.why ?? "";
-  fill(byId("robot-arm"), ...robots.robots.map((/** @type {string} */ name) => make("option", { value: name }, name)));
+  const movable = symbols.filter((/** @type {any} */ one) => one.path);
+  fill(byId("robot-what"), ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
+  arms ??= await tried(() => get("/api/robots").catch(without));
+  if (!arms) return;
+  const ready = arms.available && movable.length > 0;
+  byId("robot-empty").hidden = ready;
+  byId("robot-main").hidden = !ready;
+  byId("robot-empty-title").textContent = arms.available ? "Nothing to move yet" : "No arm here yet";
+  byId("robot-why").textContent = arms.why ?? "Draw a movement and give it a name first; then an arm shows it.";
+  byId("robot-draw").hidden = !arms.available;
+  if (!byId("robot-arm").children.length) fill(byId("robot-arm"), ...arms.robots.map((/** @type {string} */ name) => make("option", { value: name }, name)));
 }
 
 export function startRobot() {

@@ -1,0 +1,20 @@
+// A field that finds symbols by words of their names; it is there where they are too many to look through.
+
+const MANY = 12;
+
+/**
+ * @param {HTMLInputElement} field @param {() => void} changed What shows those that are found.
+ * @param {() => HTMLElement|null} first What Enter presses.
+ */
+export function startFinding(field, changed, first) {
+  field.addEventListener("input", changed);
+  field.addEventListener("keydown", (event) => event.key === "Enter" && first()?.click());
+}
+
+/** Symbols with all words of the field in their name or description. @param {HTMLInputElement} field @param {any[]} symbols @returns {any[]} */
+export function found(field, symbols) {
+  field.hidden = symbols.length <= MANY;
+  if (field.hidden) field.value = "";
+  const words = field.value.toLowerCase().split(/\s+/);
+  return symbols.filter((one) => words.every((word) => `${one.name} ${one.description ?? ""}`.toLowerCase().includes(word)));
+}

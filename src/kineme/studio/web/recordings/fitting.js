@@ -1,0 +1,25 @@
+// Which channels of a recording fit the movements of the library: as many columns as these have.
+import { counted } from "../parts/elements.js";
+
+/** Columns that channels are recognized by; an orientation turns in three ways, whatever its columns. @param {any[]} channels */
+export const columnCount = (channels) => channels.reduce((sum, one) => sum + (one.columns?.length || 1), 0);
+const moving = (/** @type {any[]} */ channels) => channels.reduce((sum, one) => sum + (one.kind === "orientation" ? 3 : one.columns?.length || 1), 0);
+
+/** Names of the channels that are chosen at first. @param {any[]} channels @param {any} library @returns {Set<string>} */
+export function fitting(channels, { n_dims: wanted, channels: known, symbols }) {
+  const names = (/** @type {any[]} */ some) => new Set(some.map((one) => one.name));
+  if (!symbols.length || moving(channels) === wanted) return names(channels);
+  const alike = channels.filter((one) => known?.some((/** @type {any} */ other) => other.name === one.name));
+  if (moving(alike) === wanted) return names(alike);
+  const first = [];
+  for (const one of channels) if (one.kind === "position" && moving([...first, one]) <= wanted) first.push(one);
+  return moving(first) === wanted ? names(first) : names(channels);
+}
+
+/** What to do where chosen channels do not fit; "" where they do. @param {any[]} chosen @param {any} library @returns {string} */
+export function mismatch(chosen, { n_dims: wanted, symbols }) {
+  const have = moving(chosen);
+  if (!have) return "Choose at least one channel.";
+  if (!symbols.length) return "No symbol is known yet: add a span, name it, and learn it.";
+  return have === wanted ? "" : `Movements of this library have ${counted(wanted, "column")}; ${have} are chosen. Choose ${wanted}.`;
+}
