@@ -90,7 +90,7 @@ def test_other_columns_are_read_where_they_are_asked_for(client):
 
 
 def test_what_is_read_apart_is_what_is_read_here(tmp_path):
-    for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses())):
+    for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses()[0])):
         path = tmp_path / name
         path.write_bytes(data)
         direct = read_recordings(path)
@@ -104,14 +104,49 @@ def test_what_is_read_apart_is_what_is_read_here(tmp_path):
         assert direct.sources == again.sources
 
 
-def _poses():
-    t, x = drawing(1)
-    q = np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1))
-    q[:, 1] = np.linspace(0, 0.5, len(t))
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
+def _poses(*kinds, heads="t,x,y,qw,qx,qy,qz", rest=0.6):
+    """A recording that turns as it moves, with rests between, and when each movement begins and ends."""
+    times, rows, spans, now = [], [], [], 0.0
+    for k in kinds or (1,):
+        t, x = drawing(k, seed=50)
+        still = np.arange(0, rest, 0.025)
+        moves = np.concatenate((np.repeat(x[:1], len(still), axis=0), x)) - x[0]
+        half = 0.3 * np.column_stack((moves, moves[:, 0] * moves[:, 1]))
+        angle = np.linalg.norm(half, axis=1, keepdims=True)
+        rows.append(np.column_stack((moves, np.cos(angle), np.sinc(angle / np.pi) * half)))
+        times.append(now + np.concatenate((still, rest + t)))
+        spans.append((now + rest, now + rest + t[-1]))
+        now += rest + t[-1] + 0.025
     text = io.StringIO()
-    np.savetxt(text, np.column_stack((t, x, q)), "%.9f", ",", header="t,x,y,qw,qx,qy,qz", comments="")
-    return text.getvalue().encode()
+    np.savetxt(
+        text, np.column_stack((np.concatenate(times), np.concatenate(rows))), "%.9f", ",", header=heads, comments=""
+    )
+    return text.getvalue().encode(), spans
+
+
+@pytest.mark.parametrize("head", ["q", "orientation."])
+def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(tmp_path, open_studio, head):
+    client = open_studio(tmp_path / "poses")
+    four = [head + axis for axis in "wxyz"]
+    data, spans = _poses(0, 1, 2, heads=",".join(("t", "x", "y", *four)))
+    read = _send(client, data).json()
+    channels = read["tables"][0]["channels"]
+    assert [(one["kind"], one["columns"]) for one in channels[2:]] == [("orientation", four)]
+    chosen = [channels[k]["name"] for k in (2, 0)]  # not all of them, and in another order
+    body = {"channels": chosen, "spans": [{"begin": a, "end": b, "label": f"k{i}"} for i, (a, b) in enumerate(spans)]}
+    learned = client.post(f"/api/recordings/{read['recording']}/learn", json=body)
+    assert learned.status_code == 200, learned.text
+    (tmp_path / "a.csv").write_bytes(data)
+    (whole,) = read_recordings(tmp_path / "a.csv", columns=[*four, "x"]).demonstrations
+    library = client.app.state.studio.library
+    assert library.channels == whole.channels
+    for one, (begin, end) in zip(library.movements(), spans, strict=True):
+        inside = (whole.times >= begin - 1e-9) & (whole.times <= end + 1e-9)
+        np.testing.assert_allclose(one.recorded, whole.recorded[inside], atol=1e-6)
+    other = _send(client, _poses(1, 0, heads=",".join(("t", "x", "y", *four)))[0], "b.csv").json()["recording"]
+    for asked in ({"channels": chosen}, {}):
+        found = client.post(f"/api/recordings/{other}/spotted", json=asked).json()["spans"]
+        assert [one["label"] for one in found] == ["k1", "k0"]
 
 
 FILES = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -99,11 +99,11 @@ def _spotted(studio: Studio, key: str, asked: Spotting, work: Work) -> dict[str,
 def learn(studio: Writes, key: str, asked: LearnSpans) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one."""
     one = _one(studio, key, asked)
+    columns = _columns_of(studio.uploads.recordings(key), asked.channels) if asked.channels else None
     pieces = labeled_pieces(
         one, LabelTable("of the spans", tuple(map(_row, range(len(asked.spans)), asked.spans)), True)
     )
-    options = {"columns": list(asked.channels)} if asked.channels else None
-    report = learn_recordings(studio.library.store, pieces, options)
+    report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
@@ -113,11 +113,12 @@ def _row(k: int, span: Span) -> LabelRow:
 
 def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = lambda: None) -> Recordings:
     """One table of a recording, in the columns that are asked for, or those of the library where it has them."""
-    table, channels = asked.table, asked.channels
-    read = studio.uploads.recordings(key, channels or (), check)
+    read = studio.uploads.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
-    if not channels and ours and list(ours) != _columns(read) and set(ours) <= set(_columns(read)):
-        read = studio.uploads.recordings(key, ours, check)
+    wanted = _columns_of(read, asked.channels) if asked.channels else list(ours)
+    if wanted != _columns(read) and (asked.channels or (ours and set(ours) <= set(_columns(read)))):
+        read = studio.uploads.recordings(key, wanted, check)
+    table = asked.table
     names = [_name(read, k) for k in range(len(read))]
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
@@ -132,6 +133,12 @@ def _name(read: Recordings, k: int) -> str:
 def _columns(read: Recordings) -> list[str]:
     demos = read.demonstrations
     return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
+
+
+def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
+    """The columns of channels, such as the four of an orientation; other names are those of columns."""
+    known = {one.name: one.columns for one in read.demonstrations.channels or ()}
+    return [column for name in names for column in known.get(name, (name,))]
 
 
 def _table(read: Recordings, k: int) -> dict[str, Any]:
