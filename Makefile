@@ -9,7 +9,7 @@
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
-# make docs   the whole site, in out/docs/index.html; it needs no network
+# make docs   the whole site, in out/docs/index.html, without network; GALLERY=0 does not run the examples
 # make reference  docs/reference/names.md, from the stubs that list the public names
 # make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
 # make scene  what draws the arm in the page of kineme move --view, from the npm packages; vendored.json names them
@@ -112,18 +112,22 @@ evaluate: .venv-rivals/ready
 .venv-rivals/ready: bench/rivals.txt pyproject.toml .venv-rivals/python
 	$(call environment,.venv-rivals,bench/rivals.txt)
 
-# Warnings are errors; all that is wrong is told. What Sphinx read is kept, so that the next build is short.
+# Warnings are errors; all that is wrong is told. What Sphinx read and the examples drew is kept, so that the next build is
+# short. GALLERY=0 shows the examples without running them.
+GALLERY ?= 1
 docs: $(DEV)/ready
-	$(DEV)/bin/sphinx-build -b html -W --keep-going -j 2 --quiet -d out/doctrees docs out/docs
+	$(DEV)/bin/sphinx-build -b html -W --keep-going -j 2 --quiet -D plot_gallery=$(GALLERY) -d out/doctrees docs out/docs
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
+	$(DEV)/bin/python docs/make_interactive.py
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py
 
 tables: $(DEV)/ready
 	$(DEV)/bin/python docs/make_tables.py
+	$(DEV)/bin/python docs/concept_tables.py
 
 # After another version: its numbers and sums in vendored.json, which tests compare.
 SCENE = src/kineme/robots/view/vendor

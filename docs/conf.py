@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import kineme
 
-if TYPE_CHECKING:
-    from sphinx.application import Sphinx
-
 DOCS = Path(__file__).parent
-sys.path.append(str(DOCS))  # for `site`, the extensions of these pages
+sys.path.append(str(DOCS))  # for `extensions`, those of these pages
 
 project = "kineme"
 author = "The kineme developers"
@@ -24,12 +19,18 @@ extensions = [
     "myst_parser",
     "sphinx_design",
     "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
+    "extensions",
 ]
-source_suffix = {".md": "markdown"}
-exclude_patterns = ["site", "**/README.md"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["extensions", "**/README.md"]
+default_role = "literal"  # between single backticks in docstrings
 nitpicky = True
 highlight_language = "text"
+smartquotes_action = "D"  # dashes, and quotes as they are written
 pygments_style, pygments_dark_style = "friendly", "monokai"
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
@@ -40,11 +41,40 @@ copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 copybutton_only_copy_prompt_lines = True
 
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+#: Chapters in the order of the flow; others come behind them.
+_CHAPTERS = (
+    "movements", "recognition", "primitives", "modulation", "adapting", "control", "rhythm_and_poses", "kernels",
+    "anchoring", "robots",
+)  # fmt: skip
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": "/plot_",
+    "subsection_order": [f"../examples/{chapter}" for chapter in _CHAPTERS] + ["*"],
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("kineme",),
+    "download_all_examples": False,
+    "notebook_extensions": set(),
+    "show_signature": False,
+    "write_computation_times": False,
+    "min_reported_time": 1,
+    "capture_repr": (),
+    "thumbnail_size": (400, 280),
+}
+
 html_theme = "pydata_sphinx_theme"
 html_title = "kineme"
-html_static_path = ["site/static"]
+html_static_path = ["static"]
 html_css_files = ["kineme.css"]
-html_favicon = html_logo = "site/static/kineme.svg"
+html_favicon = html_logo = "static/kineme.svg"
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
@@ -63,26 +93,3 @@ html_theme_options = {
 }
 html_sidebars = {"index": []}
 mathjax_path = "mathjax/tex-chtml.js"
-
-
-def _copy_mathjax(app: Sphinx, error: Exception | None) -> None:
-    """The one script and the fonts that pages need, of the package that brings all of MathJax."""
-    from importlib.util import find_spec
-    from shutil import copytree
-
-    found = find_spec("sphinx-mathjax-offline")
-    if error or found is None or found.origin is None:
-        return
-    source = Path(found.origin).parent / "static" / "mathjax"
-    target = Path(app.outdir) / "_static" / "mathjax"
-    (target / "output").mkdir(parents=True, exist_ok=True)
-    (target / "tex-chtml.js").write_bytes((source / "tex-chtml.js").read_bytes())
-    fonts = Path("output", "chtml", "fonts", "woff-v2")
-    copytree(source / fonts, target / fonts, dirs_exist_ok=True)
-
-
-def setup(app: Sphinx) -> None:
-    """Add what this site has beside the extensions."""
-    app.connect("build-finished", _copy_mathjax)
-    reader = logging.getLogger("sphinx.sphinx.directives.other")
-    reader.addFilter(lambda record: "glob pattern" not in str(record.msg))  # a folder may wait for its pages

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from concept_figures import SCRIPTS, drawn
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
@@ -272,6 +273,8 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
         (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
+    for name in SCRIPTS:
+        (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
     library_pictures(folder)
 
 

@@ -15,7 +15,7 @@ from kineme._lazy import names_in
 PAGE = Path(__file__).with_name("reference") / "names.md"
 MODULES = [kineme, *(one for name in kineme.__all__ if isinstance(one := getattr(kineme, name), ModuleType))]
 
-_HEAD = """# Reference
+_HEAD = """# All names
 
 Every public name, in the order in which movements flow through kineme: recordings, primitives, features, recognition,
 symbols. Written by `make reference` from the stubs that kineme loads its names from. Docstrings state formula, shapes,

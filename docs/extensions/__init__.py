@@ -1,0 +1,43 @@
+"""What the site has beside the extensions of others."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from extensions import commands, equations, formats, hooks, links, mathjax, names, whole
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+_PAGES = (names.pages, commands.pages, formats.pages)
+
+
+def _write_pages(app: Sphinx) -> None:
+    """Write what is made from the code; a page that says the same is left alone, so that it is not read again."""
+    folder = Path(app.srcdir) / "reference" / "generated"
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {file: text for pages in _PAGES for file, text in pages()}
+    for path in folder.iterdir():
+        if path.name not in written:
+            path.unlink()
+    for file, text in written.items():
+        path = folder / file
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Connect what stands in this folder."""
+    app.connect("builder-inited", _write_pages)
+    app.connect("autodoc-process-docstring", hooks.read_docstring, priority=100)
+    app.connect("autodoc-skip-member", hooks.skip_member)
+    app.connect("build-finished", mathjax.copy_mathjax)
+    app.connect("build-finished", whole.check_site, priority=900)
+    app.add_directive("cited-in", equations.CitedIn)
+    app.add_post_transform(links.NamesInDocstrings)
+    app.add_post_transform(links.NamesInText)
+    reader = logging.getLogger("sphinx.sphinx.directives.other")
+    reader.addFilter(lambda record: "glob pattern" not in str(record.msg))  # a folder may wait for its pages
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

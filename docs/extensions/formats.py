@@ -1,0 +1,109 @@
+"""The pages about formats and schemas, from the tables and files that the code reads itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from importlib.resources import files
+from typing import Any
+
+from kineme.files.annotations import writers as annotations
+from kineme.files.formats import DATA_SETS, FORMATS
+from kineme.files.write_movement import WRITERS
+from kineme.output.figures import FORMATS as FIGURES
+
+#: Endings that are read together -> what they are, and the extra that reading them takes.
+_READ = {
+    ".csv .tsv .txt": ("tables of text, wide and long; exports of OptiTrack, Vicon, Qualisys by their heads", ""),
+    ".parquet": ("tables of Apache Parquet, of lists too", "parquet"),
+    ".npz .npy": ("arrays of NumPy: ragged movements, equal ones, trees by name", ""),
+    ".json .jsonl": ("objects with positions, or one on a line; trees by name", ""),
+    ".mat": ("MATLAB up to version 7.2; the name of the file is the label", ""),
+    ".h5 .hdf5": ("HDF5, a data set or group for each movement; MATLAB from 7.3", "hdf5"),
+    ".bvh": ("skeletons in motion: positions and rotations of joints", ""),
+    ".c3d": ("markers of motion capture, binary", "mocap"),
+    ".trc": ("markers of motion capture, text", ""),
+    ".bag .db3 .mcap": ("bags of ROS 1 and ROS 2, by topic or by frame", "ros"),
+}  # fmt: skip
+_FOLDERS = {"meta/info.json": ("data sets of LeRobot", "parquet"), "metadata.yaml": ("bags of ROS 2", "ros")}
+_ANNOTATIONS = {
+    "csv": "a table that pandas reads", "json": "an object for programs", "elan": "ELAN",
+    "audacity": "label tracks of Audacity",
+    "bag": "a copy of the bag with one more topic", "lerobot": "a copy of the data set with subtasks",
+}  # fmt: skip
+_WRITTEN = {
+    ".csv": "a table with `t` and the columns of the recording", ".npz": "arrays of NumPy",
+    ".json": "an object of arrays",
+    ".parquet": "a table of Apache Parquet; extra `parquet`",
+}  # fmt: skip
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """File name and text of each page, in Markdown."""
+    yield "formats.md", "\n".join(_formats())
+    yield "schemas.md", "\n".join(_schemas())
+
+
+def _formats() -> Iterator[str]:
+    yield "# Formats\n"
+    yield "What is read and written, from the tables that the code goes by. How columns are found and what they mean: "
+    yield "[Recordings](../../guide/recordings.md).\n\n## Recordings that are read\n"
+    covered = {ending for endings in _READ for ending in endings.split()}
+    if covered != set(FORMATS) or {one.marker for one in DATA_SETS} != set(_FOLDERS):
+        raise ValueError(f"expected a line for every format, found none for {covered ^ set(FORMATS)}")
+    rows = [(_code(endings), what, _extra(extra)) for endings, (what, extra) in _READ.items()]
+    rows += [(f"a folder with {_code(name)}", what, _extra(extra)) for name, (what, extra) in _FOLDERS.items()]
+    yield from _table(("ending", "what it is", "extra"), rows)
+    yield "\n## Movements that are written\n\n`kineme generate -o`, `kineme.write_movement`, without rounding.\n"
+    yield from _table(("ending", "what it is"), [(_code(one), _WRITTEN[one]) for one in WRITERS])
+    yield '\nPrimitives: `primitives.save("wave.kineme")`, `kineme generate --save`. Joints of an arm, bags and goals:'
+    yield "[On the joints of an arm](../../guide/robots.md).\n\n## Annotations that are written\n"
+    yield "`kineme annotate -o`, see [Long recordings](../../guide/long-recordings.md).\n"
+    rows = [(name, _code(" ".join(one.endings)), _ANNOTATIONS[name]) for name, one in annotations.WRITERS.items()]
+    yield from _table(("name", "ending", "what it is"), rows)
+    yield f"\n## Figures\n\n{_code(' '.join(f'.{kind}' for kind in FIGURES))}, byte for byte the same at every run."
+
+
+def _schemas() -> Iterator[str]:
+    text = files("kineme.anchoring.grounding").joinpath("grounding.schema.json").read_text(encoding="utf-8")
+    schema = json.loads(text)
+    yield "# JSON schemas\n\n## Grounding of a symbol\n"
+    yield f"{schema['description']}\n\nWritten by `kineme library ground`; the schema itself by"
+    yield f"`kineme library schema`. Its name is `{schema['$id']}`.\n"
+    yield from _table(("key", "kind", "what it is"), list(_keys(schema, "")))
+    yield f"\n```{{dropdown}} The schema\n~~~json\n{json.dumps(schema, indent=1)}\n~~~\n```"
+
+
+def _keys(schema: dict[str, Any], path: str) -> Iterator[tuple[str, str, str]]:
+    for name, one in schema.get("properties", {}).items():
+        needed = "" if name in schema.get("required", []) else " (optional)"
+        yield f"`{path}{name}`{needed}", _kind(one), one.get("description", "").replace("|", r"\|")
+        yield from _keys(one, f"{path}{name}.")
+        if isinstance(items := one.get("items"), dict):
+            yield from _keys(items, f"{path}{name}[].")
+
+
+def _kind(one: dict[str, Any]) -> str:
+    if "const" in one:
+        return f"`{json.dumps(one['const'])}`"
+    if "enum" in one:
+        return " or ".join(f"`{json.dumps(value)}`" for value in one["enum"])
+    if "$ref" in one:
+        return one["$ref"].rpartition("/")[2]
+    kinds = one.get("type") or " or ".join(_kind(each) for each in one.get("oneOf", one.get("anyOf", [])))
+    return " or ".join(kinds) if isinstance(kinds, list) else str(kinds)
+
+
+def _code(endings: str) -> str:
+    return ", ".join(f"`{one}`" for one in endings.split())
+
+
+def _extra(name: str) -> str:
+    return f"`{name}`" if name else ""
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+    yield f"| {' | '.join(head)} |"
+    yield "|---" * len(head) + "|"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"

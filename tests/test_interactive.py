@@ -1,0 +1,115 @@
+"""The interactive figure of the concepts computes what kineme does, and can be used by pointer and keyboard."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from make_interactive import FOLDER, FORMULATIONS, N_BASIS, N_POINTS, html, matrices
+
+import kineme
+
+NODE = shutil.which("node")
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+_SHAPE = "Spoon"
+_ASK = """
+const figure = require(process.argv[1]);
+const { data, name, path, goal } = JSON.parse(require("fs").readFileSync(0, "utf8"));
+const one = figure.encode(data, name, path);
+const u = Array.from({ length: 5 }, (_, k) => k / 4);
+const moved = figure.decode(data, name, one, goal);
+console.log(JSON.stringify({ one, moved, basis: u.map((u) => figure.basis(data, u)) }));
+"""
+
+
+@pytest.fixture(scope="module")
+def data():
+    return matrices()
+
+
+def test_the_page_holds_the_matrices_of_today(data):
+    written = (FOLDER / "primitive.html").read_text(encoding="utf-8")
+    parts = written.split('<script type="application/json">')
+    held, _, after = parts[1].partition("</script>")
+    fresh_before, _, fresh = html(data).partition('<script type="application/json">')
+    assert (parts[0], after) == (fresh_before, fresh.partition("</script>")[2])
+    held = json.loads(held)
+    for key in ("Phi", "velocity", "shown", "alpha", "overlap", "n"):
+        np.testing.assert_allclose(held[key], data[key], rtol=1e-3, atol=1e-4)
+    for name in FORMULATIONS:
+        for key in ("encode", "goal"):
+            np.testing.assert_allclose(
+                held["formulations"][name][key], data["formulations"][name][key], rtol=1e-3, atol=1e-3
+            )
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+@pytest.mark.parametrize("name", FORMULATIONS)
+def test_the_script_learns_and_moves_as_kineme_does(data, name):
+    dmp = kineme.DMP(name, n_basis=N_BASIS, n_points=N_POINTS)
+    demo = kineme.load_lasa([_SHAPE])[0]
+    path = demo.positions[np.linspace(0, len(demo) - 1, N_POINTS).round().astype(int)]
+    primitive = dmp.learn([path])
+    goal = path[-1] + [5.0, 3.0]
+    question = {"data": data, "name": name, "path": path.T.tolist(), "goal": goal.tolist()}
+    script = str(Path(FOLDER / "primitive.js"))
+    done = subprocess.run(
+        [str(NODE), "-e", _ASK, script], input=json.dumps(question), capture_output=True, text=True, check=True
+    )
+    answer = json.loads(done.stdout)
+    np.testing.assert_allclose(answer["one"]["weights"], primitive.scaled_weights[0] / dmp.K, atol=1e-2)
+    moved = primitive.rollout(goal=goal, n_samples=N_POINTS).positions[0]
+    np.testing.assert_allclose(np.transpose(answer["moved"]), moved, atol=1e-2)
+    np.testing.assert_allclose(answer["basis"], dmp.basis.design(np.linspace(0, 1, 5)), atol=1e-6)
+
+
+@pytest.fixture
+def browser():
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser):
+    page_file = tmp_path / "page.html"
+    picture = '<p class="primitive-picture">a picture</p>'
+    figure = (FOLDER / "primitive.html").read_text(encoding="utf-8")
+    page_file.write_text(f"<!doctype html><meta charset=utf-8><title>x</title>{picture}{figure}", encoding="utf-8")
+    page = browser.new_page(viewport={"width": 900, "height": 700})
+    said = []
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto(page_file.as_uri())
+    assert not page.locator(".primitive-picture").is_visible()
+    line = page.locator("path.path")
+    before = line.get_attribute("d")
+    page.locator(".goal").focus()
+    page.keyboard.press("ArrowRight")
+    assert "x 1.0, y 0.0" in page.locator(".goal").get_attribute("aria-valuetext")
+    after_goal = line.get_attribute("d")
+    page.locator(".grip").nth(3).focus()
+    page.keyboard.press("PageUp")
+    after_weight = line.get_attribute("d")
+    box = page.locator(".drawings svg").first.bounding_box()
+    page.mouse.move(box["x"] + 40, box["y"] + 60)
+    page.mouse.down()
+    for k in range(12):
+        page.mouse.move(box["x"] + 40 + 20 * k, box["y"] + 60 + 8 * (k % 4))
+    page.mouse.up()
+    after_drawing = line.get_attribute("d")
+    page.get_by_role("button", name="as it was shown").click()
+    assert len({before, after_goal, after_weight, after_drawing}) == 4
+    assert line.get_attribute("d") == before
+    page.close()
+    off = browser.new_context(java_script_enabled=False).new_page()
+    off.goto(page_file.as_uri())
+    assert off.locator(".primitive-picture").is_visible()
+    assert not off.locator(".primitive").is_visible()
+    assert said == []

@@ -1,0 +1,101 @@
+"""What makes the site of the documentation: formulas, docstrings, commands, and the check of the finished pages."""
+
+from __future__ import annotations
+
+import shlex
+
+import click
+import pytest
+from extensions import commands, equations, formats, public, typeset, whole
+from extensions.docstrings import to_rest
+from walk_through import DOCS
+
+from kineme.cli import main
+
+
+@pytest.mark.parametrize(
+    ("formula", "tex"),
+    [
+        ("x'' = K (g - x) - D x'", "x''=K(g-x)-Dx'"),
+        (
+            "f(s) = sum_i psi_i(s) w_i / sum_i psi_i(s)",
+            r"f(s)=\frac{\sum _{i}\psi _{i}(s)w_{i}}{\sum _{i}\psi _{i}(s)}",
+        ),
+        ("exp(-‖x - y‖² / (2 σ²))", r"\exp \left(-\frac{\lVert x-y\rVert ^2}{2\sigma ^2}\right)"),
+        ("2 sqrt(K)", r"2\sqrt{K}"),
+        ("x0^(1 - a)", "x_{0}^{1-a}"),
+    ],
+)
+def test_formulas_are_typeset(formula, tex):
+    assert typeset.to_tex(formula) == tex
+
+
+@pytest.mark.parametrize("code", ['fit="forcing"', "value = other", "(a", "a)", "max_angle: 3", "", "kineme.DMP"])
+def test_code_is_no_formula(code):
+    with pytest.raises(typeset.NoFormulaError):
+        typeset.to_tex(code)
+
+
+def test_docstrings_become_text_that_sphinx_reads():
+    text = to_rest(
+        "Give *it* to `DMP` and ``x_i = a / b``, not ``max_angle=3``.\n\n    x' = v    Eq. (1)\n\nParameters\n"
+        "----------\nw_ : Rollout, optional\n    Of |x|.\n\nRaises\n------\nDataError\n    No."
+    )
+    assert r"Give \*it\* to `DMP` and :math:`x_{i}=\frac{a}{b}`, not ``max_angle=3``." in text
+    assert ".. math::\n\n   \\begin{array}{lll}\n   \\text{} & x'=v & \\quad\\text{Eq. (1)}" in text
+    assert "w_ : `Rollout`, optional\n    Of \\|x\\|." in text
+    assert text.endswith("Raises\n------\nDataError\n    No.")
+
+
+def test_every_command_has_a_page():
+    """With an example, of its help or of a page, where all are tried; here those that no page shows."""
+    assert set(dict(commands.pages())) == {"commands.rst", *(f"kineme-{name}.rst" for name in main.commands)}
+
+
+@pytest.mark.parametrize("line", [line for lines in commands.EXAMPLES.values() for line in lines])
+def test_examples_of_commands_parse(line):
+    command, context, words = main, click.Context(main), shlex.split(line.partition(" > ")[0])[1:]
+    while isinstance(command, click.Group):
+        _, command, words = command.resolve_command(context, words)
+        context = click.Context(command, parent=context)
+    command.parse_args(context, words)
+
+
+def test_every_equation_of_the_paper_is_somewhere_in_the_code():
+    page = (DOCS / "reference" / "equations.md").read_text(encoding="utf-8")
+    assert [f"{{cited-in}} {number}" in page for number in range(1, 10)] == [True] * 9
+    assert set(equations.places()) == set(range(1, 10))
+    assert "kineme.kernels.TruncatedEuclidean" in equations.places()[7]
+
+
+def test_every_format_is_on_its_page():
+    text = dict(formats.pages())["formats.md"]
+    assert all(f"`{ending}`" in text for ending in formats.FORMATS)
+
+
+def test_public_names_are_found_under_what_users_write():
+    assert public.PUBLIC["DMP"] == public.PUBLIC["kineme.primitives.discrete.dmp.DMP"] == "kineme.DMP"
+    assert public.PUBLIC["kernels.RBF"] == "kineme.kernels.RBF"
+
+
+@pytest.mark.parametrize(
+    ("markup", "wrong"),
+    [
+        ('<script src="https://cdn.example/a.js"></script>', "loads"),
+        ('<img src="//cdn.example/a.png">', "loads"),
+        ('<a href="other.html">', "links to other.html"),
+        ('<a href="#nowhere">', "links to #nowhere"),
+        ('<a href="#here">', None),
+        ('<a href="https://example.org">', None),
+        ('<img src="data:image/png;base64,AA==">', None),
+    ],
+)
+def test_the_check_of_the_site_finds_what_is_wrong(tmp_path, markup, wrong):
+    (tmp_path / "page.html").write_text(f'<p id="here">{markup}</p>')
+    found = list(whole.problems(tmp_path))
+    assert found == [] if wrong is None else len(found) == 1 and wrong in found[0]
+
+
+def test_the_check_of_the_site_reads_style_sheets(tmp_path):
+    (tmp_path / "a.css").write_text("@import 'https://fonts.example/css'; p { background: url(a.png) }")
+    assert [line.partition("loads ")[2] for line in whole.problems(tmp_path)] == ["https://fonts.example/css"]
