@@ -1,8 +1,9 @@
-"""What all tests share: deterministic hypothesis, smooth movements, and a comparison in units of the result."""
+"""What all tests share: deterministic hypothesis, smooth movements, a comparison in units of the result, a browser."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -75,3 +76,19 @@ def digits(gestures):
     demos, people = gestures
     chosen = np.flatnonzero(np.char.isdigit(np.asarray(demos.labels, dtype=str)))
     return demos[chosen], people[chosen]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium of the system, or of the path in the environment variable CHROMIUM.
+
+    One for each module: while Playwright has its own event loop, a test can run no other.
+    """
+    playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    path = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    if path is None:
+        pytest.skip("no chromium is installed")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, headless=True)
+        yield browser
+        browser.close()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import time
 from itertools import combinations
 from pathlib import Path
 
@@ -12,58 +10,32 @@ import numpy as np
 import pytest
 from view_samples import HOSTILE, arm, mesh_visual, moved, write_stl
 
-pytest.importorskip("pinocchio", reason="the extra robot is not installed")
-playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
+from browsing import Pages, wait_until
 
-from kineme.robots import load, write_view  # noqa: E402
-from kineme.robots.checks.along import along  # noqa: E402
+pytest.importorskip("pinocchio", reason="the extra robot is not installed")
+
+from kineme.robots import load, write_view
+from kineme.robots.checks.along import along
 
 WIDTHS = (390, 820, 1440)
 #: A triangle whose texture is the address of a file.
 COLLADA = Path(__file__).parent / "textured.dae"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True)
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
 def opened(browser, tmp_path):
     """A function that opens the page of a movement; at the end, nothing was requested and nothing went wrong."""
-    wrong, requests, contexts = [], [], []
+    opening = Pages(browser)
 
     def open_page(made, width=1440, **options):
-        context = browser.new_context(viewport={"width": width, "height": 900}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: message.type == "error" and wrong.append(message.text))
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("dialog", lambda dialog: wrong.append(dialog.message))
-        page.on("request", lambda request: requests.append(request.url))
+        page = opening.new(width, **options)
         page.goto(write_view(tmp_path / "arm.html", made).as_uri())
         wait_until(page, "window.kineme && kineme.frames() > 0")
         return page
 
     yield open_page
-    for context in contexts:
-        context.close()
-    assert wrong == []
-    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
-    assert sum(url.startswith("file:") for url in requests) == len(contexts)
-
-
-def wait_until(page, expression):
-    """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
-    deadline = time.monotonic() + 20
-    while not page.evaluate(expression):
-        assert time.monotonic() < deadline, expression
-        page.wait_for_timeout(20)
+    opening.close("file:", "data:")
+    assert sum(url.startswith("file:") for url in opening.requests) == len(opening.contexts)
 
 
 def scrub(page, share):

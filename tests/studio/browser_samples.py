@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import time
 
 import numpy as np
 
 import kineme
+from browsing import stroke, wait_until
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
 LETTERS = ("GShape", "Sine", "Angle", "CShape")
 SHOWN = 5  # demonstrations of each letter that the library gets; the others are drawn
 
@@ -38,15 +36,7 @@ def make_letters(folder, shapes=LETTERS, shown=SHOWN):
     return folder
 
 
-def wait_until(page, expression, *arguments, seconds=20):
-    """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
-    deadline = time.monotonic() + seconds
-    while not page.evaluate(expression, *arguments):
-        assert time.monotonic() < deadline, expression
-        page.wait_for_timeout(20)
-
-
-def wait_for_text(page, selector, text, seconds=20):
+def wait_for_text(page, selector, text, seconds=60):
     """Wait until an element has a text."""
     deadline = time.monotonic() + seconds
     while (now := page.inner_text(selector)) != text:
@@ -54,25 +44,41 @@ def wait_for_text(page, selector, text, seconds=20):
         page.wait_for_timeout(20)
 
 
-def draw(page, movement, seconds=1.6, n=80, share=1.0, at=(0.5, 0.5)):
+#: Counts the questions to the server that have no answer yet; for `show`.
+UNANSWERED = """{
+  const ask = window.fetch;
+  window.unanswered = 0;
+  window.fetch = (...what) => {
+    window.unanswered += 1;
+    return ask(...what).finally(() => { window.unanswered -= 1; });
+  };
+}"""
+
+
+def show(page, view):
+    """Show a view, with what it asks the server for."""
+    page.evaluate("view => { location.hash = view; }", view)
+    wait_until(page, "view => !document.getElementById(`view-${view}`).hidden", view)
+    settle(page)
+
+
+def settle(page):
+    """Wait until the server has answered everything and the page has painted it."""
+    for _ in range(2):  # answers may ask for more
+        page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        wait_until(page, "window.unanswered === 0")
+
+
+def draw(page, movement, seconds=1.6, n=60, share=1.0):
     """Draw a movement by the mouse, all of it in `seconds`; with a share, begin it and hold the button."""
     box = page.locator("#draw-canvas").bounding_box()
     size = np.ptp(movement.positions, axis=0)
     scale = min(0.5 * box["width"] / size[0], 0.6 * box["height"] / size[1])
-    away = (movement.positions - movement.positions.min(axis=0) - size / 2) * scale
-    x, y = box["x"] + at[0] * box["width"] + away[:, 0], box["y"] + at[1] * box["height"] - away[:, 1]
+    away = (movement.positions - movement.positions.min(axis=0) - size / 2) * [scale, -scale]
+    points = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]) + away
+    kept = np.linspace(0, len(points) - 1, n).astype(int)[: max(round(share * n), 2)]
     times = (movement.times - movement.times[0]) / np.ptp(movement.times) * seconds
-    kept = np.linspace(0, len(times) - 1, n).astype(int)
-    kept = kept[: max(round(share * n), 2)]
-    page.mouse.move(x[0], y[0])
-    page.mouse.down()
-    began = time.monotonic()
-    for k in kept[1:]:
-        if (left := times[k] - (time.monotonic() - began)) > 0:
-            time.sleep(left)
-        page.mouse.move(x[k], y[k])
-    if share == 1.0:
-        page.mouse.up()
+    stroke(page, points[kept], times[kept], lift=share == 1.0)
 
 
 def center(page, selector):

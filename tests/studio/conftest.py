@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import ExitStack, contextmanager
+from shutil import copytree
 
 import pytest
 from studio_samples import BEARER, TOKEN, make_library
@@ -12,28 +14,45 @@ with warnings.catch_warnings():
 from kineme.studio.server.app import create_app
 
 
+@pytest.fixture(scope="session")
+def learned(tmp_path_factory):
+    """A library that no test opens: each gets a copy."""
+    return make_library(tmp_path_factory.mktemp("learned") / "actions")
+
+
 @pytest.fixture
-def folder(tmp_path):
-    return make_library(tmp_path / "actions")
+def folder(learned, tmp_path):
+    return copytree(learned, tmp_path / "actions")
+
+
+@contextmanager
+def client_of(folder, **options):
+    """A client of a studio in this process."""
+    app = create_app(folder, TOKEN, **options)
+    with TestClient(app, "http://127.0.0.1:8420", headers=BEARER, raise_server_exceptions=False) as client:
+        yield client
 
 
 @pytest.fixture
 def open_studio():
-    """Clients of studios, closed at the end."""
-    opened = []
-
-    def start(folder, **options):
-        app = create_app(folder, TOKEN, **options)
-        client = TestClient(app, "http://127.0.0.1:8420", headers=BEARER, raise_server_exceptions=False)
-        client.__enter__()
-        opened.append(client)
-        return client
-
-    yield start
-    for client in opened:
-        client.__exit__(None, None, None)
+    """A function that opens a studio for a client; all are closed at the end."""
+    with ExitStack() as opened:
+        yield lambda folder, **options: opened.enter_context(client_of(folder, **options))
 
 
 @pytest.fixture
 def client(folder, open_studio):
     return open_studio(folder)
+
+
+@pytest.fixture(scope="module")
+def studio_of_module(learned, tmp_path_factory):
+    with client_of(copytree(learned, tmp_path_factory.mktemp("shared") / "actions")) as client:
+        yield client
+
+
+@pytest.fixture
+def shared_client(studio_of_module):
+    """A client of a studio that the tests of a module share: they see what others have stored there."""
+    yield studio_of_module
+    studio_of_module.cookies.clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -12,8 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import uvicorn
 
 from kineme import ActionLibrary, Trajectory
+from kineme.studio.server.app import create_app
+from kineme.studio.server.serve import config_of
 
 TOKEN = "a-token-for-tests-only"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
@@ -78,6 +82,23 @@ class Running:
         self.process.send_signal(how)
         out, err = self.process.communicate(timeout=20)
         return self.process.returncode, self.line + out, err
+
+
+class Served:
+    """A studio of this process, served in a thread: it begins at once, where `Running` imports everything first."""
+
+    def __init__(self, folder, **options):
+        self.token, self._socket = TOKEN, socket.create_server(("127.0.0.1", 0))
+        self.address = f"http://127.0.0.1:{self._socket.getsockname()[1]}"
+        self._server = uvicorn.Server(config_of(create_app(folder, TOKEN, **options)))
+        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._socket]}, daemon=True)
+        self._thread.start()  # what comes before it listens waits in the socket
+
+    def end(self):
+        """Stop it."""
+        self._server.should_exit = True
+        self._thread.join(20)
+        self._socket.close()
 
 
 @contextmanager

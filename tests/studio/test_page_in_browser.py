@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import time
-
 import numpy as np
 import pytest
 
 import kineme
+from browsing import Pages, stroke, wait_until
 from kineme.studio.page.write_page import write_page
-
-playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
 
 WIDTHS = (390, 820, 1440)
 HOSTILE = '"><img src=x onerror=alert(1)>'
@@ -35,15 +28,6 @@ def library_of(folder, space=False):
     return library
 
 
-def wait_until(page, expression):
-    """Until something holds; the page's own policy forbids what Playwright waits with."""
-    for _ in range(200):
-        if page.evaluate(expression):
-            return
-        time.sleep(0.05)
-    raise AssertionError(expression)
-
-
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
@@ -53,36 +37,20 @@ def pages(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True)
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
 def opened(browser, pages):
     """A function that opens a page; at the end, nothing was requested and nothing went wrong."""
-    wrong, requests, contexts = [], [], []
+    opening = Pages(browser, errors=("error", "warning"))
 
-    def open_page(name="plane", width=1440, **options):
-        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, **options))
-        page = contexts[-1].new_page()
-        page.on("console", lambda message: message.type in {"error", "warning"} and wrong.append(message.text))
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("dialog", lambda dialog: wrong.append(dialog.message))
-        page.on("request", lambda request: requests.append(request.url))
+    def open_page(name="plane", **options):
+        page = opening.new(**options)
         page.goto((pages / f"{name}.html").as_uri())
         wait_until(page, "window.kineme !== undefined")
         return page
 
     yield open_page
-    for context in contexts:
-        context.close()
-    assert wrong == []
-    assert [url for url in requests if not url.startswith(("file:", "blob:"))] == []
-    assert sum(url.startswith("file:") for url in requests) == len(contexts)
+    opening.close("file:", "blob:")
+    assert sum(url.startswith("file:") for url in opening.requests) == len(opening.contexts)
 
 
 def draw(page, shape="GShape", index=5, until=1.0):
@@ -92,13 +60,8 @@ def draw(page, shape="GShape", index=5, until=1.0):
     box = page.locator("#stage").bounding_box()
     size = 0.6 * min(box["width"], box["height"])
     points = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]) + x * [size, -size]
-    page.mouse.move(*points[0])
-    page.mouse.down()
-    for point in points[1 : int(until * len(points))]:
-        page.mouse.move(*point)
-        time.sleep(0.01)
-    if until == 1.0:
-        page.mouse.up()
+    shown = points[: int(until * len(points))]
+    stroke(page, shown, np.linspace(0, until, len(shown)), lift=until == 1.0)
 
 
 def handle(page, part):

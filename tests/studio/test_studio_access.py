@@ -14,6 +14,12 @@ from kineme.studio.server.studio import Studio
 READS = ["/api/library", "/api/library/history", "/", "/index.html", "/api/openapi.json", "/nothing"]
 
 
+@pytest.fixture
+def client(shared_client):
+    """One for all tests: what is refused changes nothing."""
+    return shared_client
+
+
 @pytest.mark.parametrize("path", READS)
 def test_without_the_token_nothing_is_answered(client, path):
     for headers in ({}, {"Authorization": "Bearer "}, {"Authorization": f"Basic {TOKEN}"}, {"Cookie": "kineme_=x"}):

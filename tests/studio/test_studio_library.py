@@ -8,6 +8,7 @@ import pytest
 from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
+from kineme.errors import DataError
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -119,6 +120,42 @@ def test_symbols_are_renamed_described_split_merged_and_deleted(client):
         assert client.post("/api/library/undo").status_code == 200
     assert {name: one["n_members"] for name, one in _symbols(client).items()} == {f"kind {k}": 3 for k in range(4)}
     assert _symbols(client)["kind 0"]["id"] == key
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_what_is_shown_is_made_again_if_the_library_changes_meanwhile(client, folder, fails):
+    studio, seen = client.app.state.studio, []
+
+    def make():
+        seen.append(studio.library.version)
+        if len(seen) == 1:
+            with ActionLibrary(folder) as other:
+                other.rename("kind 1", "elsewhere")
+            if fails:
+                raise DataError("what was looked for is gone")
+        return seen[-1]
+
+    assert studio.kept("seen", make) == studio.library.version == 2
+    assert seen == [1, 2]
+    assert studio.kept("seen", make) == 2
+    assert len(seen) == 2
+
+
+def test_of_many_things_the_last_200_are_kept(client):
+    studio, made = client.app.state.studio, []
+    for k in [*range(250), 249, 0]:
+        assert studio.kept_some("squares", str(k), lambda k=k: made.append(k) or k * k) == k * k
+    assert made == [*range(250), 0]
+    assert len(studio.kept("squares", dict)) == 200
+
+
+def test_a_library_that_another_process_writes_is_busy_not_wrong(client, folder):
+    client.app.state.studio.library.store.wait = 0.05
+    with ActionLibrary(folder) as other, other.store.writing("holds"):
+        answer = client.post("/api/library/movements", json=asked(7))
+    assert answer.status_code == 503
+    assert "try again when it has finished" in answer.json()["error"]
+    assert client.post("/api/library/movements", json=asked(7)).status_code == 200
 
 
 def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):

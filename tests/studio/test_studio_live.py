@@ -153,6 +153,18 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
         assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
 
 
+def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
+    def fail(library):
+        raise DataError("expected a disk")
+
+    with client.websocket_connect(LIVE) as socket:
+        with monkeypatch.context() as broken:
+            broken.setattr(ActionLibrary, "stream", fail)
+            socket.send_json({"samples": samples(1)[:6]})
+            assert _said(socket, "error") == "expected a disk"
+        assert _draw(socket, 1)["ranked"][0]["name"] == "kind 1"
+
+
 def test_in_an_empty_library_drawings_are_taken_and_nothing_is_said(tmp_path, open_studio):
     client = open_studio(tmp_path / "new")
     with client.websocket_connect(LIVE) as socket:

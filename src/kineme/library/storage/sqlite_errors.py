@@ -54,6 +54,10 @@ _WORDS[sqlite3.SQLITE_LOCKED] = _WORDS[sqlite3.SQLITE_BUSY]
 _WORDS[sqlite3.SQLITE_PERM] = _WORDS[sqlite3.SQLITE_READONLY]
 
 
+class BusyError(DataError):
+    """Another process writes; the same may be tried again later."""
+
+
 @contextmanager
 def in_plain_words(path: Path, wait: float) -> Iterator[None]:
     """Convert errors of the database to `DataError`; programming errors stay as they are."""
@@ -74,4 +78,5 @@ def in_plain_words(path: Path, wait: float) -> Iterator[None]:
             words = _DAMAGED
         if words is None:
             raise
-        raise DataError(words.format(path=path, wait=wait, error=error)) from error
+        kind = BusyError if words == _WORDS[sqlite3.SQLITE_BUSY] else DataError
+        raise kind(words.format(path=path, wait=wait, error=error)) from error

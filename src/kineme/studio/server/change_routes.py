@@ -7,19 +7,9 @@ from typing import Any
 from fastapi import APIRouter
 
 from kineme.errors import SpecificationError
+from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import (
-    AsOf,
-    Assign,
-    Chosen,
-    Describe,
-    Learned,
-    Merge,
-    NewMovement,
-    Rename,
-    Split,
-    Version,
-)
+from kineme.studio.server.records import AsOf, Learned, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Studio, Writes
 

@@ -16,8 +16,8 @@ from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.sampling import evenly_spaced
+from kineme.studio.server.library_records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
 from kineme.studio.server.plain import numbers, thumbnail
-from kineme.studio.server.records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
 from kineme.studio.server.studio import Reads, Studio
 
 router = APIRouter(prefix="/api/library", tags=["library"])

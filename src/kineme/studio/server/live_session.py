@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kineme.errors import KinemeError, TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.recognition.early.stream import Live
 from kineme.studio.server.plain import plain_answer, plain_state
 from kineme.studio.server.studio import Studio
@@ -63,7 +63,7 @@ class LiveSession:
         if version != self._version:
             try:
                 self._stream = self.studio.library.stream()
-            except KinemeError:  # no symbols to recognize, or one movement
+            except SpecificationError:  # no symbols to recognize, or one movement
                 self._stream = None
             self._version = version
         self._begun = True

@@ -50,7 +50,6 @@ def thumbnail(positions: ArrayLike) -> Any:
 
 def plain_answer(answer: Answer) -> dict[str, Any]:
     """An answer of a library; `ranked` is best first."""
-    similarity = {near.index: near.similarity for near in answer.nearest}
     return {
         "label": answer.label,
         "confidence": numbers(answer.confidence),
@@ -58,8 +57,7 @@ def plain_answer(answer: Answer) -> dict[str, Any]:
         "p_values": {str(name): numbers(value) for name, value in answer.p_values.items()},
         "ranked": [{"name": name, "p_value": numbers(answer.p_values.get(name, np.nan))} for name in answer.ranked],
         "nearest": [
-            {"id": near.index, "name": near.name, "similarity": numbers(similarity[near.index])}
-            for near in answer.nearest
+            {"id": near.index, "name": near.name, "similarity": numbers(near.similarity)} for near in answer.nearest
         ],
         "calibrated": answer.calibrated,
         "rule": answer.rule,

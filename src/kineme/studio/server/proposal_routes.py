@@ -10,7 +10,8 @@ from fastapi import APIRouter
 from kineme.anchoring.proposals.proposals import Proposal
 from kineme.library.storage import read
 from kineme.studio.server.plain import numbers, thumbnail
-from kineme.studio.server.records import AsOf, Named, ProposalsOut, Version
+from kineme.studio.server.proposal_records import Named, ProposalsOut
+from kineme.studio.server.records import AsOf, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Reads, Studio, Writes
 

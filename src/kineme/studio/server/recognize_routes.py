@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from kineme.studio.server.plain import plain_answer, trajectory
-from kineme.studio.server.records import AnswerOut, Asked
+from kineme.studio.server.recognize_records import AnswerOut, Asked
 from kineme.studio.server.studio import Reads
 
 router = APIRouter(prefix="/api", tags=["recognition"])

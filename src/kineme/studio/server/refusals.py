@@ -12,7 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import Scope, Send
 
-from kineme.errors import DataError, KinemeError
+from kineme.errors import KinemeError
+from kineme.library.storage.sqlite_errors import BusyError
 from kineme.studio.server.work import StoppedError
 
 _LOG = logging.getLogger("kineme.studio")
@@ -46,7 +47,7 @@ def answer_errors(app: FastAPI) -> None:
         return JSONResponse({"error": text}, status)
 
     async def refused(_: Request, error: Any) -> JSONResponse:
-        return answer(503 if isinstance(error, DataError) and "another process" in str(error) else 400, str(error))
+        return answer(503 if isinstance(error, BusyError) else 400, str(error))
 
     async def missing(_: Request, error: Any) -> JSONResponse:
         return answer(404, str(error))

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from kineme.studio.server.records import Number, Operated, Point
+from kineme.studio.server.records import Number, Point
+from kineme.studio.server.rollout_records import Operated
 
 
 class ArmsOut(BaseModel):

@@ -11,7 +11,7 @@ from fastapi.responses import Response
 
 from kineme.files.write_movement import encode_movement
 from kineme.studio.server.plain import numbers
-from kineme.studio.server.records import Exported, Moved, Operated, OperatorsOut, StylesOut, Wanted
+from kineme.studio.server.rollout_records import Exported, Moved, Operated, OperatorsOut, StylesOut, Wanted
 from kineme.studio.server.rollouts import learned_as, make, operators, styles_of
 from kineme.studio.server.studio import Reads
 

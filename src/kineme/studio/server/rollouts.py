@@ -17,7 +17,7 @@ from kineme.primitives.generation.generate import Generated, MovementOptions, ge
 from kineme.primitives.generation.learned import Learned, learn_one
 from kineme.primitives.styles.learn import learn_styles
 from kineme.primitives.styles.model import StyleModel
-from kineme.studio.server.records import Obstacle, Operated, Wanted, What
+from kineme.studio.server.rollout_records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
 from kineme.validation import Array
 

@@ -45,7 +45,8 @@ def serve(options: Options, ready: Callable[[str], object]) -> None:
         A token in the environment that is too short.
     """
     try:
-        import uvicorn
+        import uvicorn  # noqa: F401
+        import websockets  # noqa: F401
 
         from kineme.studio.server.app import create_app
     except ImportError as error:
@@ -57,20 +58,26 @@ def serve(options: Options, ready: Callable[[str], object]) -> None:
     token = _token()
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        app = create_app(options.folder, token, read_only=options.read_only, hosts=hosts)
-        config = uvicorn.Config(
-            app,
-            log_level=logging.WARNING,
-            access_log=False,
-            ws="websockets-sansio",
-            ws_max_size=_MESSAGE,
-            server_header=False,
-            proxy_headers=False,
-            timeout_graceful_shutdown=1,
-        )
+        config = config_of(create_app(options.folder, token, read_only=options.read_only, hosts=hosts))
         address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/?token={token}"
         with suppress(KeyboardInterrupt):
             _server(config, lambda: ready(address)).run(sockets=[listening])
+
+
+def config_of(app: Any) -> Any:
+    """How uvicorn serves the application: quietly, with limited messages, without trust in headers of proxies."""
+    import uvicorn
+
+    return uvicorn.Config(
+        app,
+        log_level=logging.WARNING,
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=_MESSAGE,
+        server_header=False,
+        proxy_headers=False,
+        timeout_graceful_shutdown=1,
+    )
 
 
 def is_loopback(host: str) -> bool:

@@ -56,7 +56,7 @@ class Studio:
         self._turn = Lock()
 
     def close(self) -> None:
-        """Close the library, once what runs has ended."""
+        """Close the library, once no thread reads or writes it, and delete what was sent."""
         self.works.close()
         for pool in (self.live, self.long):
             pool.shutdown(wait=False, cancel_futures=True)
@@ -77,21 +77,35 @@ class Studio:
         with self._turn:
             turn = self._turns.setdefault(name, Lock())
         with turn:
-            version = self.library.version
-            if self._kept.get(name, (None, None))[0] != version:
-                self._kept[name] = version, make()
+            if self._kept.get(name, (None, None))[0] != self.library.version:
+                self._kept[name] = self._made(make)
             return self._kept[name][1]  # type: ignore[return-value]
+
+    def _made(self, make: Callable[[], Made]) -> tuple[int, Made]:
+        """What is made of one version: made once more if the library changes meanwhile."""
+        version = self.library.version
+        try:
+            made = make()
+        except KinemeError:
+            if self.library.version == version:
+                raise
+        else:
+            if self.library.version == version:
+                return version, made
+        return self.library.version, make()
 
     def kept_some(self, name: str, key: str, make: Callable[[], Made]) -> Made:
         """As `kept`, of many things of one kind; of too many the first ones are forgotten."""
-        made: dict[str, Made] = self.kept(name, dict)
-        if key not in made:
-            one = make()
-            if len(made) >= _KEPT:
-                made.pop(next(iter(made)), None)
-            made[key] = one
-            return one
-        return made[key]
+        several: dict[str, Made] = self.kept(name, dict)
+        with self._turn:
+            if key in several:
+                return several[key]
+        made = make()
+        with self._turn:
+            several[key] = made
+            if len(several) > _KEPT:
+                del several[next(iter(several))]
+        return made
 
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
         """The symbol of an id.
@@ -110,7 +124,7 @@ class Studio:
 
     def check_movements(self, ids: list[int], expected: int | None = None) -> None:
         """Refuse ids of movements that are not in the library, in the same way."""
-        there = set(self.kept("ids", lambda: set(self.library.ids().tolist())))
+        there = self.kept("ids", lambda: frozenset(self.library.ids().tolist()))
         if lost := [one for one in ids if one not in there]:
             raise self._gone(f"the movement {lost[0]}", expected)
 

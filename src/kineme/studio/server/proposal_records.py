@@ -1,0 +1,33 @@
+"""What proposals hold, and what names them."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel
+
+from kineme.studio.server.records import Change, Name, Points
+
+
+class Named(Change):
+    """A name for a proposal."""
+
+    name: Name
+    description: str | None = None
+
+
+class ProposalOut(BaseModel):
+    """Alike movements without a name."""
+
+    id: str
+    members: list[int]
+    medoid: int
+    suggested: str | None
+    cohesion: float
+    stability: float | None
+    path: Points
+
+
+class ProposalsOut(BaseModel):
+    """The largest first."""
+
+    proposals: list[ProposalOut]
+    left_over: int
