@@ -8,7 +8,7 @@ from pathlib import Path
 import kineme
 
 DOCS = Path(__file__).parent
-sys.path.append(str(DOCS))  # for `extensions`, those of these pages
+sys.path.append(str(DOCS))  # for `extensions` and `gallery_style`
 
 project = "kineme"
 author = "The kineme developers"
@@ -67,13 +67,16 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "min_reported_time": 1,
     "capture_repr": (),
-    "thumbnail_size": (400, 280),
+    "image_scrapers": ("gallery_style.scrape",),
+    "reset_modules": ("gallery_style.reset",),
+    "thumbnail_size": (480, 240),
+    "within_subsection_order": "FileNameSortKey",
 }
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kineme"
 html_static_path = ["static"]
-html_css_files = ["kineme.css"]
+html_css_files = ["kineme.css", "gallery.css"]
 html_favicon = html_logo = "static/kineme.svg"
 html_show_sourcelink = False
 html_copy_source = False

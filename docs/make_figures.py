@@ -14,6 +14,7 @@ import numpy as np
 from concept_figures import SCRIPTS, drawn
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from moving_picture import moving_picture
 from PIL import Image
 from walk_through import walk
 
@@ -273,6 +274,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, draw in FIGURES.items():
         (folder / f"{name}.png").write_bytes(render(draw(), dpi=110)["png"])
+    (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
     for name in SCRIPTS:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
     library_pictures(folder)

@@ -31,6 +31,6 @@ for (name, path), style in zip(measured.items(), ("--", "-"), strict=True):
     right.plot(*path.T, style)
 left.axvspan(1.5, 2.5, color="C4", alpha=0.2, linewidth=0, label="held")
 left.set(xlabel="time [s]", ylabel="x [mm]", xlim=(0, dt * steps))
-left.legend()
 right.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 plt.show()

@@ -6,8 +6,6 @@ For a fixed specification, everything from a path to its weights is linear, and 
 a thousand movements are learned by one product, and moved by another.
 """
 
-from time import perf_counter
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -33,7 +31,6 @@ plt.show()
 # %%
 # Ten thousand movements, learned and moved to goals of their own:
 paths = np.random.default_rng(0).normal(size=(10_000, 200, 2)).cumsum(axis=1)
-before = perf_counter()
 primitives = dmp.learn(paths)
 again = primitives.rollout(goal=primitives.goals + 1.0).positions
-print(again.shape, "in less than a second:", perf_counter() - before < 1)
+print(again.shape)

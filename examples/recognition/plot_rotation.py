@@ -29,7 +29,6 @@ for max_angle, style in ((np.radians(45), "-"), (None, "--"), (np.pi, ":")):
     name = "no limit (default)" if max_angle is None else f"max_angle {np.degrees(max_angle):.0f}°"
     known = list(recognizer.classes_)
     left.plot(np.degrees(angles), similar[:, known.index("6")] - similar[:, known.index("9")], style, label=name)
-left.axhline(0, color="0.7", linewidth=1)
 left.text(4, 0.1, "above: 6, below: 9", fontsize=8, color="0.4")
 left.set(xlabel="turned by [°]", ylabel="log similarity to 6 minus to 9", xlim=(0, 180), xticks=np.arange(0, 181, 45))
 left.legend()

@@ -1,0 +1,138 @@
+"""The moving picture of the first page: a letter is drawn, recognized while it is drawn, and moved to new goals.
+
+One SVG file, animated by its style sheet: no script, sharp at every size, still for readers who ask for less motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+import kineme
+from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE
+
+_WIDTH, _HEIGHT, _PANEL = 760, 270, 240
+_SECONDS = 9.0
+_DRAWN = 0.4  # share of the time in which the letter is drawn
+_GOALS = 6
+_AFTER = "84%,96%{opacity:.55}99%,100%{opacity:0}"  # the last goal has come
+_STEPS = 20  # answers of the recognizer that are shown
+_LETTER, _OTHERS = "GShape", ("CShape", "Sshape")
+
+
+class _Frame(NamedTuple):
+    """Where the unit of the recording comes to lie in the picture."""
+
+    left: float
+    middle: np.ndarray
+    scale: float
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        center = np.array([self.left + _PANEL / 2, 150.0])
+        return center + self.scale * (x - self.middle) * (1, -1)
+
+
+def moving_picture() -> str:
+    """The picture as SVG."""
+    demos = kineme.load_lasa()
+    shown = demos[[i for i, label in enumerate(demos.labels) if label == _LETTER][3]]
+    path = shown.positions[::10]
+    left, right = (_Frame(x, (path.min(0) + path.max(0)) / 2, 3.1) for x in (10.0, 510.0))
+    lines = [*_letter(left.points(path)), *_answers(demos, shown), *_goals(right, shown)]
+    titles = ("Drawn once", "Recognized on the way", "Moved to new goals")
+    heads = [f'<text x="{130 + 250 * k}" y="30" class="head">{title}</text>' for k, title in enumerate(titles)]
+    return "\n".join([_HEAD.format(style=_style()), *heads, *lines, "</svg>", ""])
+
+
+_HEAD = f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" \
+aria-label="A handwritten G is drawn, recognized on the way, and moved to new goals">
+<style>{{style}}</style>
+<rect width="{_WIDTH}" height="{_HEIGHT}" rx="10" fill="#ffffff"/>"""
+
+
+def _letter(points: np.ndarray) -> Iterator[str]:
+    yield f'<path class="pen" pathLength="1" d="{_d(points)}"/>'
+    yield _dot(points[0], GRAY, 5)
+    steps = [f"{_percent(k / _STEPS)}{_at(point)}" for k, point in _along(points)]
+    yield f"<style>@keyframes tip{{{''.join(steps)}100%{_at(points[-1])}}}</style>"
+    yield f'<circle class="tip" r="6" fill="{ORANGE}"/>'
+
+
+def _at(point: np.ndarray) -> str:
+    return f"{{transform:translate({point[0]:.1f}px,{point[1]:.1f}px)}}"
+
+
+def _along(points: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Even steps of the length, as the line itself is drawn."""
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    for k in range(_STEPS + 1):
+        yield k, np.array([np.interp(k / _STEPS * length[-1], length, column) for column in points.T])
+
+
+def _answers(demos: kineme.Demonstrations, shown: kineme.Trajectory) -> Iterator[str]:
+    """Bars of what the recognizer says at each step, of one demonstration of each of the 26 shapes."""
+    stream = kineme.Recognizer().fit(demos[::7]).stream()
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(shown.positions, axis=0), axis=1)))
+    confidence = {name: np.zeros(_STEPS + 1) for name in (_LETTER, *_OTHERS)}
+    for t, x, share in zip(shown.times, shown.positions, length / length[-1], strict=True):
+        update = stream.update(t, x)
+        for guess in update.ranked:
+            if guess.label in confidence:
+                confidence[guess.label][int(np.ceil(share * _STEPS)) :] = guess.confidence
+    for row, (name, values) in enumerate(confidence.items()):
+        y = 95 + 48 * row
+        steps = "".join(f"{_percent(k / _STEPS)}{{transform:scaleX({value:.3f})}}" for k, value in enumerate(values))
+        yield f"<style>@keyframes bar{row}{{{steps}100%{{transform:scaleX({values[-1]:.3f})}}}}</style>"
+        yield f'<text x="295" y="{y + 17}" class="name">{name[0].upper()}</text>'
+        yield f'<rect x="320" y="{y}" width="150" height="22" rx="4" fill="#eeeeee"/>'
+        color = BLUE if row == 0 else GRAY
+        yield f'<rect class="bar bar{row}" x="320" y="{y}" width="150" height="22" rx="4" fill="{color}"/>'
+
+
+def _goals(frame: _Frame, shown: kineme.Trajectory) -> Iterator[str]:
+    """The demonstration, and the primitive of it to goals on an arc."""
+    primitive = kineme.DMP().learn([shown])
+    yield f'<path class="gray" d="{_d(frame.points(shown.positions[::10]))}"/>'
+    angles = np.linspace(-0.9, 1.9, _GOALS)
+    goals = primitive.goals + 17 * np.column_stack((np.cos(angles), np.sin(angles)))
+    for k, path in enumerate(primitive.rollout(goal=goals).positions):
+        points = frame.points(path[:: max(1, len(path) // 80)])
+        end = frame.points(goals[k])
+        first = 46 + 5 * k
+        steps = f"0%,{first}%{{opacity:0}}{first + 2}%,{first + 6}%{{opacity:1}}{_AFTER}"
+        yield f"<style>@keyframes goal{k}{{{steps}}}</style>"
+        yield f'<g style="animation:goal{k} {_SECONDS}s linear infinite">'
+        yield f'<path class="moved" d="{_d(points)}"/>{_dot(end, GREEN, 5)}</g>'
+
+
+def _style() -> str:
+    time = f"{_SECONDS}s linear infinite"
+    return (
+        ".head{font:600 17px system-ui,sans-serif;text-anchor:middle;fill:#222}"
+        ".name{font:600 17px system-ui,sans-serif;text-anchor:end;fill:#222}"
+        "path{fill:none;stroke-linecap:round;stroke-linejoin:round}"
+        f".gray{{stroke:{GRAY};stroke-width:7;opacity:.35}}"
+        f".pen{{stroke:{BLUE};stroke-width:5;stroke-dasharray:1;animation:draw {time}}}"
+        f".moved{{stroke:{GREEN};stroke-width:2.5;opacity:.85}}"
+        f".tip{{animation:tip {time}}}.bar{{transform-box:fill-box;transform-origin:left}}"
+        + "".join(f".bar{k}{{animation:bar{k} {time}}}" for k in range(3))
+        + f"@keyframes draw{{0%{{stroke-dashoffset:1}}{_percent(1)}{{stroke-dashoffset:0}}100%{{stroke-dashoffset:0}}}}"
+        "@media (prefers-reduced-motion:reduce)"
+        "{*{animation-play-state:paused!important;animation-delay:-8.5s!important}}"
+    )
+
+
+def _percent(share: float) -> str:
+    """Of the whole time, where the letter is drawn."""
+    return f"{100 * _DRAWN * share:.4g}%"
+
+
+def _d(points: np.ndarray) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _dot(point: np.ndarray, color: str, radius: int) -> str:
+    x, y = np.ravel(point)
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" fill="{color}"/>'
