@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+import threading
+import time
+from contextlib import contextmanager
 
 import pytest
 from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
 from kineme.errors import DataError
+from kineme.library.storage.store import Store
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -169,6 +174,35 @@ def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
     assert "kind 1" in _symbols(client)
 
 
+def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):
+    writing = Store.writing
+
+    @contextmanager
+    def followed(store, *options):
+        with writing(store, *options) as change:
+            yield change
+        with ActionLibrary(folder) as other:
+            monkeypatch.setattr(Store, "writing", writing)
+            other.annotate("kind 3", f"after {change.version}")
+            monkeypatch.setattr(Store, "writing", followed)
+
+    a, b = (_symbols(client)[f"kind {k}"]["id"] for k in (0, 1))
+    monkeypatch.setattr(Store, "writing", followed)
+    asking = [
+        (f"symbols/{a}/rename", {"name": "wave"}),
+        (f"symbols/{a}/describe", {"text": "a hand"}),
+        (f"symbols/{a}/split", {"ids": [1], "name": "half"}),
+        ("symbols/merge", {"ids": [a, b], "into": "both"}),
+        ("movements/assign", {"ids": [7], "symbol": "both"}),
+        ("movements/assign", {"ids": [7], "symbol": None}),
+        ("movements/delete", {"ids": [8]}),
+        ("undo", {}),
+    ]
+    versions = [client.post(f"/api/library/{path}", json=body).json()["version"] for path, body in asking]
+    versions.append(client.delete(f"/api/library/symbols/{_symbols(client)['half']['id']}").json()["version"])
+    assert versions == [2 + 2 * k for k in range(9)]
+
+
 def test_what_is_gone_meanwhile_is_a_conflict_and_what_never_was_is_missing(client, folder):
     shown = client.get("/api/library").json()
     key, seen = shown["symbols"][0]["id"], shown["version"]
@@ -228,3 +262,27 @@ def test_a_library_in_space(tmp_path, open_studio):
     assert shown["n_dims"] == 3
     assert len(shown["symbols"][0]["path"][0]) == 3
     assert client.post("/api/recognize", json=asked(1)).status_code == 400
+
+
+def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, folder):
+    client.app.state.studio.library.store.wait = 5.0
+    other = sqlite3.connect(folder / "library.sqlite", isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    versions = []
+
+    def learn(k):
+        versions.append(client.post("/api/library/movements", json=asked(20 + k)).json()["version"])
+
+    waiting = [threading.Thread(target=learn, args=(k,)) for k in range(9)]
+    for one in waiting:
+        one.start()
+    time.sleep(0.5)
+    start = time.perf_counter()
+    assert client.get("/api/library/history").status_code == 200
+    assert time.perf_counter() - start < 3
+    other.execute("ROLLBACK")
+    for one in waiting:
+        one.join()
+    other.close()
+    assert client.get("/api/library").json()["version"] == 10
+    assert len(versions) == 9

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
 import signal
 import subprocess
+import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,12 +16,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from studio_samples import drawing
+from studio_samples import BEARER, drawing
 
 from kineme import ActionLibrary
 from kineme.errors import DataError
 from kineme.files.recordings import read_recordings
-from kineme.studio.server import bodies, read_upload, recording_routes, uploads
+from kineme.studio.server import bodies, own_folder, read_upload, recording_routes, uploads
 from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError
 
@@ -215,9 +217,48 @@ def test_the_last_eight_are_kept():
     keys = [_received(files, b"x") for _ in range(10)]
     with pytest.raises(MissingError, match="one of the last 8 recordings"):
         files.recordings(keys[0])
-    assert len(list(Path(files._folder.name).rglob("*.csv"))) == 8
+    assert len(list(files._folder.path.rglob("*.csv"))) == 8
     files.close()
-    assert not Path(files._folder.name).exists()
+    assert not files._folder.path.exists()
+
+
+def test_folders_of_studios_that_were_killed_are_deleted_and_those_of_others_are_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    running = own_folder.OwnFolder()
+    left, new, other = (tmp_path / name for name in ("kineme-studio-left", "kineme-studio-new", "else"))
+    for one in (left, new, other):
+        one.mkdir()
+        (one / "sent.csv").write_text("1")
+    (tmp_path / "kineme-studio-link").symlink_to(other)
+    for one in (left, other, running.path):
+        os.utime(one, (1, 1))
+    second = own_folder.OwnFolder()
+    assert {one.name for one in tmp_path.iterdir()} == {
+        *("kineme-studio-new", "kineme-studio-link", "else"),
+        *(running.path.name, second.path.name),
+    }
+    assert (other / "sent.csv").exists()
+    running.close()
+    second.close()
+
+
+def test_a_file_that_does_not_come_whole_leaves_nothing_and_is_no_error(client, caplog):
+    async def send(path):
+        parts = iter([{"type": "http.request", "body": b"t,x", "more_body": True}, {"type": "http.disconnect"}])
+
+        async def receive():
+            return next(parts)
+
+        async def answer(_):
+            pass
+
+        headers = [(name.lower().encode(), value.encode()) for name, value in (BEARER | {"Host": "localhost"}).items()]
+        scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "headers": headers}
+        await client.app(scope | {"http_version": "1.1", "raw_path": path.encode(), "root_path": ""}, receive, answer)
+
+    client.portal.call(send, "/api/recordings")
+    assert not list(client.app.state.studio.uploads._folder.path.iterdir())
+    assert "Traceback" not in caplog.text
 
 
 def _gone(after):
@@ -316,7 +357,7 @@ def test_a_recording_that_is_too_large_is_refused(client, monkeypatch):
 
     assert _send(client, b"1,2\n" * 1000).status_code == 413
     assert _send(client, parts()).status_code == 413
-    folder = Path(client.app.state.studio.uploads._folder.name)
+    folder = client.app.state.studio.uploads._folder.path
     assert not [one for one in folder.rglob("*") if one.is_file()]
 
 

@@ -1,4 +1,4 @@
-"""Changes to symbols and their members; each creates one version, and none deletes rows of earlier versions."""
+"""Changes to symbols and their members; each creates one version, which it returns, and none deletes earlier rows."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ _STATE = COLUMNS["symbol_state"]
 _SAID = ("description", "prototype", "threshold")  # the columns that `annotate` changes
 
 
-def rename(store: Store, old: str, new: str) -> None:
+def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
     check_name(new)
     with store.writing("rename", {"old": old, "new": new}) as change:
         state = state_of(change.connection, old, NOW)
         _check_free(change.connection, new)
         _replace_state(change, state, name=new)
+    return change.version
 
 
-def annotate(store: Store, who: str, **values: Any) -> None:
+def annotate(store: Store, who: str, **values: Any) -> int:
     """Change description, prototype (id of a movement) and threshold of a symbol."""
     for name in values:
         check_choice("what is annotated", name, _SAID)
@@ -44,17 +45,19 @@ def annotate(store: Store, who: str, **values: Any) -> None:
         check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, in JSON
     with store.writing("annotate", {"symbol": who, **values}) as change:
         _replace_state(change, state_of(change.connection, who, NOW), **values)
+    return change.version
 
 
-def delete_symbol(store: Store, who: str) -> None:
+def delete_symbol(store: Store, who: str) -> int:
     """Delete a symbol; its movements stay, without a symbol."""
     with store.writing("delete", {"symbol": who}) as change:
         state = state_of(change.connection, who, NOW)
         _leave(change, "symbol = :key", {"key": state[1]})
         change.retire("symbol_state", [state])
+    return change.version
 
 
-def delete_movements(store: Store, ids: Any) -> None:
+def delete_movements(store: Store, ids: Any) -> int:
     """Delete movements; a symbol whose prototype is among them loses it."""
     wanted = as_ids(store, ids)
     detail = {"movements": len(wanted), "first": int(wanted[0])}
@@ -65,9 +68,10 @@ def delete_movements(store: Store, ids: Any) -> None:
             _replace_state(change, state, prototype=None)
         gone = select(change.connection, "movement", f"removed IS NULL AND {among('id')}", keys)
         change.retire("movement", gone)
+    return change.version
 
 
-def merge(store: Store, names: Sequence[str], into: str) -> None:
+def merge(store: Store, names: Sequence[str], into: str) -> int:
     """Merge several symbols into one.
 
     If `into` is the name or id of a symbol, that one takes the members of the others; otherwise a new symbol is
@@ -94,9 +98,10 @@ def merge(store: Store, names: Sequence[str], into: str) -> None:
             members = _leave(change, "symbol = :key", {"key": state[1]})
             _move_members(change, members, key)
             change.retire("symbol_state", [state])
+    return change.version
 
 
-def split(store: Store, name: str, ids: Any, new: str) -> None:
+def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
     check_name(new)
     wanted = as_ids(store, ids)
@@ -111,9 +116,10 @@ def split(store: Store, name: str, ids: Any, new: str) -> None:
             raise SpecificationError(f"expected movements of {name!r}, got {strange[0]}, which is not one of them")
         _forget_prototypes(change, members)
         _move_members(change, members, key)
+    return change.version
 
 
-def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None) -> None:
+def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None) -> int:
     """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
 
     A symbol that is created has the medoid as its prototype, if that is among the movements.
@@ -128,13 +134,15 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int 
         add_members(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
         if state is None and medoid in wanted.tolist():
             _replace_state(change, state_of(change.connection, who, NOW), prototype=medoid)
+    return change.version
 
 
-def release(store: Store, ids: Any) -> None:
+def release(store: Store, ids: Any) -> int:
     """Remove movements from their symbols."""
     wanted = as_ids(store, ids)
     with store.writing("release", {"movements": len(wanted)}) as change:
         _forget_prototypes(change, _leave(change, among("movement"), {"keys": listed(wanted)}))
+    return change.version
 
 
 def _replace_state(change: Change, state: Row, **values: Any) -> None:

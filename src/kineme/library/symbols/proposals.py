@@ -114,23 +114,23 @@ def propose(
     return LibraryProposals(chosen, proposals)
 
 
-def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> None:
-    """Assign the members of a proposal to a symbol; see `ActionLibrary.accept`."""
+def accept(store: Store, proposal: Proposal, name: str, description: str | None = None) -> int:
+    """Assign the members of a proposal to a symbol; return the version. See `ActionLibrary.accept`."""
     members = np.intersect1d(proposal.members, read.unlabeled_ids(store))
     if not len(members):
         raise SpecificationError(
             f"expected movements without a symbol, all {len(proposal.members)} of this proposal show one by now; "
             "propose again"
         )
-    changes.assign(store, members, name, "anchored", proposal.medoid)
-    if description is not None:
-        changes.annotate(store, name, description=description)
+    version = changes.assign(store, members, name, "anchored", proposal.medoid)
+    return version if description is None else changes.annotate(store, name, description=description)
 
 
-def reject(store: Store, proposal: Proposal) -> None:
-    """Store that these movements are no symbol; see `ActionLibrary.reject`."""
-    with store.writing("reject", {"movements": proposal.members.tolist()}):
+def reject(store: Store, proposal: Proposal) -> int:
+    """Store that these movements are no symbol; return the version. See `ActionLibrary.reject`."""
+    with store.writing("reject", {"movements": proposal.members.tolist()}) as change:
         pass
+    return change.version
 
 
 def _rejected_before(store: Store, ids: Ids) -> list[NDArray[np.intp]]:

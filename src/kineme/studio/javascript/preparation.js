@@ -5,6 +5,7 @@ const SHARE = 0.1; // of its usual step: closer samples are averaged before a sp
 const QUANTILE = 0.75; // of the gaps: the usual step
 const TIME_SHARE = 1e-3; // of the arc-length phase, which keeps it rising through pauses
 const MIN_SAMPLES = 4;
+const LARGEST = 1e100; // position, and 1e50 s: squares of larger numbers may overflow
 
 /**
  * @typedef {Object} Movement
@@ -28,7 +29,9 @@ export function movement(times, positions, d) {
   if (flat.length !== t.length * d) {
     throw new Error(`expected ${t.length} samples of ${d} numbers, got ${flat.length} numbers; give one of each`);
   }
-  if (![...t, ...flat].every(Number.isFinite)) throw new Error("expected finite numbers, got others; leave them out");
+  if (!flat.every((x) => Math.abs(x) <= LARGEST) || !t.every((x) => Math.abs(x) <= Math.sqrt(LARGEST))) {
+    throw new Error("expected finite positions up to 1e100 and times up to 1e50 s, got others; leave them out");
+  }
   for (let k = 1; k < t.length; k++) {
     if (!(t[k] > t[k - 1])) throw new Error(`expected rising times, got ${t[k - 1]}, ${t[k]} at ${k}; sort them`);
   }

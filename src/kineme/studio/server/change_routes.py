@@ -7,11 +7,12 @@ from typing import Any
 from fastapi import APIRouter
 
 from kineme.errors import SpecificationError
+from kineme.library.storage import changes
 from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
 from kineme.studio.server.records import AsOf, Learned, Version
 from kineme.studio.server.refusals import ConflictError
-from kineme.studio.server.studio import Studio, Writes
+from kineme.studio.server.studio import Writes
 
 router = APIRouter(prefix="/api/library", tags=["changes"])
 
@@ -28,56 +29,52 @@ def learn(studio: Writes, asked: NewMovement) -> dict[str, Any]:
 def assign(studio: Writes, asked: Assign) -> dict[str, Any]:
     """They leave the one that they belonged to."""
     studio.check_movements(asked.ids, asked.version)
+    store = studio.library.store
     if asked.symbol is None:
-        studio.library.release(asked.ids)
-    else:
-        studio.library.assign(asked.ids, asked.symbol, "label")
-    return _version(studio)
+        return {"version": changes.release(store, asked.ids)}
+    return {"version": changes.assign(store, asked.ids, asked.symbol, "label")}
 
 
 @router.post("/movements/delete", response_model=Version, summary="Delete movements")
 def delete_movements(studio: Writes, asked: Chosen) -> dict[str, Any]:
     """Earlier versions still hold them."""
     studio.check_movements(asked.ids, asked.version)
-    studio.library.delete(asked.ids)
-    return _version(studio)
+    return {"version": changes.delete_movements(studio.library.store, asked.ids)}
 
 
 @router.post("/symbols/merge", response_model=Version, summary="Merge symbols into one")
 def merge(studio: Writes, asked: Merge) -> dict[str, Any]:
     """`into` names one of them, another one, or a new one."""
     names = [studio.symbol(key, asked.version).name for key in asked.ids]
-    studio.library.merge(names, asked.into)
-    return _version(studio)
+    return {"version": changes.merge(studio.library.store, names, asked.into)}
 
 
 @router.post("/symbols/{key}/rename", response_model=Version, summary="Rename a symbol")
 def rename(studio: Writes, key: str, asked: Rename) -> dict[str, Any]:
     """Its id stays."""
-    studio.library.rename(studio.symbol(key, asked.version).name, asked.name)
-    return _version(studio)
+    name = studio.symbol(key, asked.version).name
+    return {"version": changes.rename(studio.library.store, name, asked.name)}
 
 
 @router.post("/symbols/{key}/describe", response_model=Version, summary="Describe a symbol")
 def describe(studio: Writes, key: str, asked: Describe) -> dict[str, Any]:
     """In words of your own."""
-    studio.library.annotate(studio.symbol(key, asked.version).name, asked.text)
-    return _version(studio)
+    name = studio.symbol(key, asked.version).name
+    return {"version": changes.annotate(studio.library.store, name, description=asked.text)}
 
 
 @router.post("/symbols/{key}/split", response_model=Version, summary="Make a new symbol of some members")
 def split(studio: Writes, key: str, asked: Split) -> dict[str, Any]:
     """The others stay."""
     studio.check_movements(asked.ids, asked.version)
-    studio.library.split(studio.symbol(key, asked.version).name, asked.ids, asked.name)
-    return _version(studio)
+    name = studio.symbol(key, asked.version).name
+    return {"version": changes.split(studio.library.store, name, asked.ids, asked.name)}
 
 
 @router.delete("/symbols/{key}", response_model=Version, summary="Delete a symbol; its movements stay")
 def delete_symbol(studio: Writes, key: str, version: int | None = None) -> dict[str, Any]:
     """They belong to none then."""
-    studio.library.delete(studio.symbol(key, version).name)
-    return _version(studio)
+    return {"version": changes.delete_symbol(studio.library.store, studio.symbol(key, version).name)}
 
 
 @router.post("/undo", response_model=Version, summary="Take back the last change")
@@ -90,7 +87,3 @@ def undo(studio: Writes, asked: AsOf | None = None) -> dict[str, Any]:
         if expected is not None and studio.library.version != expected:
             raise ConflictError(str(error)) from None
         raise
-
-
-def _version(studio: Studio) -> dict[str, Any]:
-    return {"version": studio.library.version}

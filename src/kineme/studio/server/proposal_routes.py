@@ -9,6 +9,7 @@ from fastapi import APIRouter
 
 from kineme.anchoring.proposals.proposals import Proposal
 from kineme.library.storage import read
+from kineme.library.symbols import proposals as stored
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.proposal_records import Named, ProposalsOut
 from kineme.studio.server.records import AsOf, Version
@@ -28,15 +29,14 @@ def proposals(studio: Reads) -> dict[str, Any]:
 @router.post("/{key}/accept", response_model=Version, summary="Name a proposal")
 def accept(studio: Writes, key: str, asked: Named) -> dict[str, Any]:
     """Its movements belong to that symbol from now on, which is made if needed; its medoid is the prototype."""
-    studio.library.accept(_proposal(studio, key), asked.name, asked.description)
-    return {"version": studio.library.version}
+    made = _proposal(studio, key)
+    return {"version": stored.accept(studio.library.store, made, asked.name, asked.description)}
 
 
 @router.post("/{key}/reject", response_model=Version, summary="Propose it no more")
 def reject(studio: Writes, key: str, asked: AsOf | None = None) -> dict[str, Any]:
     """Its movements stay without a name."""
-    studio.library.reject(_proposal(studio, key))
-    return {"version": studio.library.version}
+    return {"version": stored.reject(studio.library.store, _proposal(studio, key))}
 
 
 def _propose(studio: Studio) -> tuple[dict[str, Proposal], int]:

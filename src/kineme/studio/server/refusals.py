@@ -9,6 +9,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse
 from starlette.types import Scope, Send
 
@@ -64,6 +65,9 @@ def answer_errors(app: FastAPI) -> None:
     async def invalid(_: Request, error: Any) -> JSONResponse:
         return answer(422, _first(error))
 
+    async def gone(_: Request, __: Any) -> JSONResponse:
+        return answer(400, "the rest of the request did not come")  # nobody is there to read it
+
     async def other(_: Request, error: Any) -> JSONResponse:
         return answer(error.status_code, str(error.detail))
 
@@ -78,6 +82,7 @@ def answer_errors(app: FastAPI) -> None:
         (PermissionError, forbidden),
         (StoppedError, stopped),
         (RequestValidationError, invalid),
+        (ClientDisconnect, gone),
         (HTTPException, other),
         (Exception, broken),
     ):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -21,6 +22,7 @@ from kineme.studio.server.work import Works
 
 Made = TypeVar("Made")
 
+_WRITERS = 4  # changes that are worked on at once; each holds a thread until it has its turn
 _KEPT = 200  # things of one kind
 _LONG = 4  # files that are read or searched at once; others wait
 
@@ -48,6 +50,7 @@ class Studio:
         self.read_only = read_only
         self.library = ActionLibrary(folder, create=not read_only, read_only=read_only)
         self.uploads = Uploads()
+        self.writers = asyncio.Semaphore(_WRITERS)
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
         self.works = Works()
@@ -148,8 +151,8 @@ def studio_of(request: Request) -> Studio:
     return studio
 
 
-def writable_studio_of(request: Request) -> Studio:
-    """The same for a change.
+async def writable_studio_of(request: Request) -> AsyncIterator[Studio]:
+    """The same for a change, of which few are worked on at once: while another process writes, others still read.
 
     Raises
     ------
@@ -161,7 +164,8 @@ def writable_studio_of(request: Request) -> Studio:
         raise PermissionError(
             "this studio shows the library for reading only; start it without --read-only to change it"
         )
-    return studio
+    async with studio.writers:
+        yield studio
 
 
 Reads = Annotated[Studio, Depends(studio_of)]

@@ -14,12 +14,12 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Lock
 from urllib.parse import unquote
 
 from kineme.errors import DataError
 from kineme.files.merge_files import Recordings
+from kineme.studio.server.own_folder import OwnFolder
 from kineme.studio.server.read_upload import REFUSED, load
 from kineme.studio.server.refusals import MissingError
 
@@ -42,14 +42,14 @@ class Uploads:
     def __init__(self, seconds: float = SECONDS, memory: int = BYTES, held: int = HELD) -> None:
         self.seconds, self.memory, self.held = seconds, memory, held
         self.readers = asyncio.Semaphore(_READERS)
-        self._folder = TemporaryDirectory(prefix="kineme-studio-", ignore_cleanup_errors=True)
+        self._folder = OwnFolder()
         self._kept: dict[str, Path] = {}
         self._read: dict[tuple[str, tuple[str, ...]], Recordings] = {}  # by the columns that were asked for
         self._turn = Lock()
 
     def close(self) -> None:
         """Delete them."""
-        self._folder.cleanup()
+        self._folder.close()
 
     async def receive(self, name: str, chunks: AsyncIterator[bytes]) -> str:
         """Keep a file under the key that is returned; `name` is percent-encoded, its ending says the format.
@@ -60,7 +60,7 @@ class Uploads:
             The disk is full.
         """
         key = secrets.token_hex(8)
-        path = Path(self._folder.name) / key / plain_name(name)
+        path = self._folder.path / key / plain_name(name)
         try:
             path.parent.mkdir()
             with path.open("wb") as file:
@@ -70,7 +70,7 @@ class Uploads:
             shutil.rmtree(path.parent, ignore_errors=True)
             if isinstance(error, OSError):
                 raise DataError(
-                    f"expected to keep the file in {self._folder.name}, got: {error.strerror}; free some space there, "
+                    f"expected to keep the file in {self._folder.path}, got: {error.strerror}; free some space there, "
                     "or set TMPDIR to another folder before the studio is started"
                 ) from error
             raise

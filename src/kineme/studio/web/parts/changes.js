@@ -3,21 +3,33 @@ import { post, remove } from "./api.js";
 import { library, refresh } from "./library_state.js";
 import { say, tried } from "./toasts.js";
 
+let own = 0; // the version of the last change of this page
+let turn = Promise.resolve(); // of undoing, one after the other
+
 /** @param {() => Promise<any>} ask @param {string} done What to say then. @returns {Promise<any>} */
 async function change(ask, done) {
   return tried(async () => {
+    const before = library().version;
     const answer = await ask();
+    own = answer.version;
     await refresh();
-    say(done, library().can_undo ? { act: undo, action: "Undo" } : {});
-    return answer ?? {};
+    const changed = answer.version > before; // not where it was stored already
+    say(done, changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {});
+    return answer;
   });
 }
 
-/** Back to the state before the last change. */
-export async function undo() {
+/** Back to the state before a change, by default the last one that is shown; the server refuses if others came since. @param {number} [version] */
+export function undo(version) {
+  turn = turn.then(() => takeBack(version));
+  return turn;
+}
+
+/** @param {number} [version] */
+async function takeBack(version) {
   if (!library().can_undo || library().read_only) return;
   await tried(async () => {
-    await post("/api/library/undo");
+    own = (await post("/api/library/undo", { version: version ?? Math.max(own, library().version) })).version;
     await refresh();
     say("The last change is taken back.");
   });

@@ -40,5 +40,5 @@ function pressed(event) {
 export function startShortcuts() {
   document.addEventListener("keydown", pressed);
   byId("help").addEventListener("click", list);
-  byId("undo").addEventListener("click", undo);
+  byId("undo").addEventListener("click", () => undo());
 }
