@@ -105,6 +105,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
     page.evaluate("location.hash = 'move'")
     wait_until(page, "document.getElementById('move-empty').checkVisibility()")
     assert page.is_hidden("#move-panel")
+    assert page.locator("#library-empty h2").count() == 1  # below the page's h1, where nothing else is
     page.click("#move-empty button")
     assert page.inner_text("#draw-empty-title") == "Nothing is known yet"
     assert "One drawing is enough" in page.inner_text("#draw-empty-text")
@@ -338,6 +339,9 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
             break
     page.keyboard.press("Shift+ArrowRight")
     assert page.get_attribute(".handle.goal", "aria-label") != before
+    page.keyboard.press("Control+z")  # here it takes back the step, and not what was learned
+    assert page.get_attribute(".handle.goal", "aria-label") == before
+    assert "5 symbols" in page.inner_text("#library-count")
     page.keyboard.press("?")
     assert page.is_visible("#keys")
     page.keyboard.press("Escape")
@@ -504,5 +508,13 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     assert page.locator("#robot-checks tr").count() > 5
     frame = page.frame_locator(".arm-frame")
     frame.locator(".chart").first.wait_for()
-    frame.locator("#play").click()
+    assert frame.locator("#play").inner_text() == "Pause"  # it moves by itself
     assert frame.locator(".chart .limit").count() > 0
+    assert page.is_hidden("#robot-dragged")
+    page.keyboard.press("3")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    page.locator(".handle.goal").press("Shift+ArrowLeft")
+    page.keyboard.press("5")
+    with page.expect_request("**/api/robots/move") as asked:
+        page.click("#robot-go")
+    assert len(asked.value.post_data_json["displacement"]) == 2  # it goes where the goal was dragged to

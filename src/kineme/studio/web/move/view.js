@@ -5,22 +5,25 @@ import { byId, fill, make } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { lengths, Plot } from "../parts/plots.js";
+import { isUndo } from "../parts/shortcuts.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, toMove } from "./chosen.js";
+import { chooseToMove, dragGoal, toMove } from "./chosen.js";
 import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";
 import { MovePicture } from "./picture.js";
-import { asShown, extent, question } from "./plan.js";
+import { asShown, draggedWay, extent, question } from "./plan.js";
 import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
+import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
 
 const FORMATS = ["csv", "json", "npz", "parquet"];
 
 class Move {
   constructor() {
+    this.steps = new Steps();
     this.camera = new Camera();
     this.plan = null;
     this.version = -1;
@@ -46,6 +49,7 @@ class Move {
     });
     const pick = () => showPick(this.plan?.symbol ?? null, (chosen) => this.choose(chosen));
     startFinding(byId("find-pick"), pick, () => byId("move-pick").querySelector("input"));
+    document.addEventListener("keydown", (event) => isUndo(event) && currentView() === "move" && this.back());
     onShow("move", () => this.shown());
     onLibrary(() => this.shown());
   }
@@ -72,6 +76,7 @@ class Move {
     chooseToMove(symbol.id);
     this.version = library().version;
     this.plan = null;
+    this.steps = new Steps();
     this.handles.set([]);
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
@@ -128,10 +133,12 @@ class Move {
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
     for (const name of this.on) this.rollouts.get(name).follow(this.plan);
     this.picture.board.draw();
+    dragGoal(this.plan.symbol, draggedWay(this.plan));
     if (!this.dragging) this.numbers();
   }
 
   numbers() {
+    this.steps.keep(this.plan);
     showPoints(this.plan, () => this.changed(), () => this.structure());
   }
 
@@ -181,6 +188,13 @@ class Move {
     if (!this.plan) return;
     this.plan.share = 4 ** (Number(byId("duration").value) / 100);
     this.changed();
+  }
+
+  /** Before the last change of a point or the duration. */
+  back() {
+    if (!this.plan || !this.steps.back(this.plan)) return say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
+    byId("duration").value = String(Math.round((100 * Math.log(this.plan.share)) / Math.log(4)));
+    this.structure();
   }
 
   addVia() {
