@@ -35,6 +35,7 @@ SUBJECTS = (
     "annotate",
     "page",
     "studio",
+    "studio_in_browser",
     "by_person",
     "nested",
 )

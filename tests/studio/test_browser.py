@@ -103,6 +103,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
     page.evaluate("location.hash = 'move'")
     wait_until(page, "document.getElementById('move-empty').checkVisibility()")
     assert page.is_hidden("#move-panel")
+    assert page.locator("#library-empty h2").count() == 1  # below the page's h1, where nothing else is
     page.click("#move-empty button")
     assert page.inner_text("#draw-empty-title") == "Nothing is known yet"
     assert "One drawing is enough" in page.inner_text("#draw-empty-text")
@@ -124,7 +125,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
 def test_the_path_follows_the_goal_without_asking_the_server(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
-    page.wait_for_timeout(1500)  # operators are asked for once
+    page.wait_for_timeout(1500)  # the primitive is asked for once
     page.route("**/api/rollout", lambda route: None)  # from now on it never answers
     x, y = center(page, ".handle.goal")
     page.mouse.move(x, y)
@@ -134,6 +135,15 @@ def test_the_path_follows_the_goal_without_asking_the_server(opened, served_lett
     assert page.evaluate(INKED, [x + 70, y - 90, 30]) > 20
     page.mouse.up()
     assert center(page, ".handle.goal") != (x, y)
+    page.click("#add-via")
+    for _ in range(4):
+        page.keyboard.press("Shift+ArrowUp")
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.evaluate(INKED, [*center(page, ".handle.via"), 30]) > 20
+    loaded = (
+        "performance.getEntriesByName(location.origin + '/api/library').filter((one) => one.responseStatus === 200)"
+    )
+    assert page.evaluate(f"{loaded}.map((one) => one.initiatorType)") == ["link"]  # once, beside the modules
 
 
 def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):
@@ -330,6 +340,9 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
             break
     page.keyboard.press("Shift+ArrowRight")
     assert page.get_attribute(".handle.goal", "aria-label") != before
+    page.keyboard.press("Control+z")  # here it takes back the step, and not what was learned
+    assert page.get_attribute(".handle.goal", "aria-label") == before
+    assert "5 symbols" in page.inner_text("#library-count")
     page.keyboard.press("?")
     assert page.is_visible("#keys")
     page.keyboard.press("Escape")
@@ -466,5 +479,13 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     assert page.locator("#robot-checks tr").count() > 5
     frame = page.frame_locator(".arm-frame")
     frame.locator(".chart").first.wait_for()
-    frame.locator("#play").click()
+    assert frame.locator("#play").inner_text() == "Pause"  # it moves by itself
     assert frame.locator(".chart .limit").count() > 0
+    assert page.is_hidden("#robot-dragged")
+    page.keyboard.press("3")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    page.locator(".handle.goal").press("Shift+ArrowLeft")
+    page.keyboard.press("5")
+    with page.expect_request("**/api/robots/move") as asked:
+        page.click("#robot-go")
+    assert len(asked.value.post_data_json["displacement"]) == 2  # it goes where the goal was dragged to

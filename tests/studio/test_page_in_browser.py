@@ -95,6 +95,9 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
         np.array(page.evaluate("kineme.state.moving.goal")) - before[-1]
     )
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    page.get_by_role("button", name=HOSTILE).click()
+    seen = page.locator("#verdict").bounding_box()
+    assert 0 <= seen["y"] < 700  # what was chosen is in sight, also on a phone where the list is below it
 
 
 def test_the_path_itself_is_dragged_through_a_point(opened):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from kineme.errors import DataError
@@ -59,6 +60,15 @@ def test_no_file_of_the_server_is_an_arm(client, symbol, robot):
 
 def test_a_goal_without_a_start_is_refused(client, symbol, arms):
     assert _move(client, symbol, goal=[0.5, 0.0, 0.4]).status_code == 400
+    assert _move(client, symbol, displacement=[0.5, 0.0, 0.4]).status_code == 400  # the library is in the plane
+
+
+def test_the_goal_may_be_where_it_was_dragged_to_in_the_library_s_unit(client, symbol, arms):
+    shown = client.post("/api/rollout", json={"what": {"symbol": symbol}}).json()["positions"]
+    way = np.subtract(shown[-1], shown[0]) * [1.2, -1.0]
+    wanted = np.array(_move(client, symbol, displacement=way.tolist()).json()["scene"]["wanted"])
+    scale = SIZE / np.ptp(shown, axis=0).max()
+    np.testing.assert_allclose((wanted[-1] - wanted[0])[:2], way * scale, rtol=0.02, atol=0.002)
 
 
 def test_without_the_extra_it_says_what_to_install(client, monkeypatch):

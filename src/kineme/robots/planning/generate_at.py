@@ -44,6 +44,7 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     goal: ArrayLike | None = None,
     duration: float | None = None,
     *,
+    displacement: ArrayLike | None = None,
     scale: float | None = None,
     rate: float = 100.0,
     joints: bool = False,
@@ -59,6 +60,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         goal is then that from the demonstrated start.
     duration : float, optional
         [s]
+    displacement : array_like of shape (n,), optional
+        Goal minus start, in the unit of the recording, instead of a goal.
     scale : float, optional
         Meters (of the joints radians) for one unit of the recording, as 0.001 for millimeters; by default as the heads
         of its columns say, and where they do not, 1.
@@ -86,6 +89,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     units = roles.units if scale is None else np.full(n, scale)
     frame = _Frame(start, units, start * units if begin is None else begin[axes])
     target = None if end is None else _goal_as_recorded(shown[-1], roles, frame.to_recording(end[axes]))
+    if (way := _point(displacement, "displacement", n)) is not None:
+        target = _goal_as_recorded(shown[-1], roles, start + way)
     options = MovementOptions(goal=target, duration=duration, rate=rate, meet_goal=target is not None)
     made = generate(learned, options).columns
     moved = frame.to_robot(made["positions"][:, roles.positions])

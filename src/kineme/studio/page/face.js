@@ -5,6 +5,7 @@ import { createMoving, placed } from "./movements.js";
 import { boxOf, createStage } from "./stage.js";
 
 const ROWS = 5; // bars
+const MANY = 12; // known movements that can be looked through
 const STEP = 0.03; // of the stage, by an arrow key
 const ERROR_RATE = 0.05;
 const DRAWN = "Your drawing";
@@ -63,15 +64,15 @@ function paintMoving(moving) {
   for (const [, x] of moving.via) stage.dot(x, "--predicted", { radius: 6 });
   stage.dot(moving.start, "--ink", { hollow: true });
   stage.dot(moving.goal, "--goal");
-  stage.word("start", moving.start, "--soft");
-  stage.word("goal", moving.goal, "--goal");
+  stage.word("start", moving.start, "--soft", moving.positions);
+  stage.word("goal", moving.goal, "--goal", moving.positions);
   if (state.played !== null) stage.dot(moving.positions[state.played], "--predicted");
 }
 
 /** Words of the answer; a reader of the screen is told once for each verdict. */
 function say(verdict, reason, kind = "") {
   const said = element("verdict");
-  if (said.textContent !== verdict) said.textContent = verdict;
+  if (said.textContent !== verdict) said.textContent = said.title = verdict;
   said.className = kind;
   element("reason").textContent = state.note || reason;
 }
@@ -139,6 +140,8 @@ function choose(name) {
   select(name);
   showAnswer();
   later();
+  // In a narrow window what was chosen is above the list of what can be chosen.
+  document.querySelector(".answer").scrollIntoView({ block: "nearest" });
 }
 
 function finish() {
@@ -262,10 +265,15 @@ function list() {
   runtime.classes.forEach((name, c) => {
     const picture = make("canvas", { className: "picture" });
     picture.setAttribute("aria-hidden", "true");
-    const button = make("button", { type: "button" }, picture, make("span", { textContent: name }));
+    const button = make("button", { type: "button", title: name }, picture, make("span", { textContent: name }));
     button.dataset.index = c;
     button.addEventListener("click", () => choose(name));
     element("symbols").append(make("li", {}, button));
+  });
+  element("find").hidden = runtime.classes.length <= MANY;
+  element("find").addEventListener("input", () => {
+    const words = element("find").value.toLowerCase().split(/\s+/);
+    for (const item of element("symbols").children) item.hidden = !words.every((word) => item.textContent.toLowerCase().includes(word));
   });
 }
 
@@ -276,7 +284,7 @@ function pictures() {
     small.turned(turn, tilt);
     small.cleared();
     small.line(prototypes[c], "--ink", { wide: 2 });
-    small.dot(prototypes[c].at(-1), "--goal", { radius: 3.5 });
+    small.dot(prototypes[c].at(-1), "--goal", { radius: 3.5, edge: 1 });
   });
 }
 

@@ -54,24 +54,28 @@ export function createStage(canvas, view, box) {
     context.setLineDash([]);
   }
 
-  function dot(x, color, { radius = RADIUS, hollow = false } = {}) {
+  function dot(x, color, { radius = RADIUS, hollow = false, edge = 3 } = {}) {
     context.beginPath();
     context.arc(...project(x), radius, 0, 2 * Math.PI);
     context.fillStyle = style.getPropertyValue(hollow ? "--surface" : color);
     context.fill();
-    context.lineWidth = 3;
+    context.lineWidth = edge;
     context.strokeStyle = style.getPropertyValue(hollow ? color : "--surface");
     context.stroke();
   }
 
-  function word(text, x, color) {
+  /** A word beside a place: on the side where a path does not go on. */
+  function word(text, x, color, path = []) {
     const [px, py] = project(x);
+    const near = path.map(project).filter(([u, v]) => Math.abs(v - py) < 14 && Math.abs(u - px) < 60);
+    const right = near.filter(([u]) => u > px).length;
+    const left = px > width - 80 || (px > 80 && right > near.length - right);
     context.font = `600 ${style.fontSize} ${style.fontFamily}`;
-    context.textAlign = px > width - 80 ? "right" : "left";
+    context.textAlign = left ? "right" : "left";
     context.lineWidth = 4;
     context.strokeStyle = style.getPropertyValue("--surface");
     context.fillStyle = style.getPropertyValue(color);
-    const at = [px + (px > width - 80 ? -1 : 1) * (RADIUS + 7), py + 5];
+    const at = [px + (left ? -1 : 1) * (RADIUS + 7), py + 5];
     context.strokeText(text, ...at);
     context.fillText(text, ...at);
   }

@@ -19,11 +19,15 @@ class ArmsOut(BaseModel):
 
 
 class ArmWanted(Operated):
-    """A movement for an arm; `size` is its largest extent there [m], `at` and `goal` are in the frame of the robot."""
+    """A movement for an arm; `size` is its largest extent there [m], `at` and `goal` are in the frame of the robot.
+
+    Instead of a goal, `displacement` is the way from start to goal in the unit of the library.
+    """
 
     robot: str
     at: Point | None = None
     goal: Point | None = None
+    displacement: Point | None = None
     duration: Number | None = Field(None, gt=0)
     size: Number | None = Field(None, gt=0)
     plane: Literal["xy", "xz", "yz"] = "xy"

@@ -51,6 +51,7 @@ def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
         asked.at,
         asked.goal,
         asked.duration,
+        displacement=None if asked.goal is not None else asked.displacement,
         scale=None if asked.size is None or space == "joints" else asked.size / _extent(learned),
         joints=space == "joints",
         plane=asked.plane,

@@ -2,6 +2,7 @@
 import { startDraw } from "./draw/view.js";
 import { startLibrary } from "./library/view.js";
 import { startMove } from "./move/view.js";
+import { get } from "./parts/api.js";
 import { byId, counted, fill, make } from "./parts/elements.js";
 import { library, onLibrary, refresh } from "./parts/library_state.js";
 import { Live } from "./parts/live.js";
@@ -10,6 +11,9 @@ import { say, tried } from "./parts/toasts.js";
 import { startViews } from "./parts/views.js";
 import { startRecordings } from "./recordings/view.js";
 import { startRobot } from "./robot/view.js";
+
+const AWAY = "The server does not answer. What you draw stays here; trying again.";
+const ANEW = "The studio was started anew, with another token. Open the address that it printed; what you drew here stays until then.";
 
 /** The last part of a folder's path. @param {string} folder */
 const lastPart = (folder) => folder.replace(/[/\\]+$/, "").split(/[/\\]/).pop() || folder;
@@ -27,6 +31,7 @@ onLibrary((known) => {
 function connected(here) {
   byId("status").dataset.state = here ? "here" : "away";
   byId("away-note").hidden = here;
+  if (!here) get("/api/library").catch((/** @type {any} */ error) => (byId("away-note").textContent = error.status === 401 ? ANEW : AWAY));
 }
 
 const draw = startDraw((message) => live.send(message));

@@ -6,5 +6,14 @@ let chosen = null;
 /** @param {string|null} id */
 export const chooseToMove = (id) => (chosen = id);
 
+/** @type {{symbol: string, displacement: number[]}|null} The way from start to goal where it is not the recorded one. */
+let dragged = null;
+
+/** @param {string} symbol @param {number[]|null} displacement */
+export const dragGoal = (symbol, displacement) => (dragged = displacement && { symbol, displacement });
+
+/** @param {string} symbol @returns {number[]|null} */
+export const draggedGoal = (symbol) => (dragged?.symbol === symbol ? dragged.displacement : null);
+
 /** @param {any[]} symbols @returns {string|null} The chosen one, or the first where it is gone. */
 export const toMove = (symbols) => (symbols.some((one) => one.id === chosen) ? chosen : (symbols.find((one) => one.path)?.id ?? null));

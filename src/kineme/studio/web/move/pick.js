@@ -14,5 +14,6 @@ export function showPick(chosen, choose) {
   const symbols = found(byId("find-pick"), library().symbols.filter((/** @type {any} */ one) => one.path));
   keepingFocus(() => fill(byId("move-pick"), ...symbols.map(option)));
   const at = byId("move-pick").querySelector(":checked")?.closest("label");
-  if (at) byId("move-pick").scrollLeft = at.offsetLeft - byId("move-pick").clientWidth / 2;
+  const row = byId("move-pick");
+  if (at) row.scrollLeft = at.offsetLeft - row.offsetLeft - row.clientWidth / 2;
 }

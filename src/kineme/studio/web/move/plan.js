@@ -1,15 +1,25 @@
 // What the movement shall do: where from, where to, past what, how fast.
 
 /**
- * @typedef {{symbol: string, start: number[], goal: number[], path: number[][], usual: number, share: number,
+ * @typedef {{symbol: string, start: number[], goal: number[], path: number[][], reach: number[], usual: number, share: number,
  *   style: number[]|null, via: {at: number, point: number[]}[], obstacles: {center: number[], radius: number}[]}} Plan
- *   `usual` is the demonstrated duration [s]; `share` stretches it.
+ *   `reach` is the demonstrated way from start to goal; `usual` is the demonstrated duration [s]; `share` stretches it.
  */
+
+/** From start to goal. @param {{start: number[], goal: number[]}} plan */
+const way = ({ start, goal }) => goal.map((value, k) => value - start[k]);
+
+/** The way from start to goal where it was dragged to another one, else null. @param {Plan} plan */
+export function draggedWay(plan) {
+  const to = way(plan);
+  const least = 1e-6 * extent(plan.path);
+  return to.some((value, k) => Math.abs(value - plan.reach[k]) > least) ? to : null;
+}
 
 /** The movement as it was shown. @param {any} symbol @param {any} rollout @returns {Plan} */
 export function asShown(symbol, rollout) {
   const usual = rollout.times[rollout.times.length - 1] - rollout.times[0];
-  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: symbol.path ?? rollout.positions, usual, share: 1, style: null, via: [], obstacles: [] };
+  return { symbol: symbol.id, start: [...rollout.start], goal: [...rollout.goal], path: symbol.path ?? rollout.positions, reach: way(rollout), usual, share: 1, style: null, via: [], obstacles: [] };
 }
 
 /** The size of the movement, for distances that fit it. @param {number[][]} path */
@@ -28,6 +38,3 @@ export function question(plan, formulation) {
   if (plan.obstacles.length) body.obstacles = plan.obstacles;
   return body;
 }
-
-/** Whether a matrix in the page gives the path: no via points and obstacles. @param {Plan} plan */
-export const isPlain = (plan) => !plan.via.length && !plan.obstacles.length;

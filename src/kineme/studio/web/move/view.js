@@ -5,26 +5,30 @@ import { byId, fill, make } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
 import { lengths, Plot } from "../parts/plots.js";
+import { isUndo } from "../parts/shortcuts.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, toMove } from "./chosen.js";
+import { chooseToMove, dragGoal, toMove } from "./chosen.js";
 import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";
 import { MovePicture } from "./picture.js";
-import { asShown, extent, question } from "./plan.js";
+import { asShown, draggedWay, extent, question } from "./plan.js";
 import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
+import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
 
 const FORMATS = ["csv", "json", "npz", "parquet"];
 
 class Move {
   constructor() {
+    this.steps = new Steps();
     this.camera = new Camera();
     this.plan = null;
     this.version = -1;
     this.dragging = false;
+    this.named = null;
     this.on = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map((one) => [one.name, new Rollouts(one.name, () => this.redraw())]));
     this.handles = new Handles(this.camera, { moving: (on) => this.moving(on) });
@@ -46,6 +50,7 @@ class Move {
     });
     const pick = () => showPick(this.plan?.symbol ?? null, (chosen) => this.choose(chosen));
     startFinding(byId("find-pick"), pick, () => byId("move-pick").querySelector("input"));
+    document.addEventListener("keydown", (event) => isUndo(event) && currentView() === "move" && this.back());
     onShow("move", () => this.shown());
     onLibrary(() => this.shown());
   }
@@ -72,13 +77,14 @@ class Move {
     chooseToMove(symbol.id);
     this.version = library().version;
     this.plan = null;
+    this.steps = new Steps();
     this.handles.set([]);
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
-    for (const one of this.rollouts.values()) Object.assign(one, { path: null, operators: null, problem: "" });
+    for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
     byId("duration").value = "0";
     this.picture.paths = [];
     this.picture.fit();
@@ -92,10 +98,10 @@ class Move {
     await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
-  /** Another style moves; its operators are asked for once the slider rests. @param {number[]|null} values */
+  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values */
   style(values) {
     this.plan.style = values;
-    for (const one of this.rollouts.values()) one.operators = null;
+    for (const one of this.rollouts.values()) one.primitive = null;
     this.changed();
     clearTimeout(this.resting);
     this.resting = setTimeout(() => this.prepare(), 400);
@@ -128,10 +134,12 @@ class Move {
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
     for (const name of this.on) this.rollouts.get(name).follow(this.plan);
     this.picture.board.draw();
+    dragGoal(this.plan.symbol, draggedWay(this.plan));
     if (!this.dragging) this.numbers();
   }
 
   numbers() {
+    this.steps.keep(this.plan);
     showPoints(this.plan, () => this.changed(), () => this.structure());
   }
 
@@ -160,10 +168,18 @@ class Move {
     this.picture.board.draw();
     this.speed.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.velocities), look })));
     this.acceleration.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })));
-    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
+    this.legend(shown);
     const said = [...this.on].flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
     const text = [...new Set(said)].join(" ");
     if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
+  }
+
+  /** Not while a path follows the hand: it stays the same then. @param {any[]} shown */
+  legend(shown) {
+    const names = shown.map((one) => one.name).join();
+    if (this.named === names) return;
+    this.named = names;
+    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
   }
 
   /** @param {string} name @param {boolean} on */
@@ -181,6 +197,13 @@ class Move {
     if (!this.plan) return;
     this.plan.share = 4 ** (Number(byId("duration").value) / 100);
     this.changed();
+  }
+
+  /** Before the last change of a point or the duration. */
+  back() {
+    if (!this.plan || !this.steps.back(this.plan)) return say("Nothing is changed here. The arrow in the bar takes back changes of the library.");
+    byId("duration").value = String(Math.round((100 * Math.log(this.plan.share)) / Math.log(4)));
+    this.structure();
   }
 
   addVia() {

@@ -1,12 +1,12 @@
 // Keys that work everywhere, and the list of all keys under "?".
 import { undo } from "./changes.js";
 import { byId, fill, make } from "./elements.js";
-import { show, VIEWS } from "./views.js";
+import { currentView, show, VIEWS } from "./views.js";
 
 const KEYS = [
   ["1 … 5", "Draw, Library, Move, Recordings, Robot"],
   ["← →", "from view to view, where a view's name has the focus"],
-  ["Ctrl Z", "undo the last change of the library"],
+  ["Ctrl Z", "undo the last change of the library; in Move, the last change of a point or the duration"],
   ["Esc", "clear the drawing"],
   ["Enter", "learn the drawing under the name in the field"],
   ["Space", "in the drawing area: pen down, pen up; in Move: play; in Robot: play and pause"],
@@ -24,12 +24,16 @@ function list() {
   byId("keys").showModal();
 }
 
+/** Whether a key takes back, other than in a field in which one writes. @param {KeyboardEvent} event */
+export const isUndo = (event) =>
+  (event.ctrlKey || event.metaKey) && !event.shiftKey && event.key.toLowerCase() === "z" && !writes(event.target) && !document.querySelector("dialog[open]");
+
 /** @param {KeyboardEvent} event */
 function pressed(event) {
   if (writes(event.target) || document.querySelector("dialog[open]")) return;
-  if ((event.ctrlKey || event.metaKey) && !event.shiftKey && event.key.toLowerCase() === "z") {
+  if (isUndo(event)) {
     event.preventDefault();
-    undo();
+    if (currentView() !== "move") undo();
   }
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") list();

@@ -4,7 +4,7 @@ import { byId, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, toMove } from "../move/chosen.js";
+import { chooseToMove, draggedGoal, toMove } from "../move/chosen.js";
 
 /** @type {any} What the server answered about arms. */
 let arms = null;
@@ -50,7 +50,7 @@ async function move(event) {
   byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
-  const body = { what: { symbol }, robot: byId("robot-arm").value, size: byId("robot-size").valueAsNumber || 0.3, slow_down: byId("robot-slow").checked };
+  const body = { what: { symbol }, robot: byId("robot-arm").value, size: byId("robot-size").valueAsNumber || 0.3, slow_down: byId("robot-slow").checked, displacement: byId("robot-dragged").checked ? draggedGoal(symbol) : null };
   const answer = await tried(() => post("/api/robots/move", body));
   byId("robot-go").disabled = false;
   if (!answer) byId("robot-verdict").textContent = "";
@@ -58,6 +58,9 @@ async function move(event) {
   showPreflight(answer);
   if (answer.scene) showArm(answer.scene, answer.joints);
 }
+
+/** Whether a goal was dragged in Move is offered where it was. */
+const offer = () => (byId("robot-dragged").parentElement.hidden = draggedGoal(byId("robot-what").value) === null);
 
 /** A server without the routes of arms says so in words. @param {any} error */
 function without(error) {
@@ -71,6 +74,7 @@ async function shown() {
   const id = toMove(symbols);
   const movable = symbols.filter((/** @type {any} */ one) => one.path);
   fill(byId("robot-what"), ...movable.map((/** @type {any} */ one) => make("option", { value: one.id, selected: one.id === id }, one.name)));
+  offer();
   arms ??= await tried(() => get("/api/robots").catch(without));
   if (!arms) return;
   const ready = arms.available && movable.length > 0;
@@ -84,6 +88,7 @@ async function shown() {
 
 export function startRobot() {
   byId("robot-form").addEventListener("submit", move);
+  byId("robot-what").addEventListener("change", offer);
   onShow("robot", shown);
   onLibrary(shown);
 }

@@ -1,0 +1,28 @@
+// What was changed in Move, to go back step by step: points, obstacles and the duration.
+
+const KEPT = 200;
+
+/** @param {import("./plan.js").Plan} plan */
+const shape = ({ start, goal, via, obstacles, share }) => JSON.stringify({ start, goal, via, obstacles, share });
+
+export class Steps {
+  constructor() {
+    /** @type {string[]} The plan after each change, the first one as it was shown. */
+    this.kept = [];
+  }
+
+  /** @param {import("./plan.js").Plan} plan As it is now. */
+  keep(plan) {
+    const now = shape(plan);
+    if (now !== this.kept[this.kept.length - 1]) this.kept.push(now);
+    if (this.kept.length > KEPT) this.kept.shift();
+  }
+
+  /** Make a plan what it was before the last change. @param {import("./plan.js").Plan} plan @returns {boolean} Whether there was one. */
+  back(plan) {
+    if (this.kept.length < 2) return false;
+    this.kept.pop();
+    Object.assign(plan, JSON.parse(this.kept[this.kept.length - 1]));
+    return true;
+  }
+}
