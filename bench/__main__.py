@@ -34,6 +34,7 @@ SUBJECTS = (
     "anchoring",
     "annotate",
     "page",
+    "migrating",
     "studio",
     "studio_in_browser",
     "by_person",

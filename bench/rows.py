@@ -14,7 +14,7 @@ from typing import Any
 import kineme
 
 RESULTS = Path(__file__).parent / "results"
-_PACKAGES = ("numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance")
+_PACKAGES = ("numpy", "scipy", "scikit-learn", "numba", "movement-primitives", "pydmps", "dtaidistance", "dollarpy")
 
 
 @dataclass(frozen=True)

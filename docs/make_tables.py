@@ -194,3 +194,6 @@ if __name__ == "__main__":
     path = DOCS / "guide" / "recognition.md"
     path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
     print(path)
+    from beside_tables import fill_pages
+
+    fill_pages()

@@ -92,5 +92,5 @@ def _part_rotation(R: Array, s: Array) -> Array:
     if d == 3:
         from scipy.spatial.transform import Rotation
 
-        return np.asarray(Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(R).as_rotvec()).as_matrix())
+        return np.asarray(Rotation.from_rotvec(s[:, None] * Rotation.from_matrix(np.array(R)).as_rotvec()).as_matrix())
     return np.broadcast_to(np.eye(d), (len(s), d, d)).copy()

@@ -25,4 +25,4 @@ def matrices_of(q: ArrayLike) -> Array:
 
 def quaternion_of(R: Array) -> Array:
     """The unit quaternion (4,) of a rotation matrix (3, 3)."""
-    return np.asarray(Rotation.from_matrix(R).as_quat(scalar_first=True))
+    return np.asarray(Rotation.from_matrix(np.array(R)).as_quat(scalar_first=True))  # SciPy 1.14: none read-only

@@ -26,7 +26,8 @@ class TaskPath(NamedTuple):
 
     def at(self, times: Array) -> TaskPath:
         """The poses at other times: cubic between positions, along the shortest turn between orientations."""
-        turns = Slerp(self.times, Rotation.from_matrix(self.rotations))
+        rotations = Rotation.from_matrix(np.array(self.rotations))  # SciPy 1.14 takes no read-only array
+        turns = Slerp(self.times, rotations)
         return TaskPath(times, CubicSpline(self.times, self.positions)(times), turns(times).as_matrix())
 
 

@@ -1,4 +1,4 @@
-"""README's table, and what README reads in it, are what ``kineme reproduce`` computes and says."""
+"""The table of docs/guide/the-paper.md, and what it reads in it, are what ``kineme reproduce`` computes and says."""
 
 import copy
 import re
@@ -13,7 +13,7 @@ from kineme.experiments.reproduction.representations import READINGS, REPRESENTA
 from kineme.experiments.reproduction.tables import make_tables
 from kineme.output.table import mean_and_range
 
-README = " ".join((Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8").split())
+PAGE = " ".join((Path(__file__).parents[3] / "docs" / "guide" / "the-paper.md").read_text(encoding="utf-8").split())
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def values(draws, kind, key):
     return [one[kind][key] for one in draws]
 
 
-def test_the_table_of_readme_is_table_2(tables):
+def test_the_table_of_the_page_is_table_2(tables):
     table = next(one for one in tables if one.title.startswith("Table 2. "))
     names = {
         "closest in distances": "conventions closest to the paper in distances",
@@ -38,64 +38,64 @@ def test_the_table_of_readme_is_table_2(tables):
         "correlation of w (Ijspeert 2003)": "correlation of weights (Ijspeert et al. 2003)",
     }
     for name, *cells in table.rows:
-        assert f"| {' | '.join([names.get(name, name), *cells])} |" in README
-    assert f"| {' | '.join(table.columns[1:])} |" in README
+        assert f"| {' | '.join([names.get(name, name), *cells])} |" in PAGE
+    assert f"| {' | '.join(table.columns[1:])} |" in PAGE
 
 
-def test_readme_says_how_often_the_shape_attractor_is_ahead(tables):
+def test_the_page_says_how_often_the_shape_attractor_is_ahead(tables):
     said = re.search(r"Kineme's default, original: (f\(t\) is ahead .*?\))\.", reading(tables, "Table 2. "))[1]
-    assert f"{said[:4]}, taken as the shape-attractor,{said[4:]}." in README
+    assert f"{said[:4]}, taken as the shape-attractor,{said[4:]}." in PAGE
 
 
-def test_readme_says_what_the_division_costs(default_draws):
+def test_the_page_says_what_the_division_costs(default_draws):
     draws = default_draws["paper"]
     divided, whole = (values(draws, "nearest", key) for key in ("bio-w-over-s", "bio-w"))
-    assert f"1-NN falls to {fmean(divided):.3f}; do not, and weights recognize every letter of every draw" in README
+    assert f"1-NN falls to {fmean(divided):.3f}; do not, and weights recognize every letter of every draw" in PAGE
     assert min(whole) == 1.0
 
 
-def test_readme_says_what_is_reached_on_all_shapes(default_draws):
+def test_the_page_says_what_is_reached_on_all_shapes(default_draws):
     draws = default_draws["lasa-26"]
     about, weights = re.search(
         r"about ([\d.]+) for the shape-attractor in both formulations and for bio-inspired weights, "
-        r"([\d.]+) for original weights", README
+        r"([\d.]+) for original weights", PAGE
     ).groups()  # fmt: skip
     means = {
         key: f"{fmean(values(draws, 'nearest', key)):.2f}" for key in ("original-w", "bio-w", "original-sa", "bio-sa")
     }
     assert [about, about, about, weights] == [means[key] for key in ("original-sa", "bio-sa", "bio-w", "original-w")]
-    assert "no feature is perfect" in README
+    assert "no feature is perfect" in PAGE
     assert all(min(values(draws, "nearest", key)) < 1 for key in REPRESENTATIONS)
 
 
-def test_readme_says_what_the_truncated_kernel_reaches(default_draws):
+def test_the_page_says_what_the_truncated_kernel_reaches(default_draws):
     draws = default_draws["paper"]
     closest = READINGS["closest in distances"]
     tre, rbf = ([fmean(values(draws, "svm", f"{key}/{name}/paper")) for key in closest] for name in ("tre", "rbf"))
     assert sorted(np.sign(np.round(tre, 3) - np.round(rbf, 3))) == [0, 1, 1, 1]
-    assert "ahead of RBF in three columns of four, and equal in the fourth" in README
+    assert "ahead of RBF in three columns of four, and equal in the fourth" in PAGE
     reached = values(draws, "svm", "bio-sa/tre/paper")
     printed = paper.SVM_TRE["bio-inspired", "f(t)"]
     assert min(reached) <= printed <= max(reached)
-    assert f"Its {printed} on bio-inspired f(t) lies within the draws of one reading" in README
-    assert f"f(t) as the whole shape-attractor term of Eq. (4): {mean_and_range(reached)}" in README
+    assert f"Its {printed} on bio-inspired f(t) lies within the draws of one reading" in PAGE
+    assert f"f(t) as the whole shape-attractor term of Eq. (4): {mean_and_range(reached)}" in PAGE
 
 
-def test_readme_says_how_low_the_truncated_kernel_comes_on_weights(default_draws):
+def test_the_page_says_how_low_the_truncated_kernel_comes_on_weights(default_draws):
     draws = default_draws["paper"]
     means = [
         fmean(values(draws, "svm", key)) for key in draws[0]["svm"]
         if "/tre/" in key and REPRESENTATIONS[key.split("/")[0]].quantity == "weights"
     ]  # fmt: skip
-    assert f"Its 1/9 on weights we could not reproduce: our lowest mean is {min(means):.3f}." in README
+    assert f"Its 1/9 on weights we could not reproduce: our lowest mean is {min(means):.3f}." in PAGE
     assert min(means) > 1 / 9
 
 
-def test_readme_says_what_the_penalty_costs(default_draws):
+def test_the_page_says_what_the_penalty_costs(default_draws):
     draws = default_draws["paper"]
     low, high = (fmean(values(draws, "penalty", f"original-sa/rbf/{C}")) for C in (1, 10))
-    assert f"C = 1 and an RBF kernel falls to {low:.2f} on three movements per class" in README
-    assert f"with C = 10 it is {high:.3f}." in README
+    assert f"C = 1 and an RBF kernel falls to {low:.2f} on three movements per class" in PAGE
+    assert f"with C = 10 it is {high:.3f}." in PAGE
 
 
 def test_table_4_under_each_convention_finds_the_one_that_explains_tre(tables):

@@ -1,0 +1,66 @@
+"""What docs/beside-others.md and docs/migrating say of others is what was measured."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
+import beside_tables  # noqa: E402
+from walk_through import walk  # noqa: E402
+
+MIGRATED = json.loads((ROOT / "bench" / "results" / "migrating.json").read_text(encoding="utf-8"))["rows"]
+
+
+@pytest.mark.parametrize("page", beside_tables.tables())
+def test_the_pages_show_what_was_measured(page):
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    assert text == beside_tables.filled(text, beside_tables.tables()[page]), "run make tables"
+
+
+def _protocol(**means):
+    return {"one": {name: {"as recorded": {"accuracy": {"mean": mean}}} for name, mean in means.items()}}
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "said"),
+    [
+        (0.91, 0.9, "ahead of all others in all 1 rows."),
+        (0.9004, 0.9, "ahead of all others in 0 of these 1 rows and level with the best in 1."),
+        (0.89, 0.9, "in 0 of these 1 rows. Ahead of it: DTW 1-NN in *row* (0.900 against 0.890)."),
+    ],
+)
+def test_it_is_said_who_is_ahead(ours, theirs, said):
+    protocols = _protocol(kineme=ours, dtw=theirs, euclidean=0.5)
+    assert beside_tables.who_leads(protocols, [("row", "one", "as recorded", "accuracy")]).endswith(said)
+
+
+@pytest.mark.parametrize("row", MIGRATED, ids=lambda row: row["details"]["page"])
+def test_ours_gives_the_result_that_the_peer_gave(row, tmp_path):
+    """The peer's code on the page was run where it is installed: ``python -m bench --only migrating``."""
+    page = row["details"]["page"]
+    names = {}
+    list(walk(ROOT / "docs" / "migrating" / f"{page}.md", tmp_path, names))
+    theirs = row["details"]["theirs"]
+    if page == "dollar":
+        assert list(map(str, names["ours"])) == theirs
+        return
+    at, positions = np.array(theirs)[:, 0].astype(int), np.array(theirs)[:, 1:]
+    apart = np.linalg.norm(names["ours"][at] - positions, axis=1).max()
+    assert 100 * apart / np.ptp(names["ours"], axis=0).max() <= row["ours"] + 0.01
+
+
+@pytest.mark.parametrize("row", MIGRATED, ids=lambda row: row["details"]["page"])
+def test_the_peer_measured_again(row):
+    sys.path.insert(0, str(ROOT))
+    try:
+        from bench.migrating import COMPARED, executed
+    finally:
+        sys.path.remove(str(ROOT))
+    page = row["details"]["page"]
+    module, compare, *_ = COMPARED[page]
+    pytest.importorskip(module, reason=f"{module} is not installed; make bench installs and compares it")
+    assert compare(executed(page))[0] == pytest.approx(row["ours"], abs=0.01)
