@@ -36,6 +36,7 @@ SUBJECTS = (
     "page",
     "migrating",
     "studio",
+    "studio_in_browser",
     "by_person",
     "nested",
 )

@@ -19,10 +19,11 @@ REASON = "node is not installed"
 
 
 def ask(snapshot, questions, runtime=RUNTIME):
-    """What the runtime answers to each question; an error is raised."""
+    """What the runtime answers to each question; an error is raised. Without a snapshot questions bring their own."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "questions.json"
-        path.write_text(json.dumps({"snapshot": json.loads(snapshot.to_json()), "questions": questions}))
+        held = None if snapshot is None else json.loads(snapshot.to_json())
+        path.write_text(json.dumps({"snapshot": held, "questions": questions}))
         done = subprocess.run([NODE, DRIVER, runtime, path], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     answers = json.loads(done.stdout)

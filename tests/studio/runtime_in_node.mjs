@@ -3,8 +3,9 @@ import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
 const { open } = await import(pathToFileURL(process.argv[2]).href);
+const { openPrimitive } = await import(new URL("primitive.js", pathToFileURL(process.argv[2])).href);
 const { snapshot, questions } = JSON.parse(readFileSync(process.argv[3], "utf8"));
-const runtime = open(snapshot);
+const runtime = snapshot && open(snapshot);
 
 const answers = {
   recognize: ({ times, positions, error_rate }) => runtime.recognize(times, positions, error_rate),
@@ -20,6 +21,10 @@ const answers = {
     const made = runtime.primitive(symbol ?? runtime.encode(times, positions), formulation);
     const moved = runtime.rollout(made, asked);
     return { times: [...moved.times], positions: moved.positions };
+  },
+  primitive: ({ document, asked }) => {
+    const moved = openPrimitive(document).rollout(asked);
+    return { ...moved, times: [...moved.times] };
   },
 };
 

@@ -125,7 +125,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
 def test_the_path_follows_the_goal_without_asking_the_server(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
-    page.wait_for_timeout(1500)  # operators are asked for once
+    page.wait_for_timeout(1500)  # the primitive is asked for once
     page.route("**/api/rollout", lambda route: None)  # from now on it never answers
     x, y = center(page, ".handle.goal")
     page.mouse.move(x, y)
@@ -135,6 +135,15 @@ def test_the_path_follows_the_goal_without_asking_the_server(opened, served_lett
     assert page.evaluate(INKED, [x + 70, y - 90, 30]) > 20
     page.mouse.up()
     assert center(page, ".handle.goal") != (x, y)
+    page.click("#add-via")
+    for _ in range(4):
+        page.keyboard.press("Shift+ArrowUp")
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.evaluate(INKED, [*center(page, ".handle.via"), 30]) > 20
+    loaded = (
+        "performance.getEntriesByName(location.origin + '/api/library').filter((one) => one.responseStatus === 200)"
+    )
+    assert page.evaluate(f"{loaded}.map((one) => one.initiatorType)") == ["link"]  # once, beside the modules
 
 
 def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):

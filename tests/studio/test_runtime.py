@@ -339,6 +339,7 @@ def test_a_movement_that_cannot_be_used_is_refused_in_words():
     asked["times"], asked["positions"] = asked["times"][:3], asked["positions"][:3]
     with pytest.raises(AssertionError, match="at least 4 samples"):
         ask(snapshot, [asked])
-    asked = question("recognize", replace(movement, positions=movement.positions / np.ptp(movement.positions) * 1e101))
+    asked = question("recognize", movement)
+    asked["positions"] = (movement.positions / np.ptp(movement.positions) * 1e102).tolist()
     with pytest.raises(AssertionError, match="up to 1e100"):
         ask(snapshot, [asked])

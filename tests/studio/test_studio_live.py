@@ -14,9 +14,11 @@ from studio_samples import LIVE, asked, samples
 
 from kineme import ActionLibrary
 from kineme.errors import DataError, TrajectoryError
+from kineme.studio.page.write_page import library_page
 from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import parsed_samples
 from kineme.studio.server.live_socket import _Client
+from kineme.studio.snapshot.early import DRAWN
 
 
 def _said(socket, kind):
@@ -51,10 +53,14 @@ def test_a_drawing_is_named_while_it_is_drawn_and_at_its_end(client, folder):
         assert _draw(socket, 3)["decided"] == "kind 3"
 
 
-def test_states_are_those_of_a_stream_of_the_library(client, folder):
-    rows = np.array(samples(1))
+def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(client, folder):
+    rows = np.array(samples(1)) * [0.4, 1, 1]
     with ActionLibrary(folder, read_only=True) as library:
-        ours = library.stream().update(rows[:30, 0], rows[:30, 1:])
+        ours = library.stream(early=DRAWN).update(rows[:30, 0], rows[:30, 1:])
+        strict = library.stream().update(rows[:30, 0], rows[:30, 1:])
+        page = library_page(library, "the same")[1]
+    assert abs(ours.ranked[0].confidence - strict.ranked[0].confidence) > 0.05
+    assert page.header["early"]["duration_spread"] == DRAWN.duration_spread
     with client.websocket_connect(LIVE) as socket:
         socket.send_json({"samples": rows[:30].tolist()})
         state = _said(socket, "state")
@@ -150,7 +156,7 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
 
 
 def test_a_disk_that_cannot_be_read_is_said_and_read_again(client, monkeypatch):
-    def fail(library):
+    def fail(library, **_):
         raise DataError("expected a disk")
 
     with client.websocket_connect(LIVE) as socket:

@@ -7,9 +7,12 @@ import json
 
 import numpy as np
 import pytest
+from node_runtime import NODE, REASON, ask
 from studio_samples import drawing, make_library
 
-from kineme import ActionLibrary, Trajectory
+from kineme import ActionLibrary, Demonstrations, Trajectory
+from kineme.movements.channels.channel import Channel
+from kineme.movements.trajectories.channels import of_channels
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.styles.learn import learn_styles
 
@@ -58,20 +61,40 @@ def test_it_goes_around_balls_or_says_that_it_does_not(client, symbol):
     assert "whose radius is" in _rollout(client, {"symbol": symbol}, obstacles=[around_start])["warnings"][0]
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-def test_operators_give_what_a_rollout_gives_or_there_are_none(client, symbol, formulation):
-    asked = {"what": {"symbol": symbol}, "formulation": formulation}
-    found = client.post("/api/rollout/operators", json=asked).json()
-    assert (found is None) == (formulation in {"original", "amplitude-scaled"})
-    if found is None:
-        return
-    start, goal = [1.0, 2.0], [3.0, -1.0]
-    made = client.post("/api/rollout", json={**asked, "start": start, "goal": goal}).json()
-    a, b, c = (np.array(found[name]) for name in ("of_start", "of_goal", "constant"))
-    path = a[:, None] * start + b[:, None] * goal + c
-    exact = np.array(made["positions"])
-    ours = np.stack([np.interp(found["times"], made["times"], exact[:, k]) for k in range(2)], axis=1)
-    assert np.abs(path - ours).max() < 1e-3 * np.ptp(exact)
+@pytest.mark.skipif(NODE is None, reason=REASON)
+def test_the_page_lets_it_move_as_the_server_does(client, folder, symbol):
+    """In every formulation: elsewhere, through via points, slower; and so does a style."""
+    values = [0.5 * one for one in client.get(f"/api/library/symbols/{symbol}/styles").json()["highest"]]
+    whats = [({"symbol": symbol}, one) for one in FORMULATIONS]
+    whats += [({"movement": 5}, None), ({"style": {"symbol": symbol, "values": values}}, None)]
+    via = [[0.3, [0.5, 0.5]], [0.71, [0.6, 0.9]]]
+    elsewhere = {"start": [0.3, 0.1], "goal": [1.5, -1.0]}
+    wanted = [{}, elsewhere, {**elsewhere, "duration": 4.0}, {**elsewhere, "via": via}]
+    questions, answers = [], []
+    for what, formulation in whats:
+        asked = {"what": what, "formulation": formulation}
+        document = client.post("/api/primitive", json=asked).json()
+        for one in wanted:
+            questions.append({"ask": "primitive", "document": document, "asked": {**one, "samples": 201}})
+            answers.append(_rollout(client, **asked, **one))
+    for got, said in zip(ask(None, questions), answers, strict=True):
+        for name in ("times", "positions", "velocities", "accelerations"):
+            exact = np.array(said[name])
+            np.testing.assert_allclose(got[name], exact, atol=2e-6 * np.abs(exact).max(), rtol=0, err_msg=name)
+        assert got["positions"][-1] == pytest.approx(said["goal"], abs=1e-9)
+
+
+def test_what_only_the_server_lets_move_is_not_sent(client, tmp_path, open_studio):
+    times, positions = drawing(1)
+    table = np.column_stack((positions, times > 0.7))
+    channels = (*(Channel(one, "position", (one,)) for one in "xy"), Channel("grip", "discrete", ("grip",)))
+    plain = Demonstrations.from_arrays([table, 1.1 * positions @ np.eye(2, 3) + [0, 0, 1] * table], None, [times] * 2)
+    with ActionLibrary(tmp_path / "channels", create=True) as library:
+        library.learn(Demonstrations.of_movements(of_channels(plain.movements, channels)), ["grasp"] * 2)
+    other = open_studio(tmp_path / "channels")
+    assert other.post("/api/primitive", json={"what": {"movement": 1}}).json() is None
+    assert other.post("/api/rollout", json={"what": {"movement": 1}}).status_code == 200
+    assert client.post("/api/primitive", json={"what": {"movement": 99}}).status_code == 404
 
 
 def test_formulations_differ(client, symbol):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 WEB = Path(__file__).parents[2] / "src" / "kineme" / "studio" / "web"
+RUNTIME = WEB.parent / "javascript"
 SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
@@ -19,7 +20,14 @@ NODE = shutil.which("node")
 
 
 def _name(path):
-    return str(path.relative_to(WEB))
+    """Its path on the server."""
+    return str(path.relative_to(WEB)) if path.is_relative_to(WEB) else f"runtime/{path.name}"
+
+
+def _imported(path, source):
+    """The file that a module names: the server shows the runtime as a folder of the page."""
+    there = (path.parent / source).resolve()
+    return RUNTIME / there.name if there.parent == WEB / "runtime" else there
 
 
 def test_there_is_a_page_its_tokens_and_its_modules():
@@ -74,7 +82,7 @@ def test_what_a_module_imports_is_there(path):
     text = path.read_text()
     for names, source in re.findall(r"^import \{?\s*([\w,\s*{}]+?)\s*\}? from \"([^\"]+)\";", text, re.MULTILINE):
         assert source.startswith("."), source
-        there = (path.parent / source).resolve()
+        there = _imported(path, source)
         assert there.is_file(), source
         for name in (one.strip() for one in names.split(",")):
             if name.startswith("* as "):
@@ -89,7 +97,7 @@ def test_what_a_module_imports_is_there(path):
 def _reached(path, known):
     """All modules that one imports, and those that they import."""
     for source in re.findall(r' from "([^"]+)";', path.read_text()):
-        there = (path.parent / source).resolve()
+        there = _imported(path, source)
         if there not in known:
             known.add(there)
             _reached(there, known)

@@ -101,12 +101,21 @@ function step(how, formulation, state, u, h) {
   return next;
 }
 
+/** A state with a third row: x'' = K (g - x) - D x' + f + coupling (g - x0), with the values of `forcing` at its time. */
+function withAcceleration({ n_basis: N, K, D }, state, values) {
+  const M = N + 2;
+  const whole = new Float64Array(3 * M);
+  whole.set(state);
+  for (let i = 0; i < M; i++) whole[2 * M + i] = (i <= N ? values[i] : 0) - K * state[i] - D * state[M + i];
+  return whole;
+}
+
 /**
  * The decode matrix of a formulation at n even times: x - x0 as a map of (W, g - x0, v0), with v0 = dx/du.
  * @param {Object} how the header's movements
  * @param {string} formulation
  * @param {number} n
- * @returns {Float64Array[]} states at each time, x and x'
+ * @returns {Float64Array[]} states at each time, x, x' and x''
  */
 export function decoder(how, formulation, n) {
   const { n_basis: N } = how;
@@ -119,7 +128,7 @@ export function decoder(how, formulation, n) {
     state = step(how, formulation, state, k * h, h);
     if ((k + 1) % steps === 0) found.push(state);
   }
-  return found;
+  return found.map((one, t) => withAcceleration(how, one, forcing(how, formulation, t / (n - 1))));
 }
 
 const kept = new Map();
@@ -141,7 +150,8 @@ function keptDecoder(how, formulation, n) {
  * @returns {Primitive}
  */
 export function primitiveOf({ header, arrays }, c, formulation) {
-  const { movements: how, comparison: { n_dims: d } } = header;
+  const how = header.movements;
+  const d = how.n_dims;
   const part = (name, size) => arrays[name].subarray(c * size, (c + 1) * size);
   const row = (name) => [...part(`primitive ${name}`, d)];
   const [start, goal, velocity, extents] = ["starts", "goals", "velocities", "extents"].map(row);
@@ -207,13 +217,14 @@ export function encode({ header, arrays }, one) {
  * The movement to a new start and goal; see `kineme.Primitives.rollout`.
  * @param {import("./arrays.js").Snapshot} snapshot
  * @param {Primitive} one
- * @param {{start?: number[], goal?: number[], duration?: number, via?: [number, number[]][], samples?: number}} [asked]
- * @returns {{times: Float64Array, positions: number[][]}}
+ * @param {{start?: number[], goal?: number[], duration?: number, via?: [number, number[]][], endVelocity?: number[],
+ *   samples?: number}} [asked] with an end velocity the goal is met exactly, as with via points
+ * @returns {{times: Float64Array, positions: number[][], velocities: number[][], accelerations: number[][]}}
  */
 export function rollout({ header, arrays }, one, asked = {}) {
   const how = header.movements;
   const N = how.n_basis;
-  const { start = one.start, goal = one.goal, duration = one.duration, via = [], samples = how.n_points } = asked;
+  const { start = one.start, goal = one.goal, duration = one.duration, via = [], endVelocity, samples = how.n_points } = asked;
   const amplitude = goal.map((g, k) => g - start[k]);
   const learned = one.goal.map((g, k) => g - one.start[k]);
   const ratio = FORMULATIONS[one.formulation].ratio(amplitude, learned, one.extents);
@@ -221,13 +232,22 @@ export function rollout({ header, arrays }, one, asked = {}) {
     const own = Array.from({ length: N }, (_, i) => one.weights[k * N + i] * ratio[k]);
     return Float64Array.from([...own, amplitude[k], one.velocity[k] * one.duration]);
   });
-  const map = (state) => numbers.map((own, k) => start[k] + product(own, 0, state, 0, N + 2));
-  if (via.length) passThrough(how, arrays.smooth, one.formulation, via, goal, numbers, map);
-  return { times: linspace(0, duration, samples), positions: keptDecoder(how, one.formulation, samples).map(map) };
+  const row = (state, order) => numbers.map((own) => product(own, 0, state, order * (N + 2), N + 2) / duration ** order);
+  const map = (state) => row(state, 0).map((x, k) => start[k] + x);
+  if (via.length || endVelocity) {
+    const faster = (end) => (endVelocity ? row(end, 1).map((v, k) => (endVelocity[k] - v) * duration) : goal.map(() => 0));
+    passThrough(how, arrays.smooth, one.formulation, via, goal, numbers, map, faster);
+  }
+  const states = keptDecoder(how, one.formulation, samples);
+  const [velocities, accelerations] = [1, 2].map((order) => states.map((state) => row(state, order)));
+  return { times: linspace(0, duration, samples), positions: states.map(map), velocities, accelerations };
 }
 
-/** Change the weights as little as possible so that the movement passes the via points, and ends at its goal. */
-function passThrough(how, smooth, formulation, via, goal, numbers, map) {
+/**
+ * Change the weights as little as possible so that the movement passes the via points, and ends at its goal; by how much
+ * faster it shall be there `faster` says.
+ */
+function passThrough(how, smooth, formulation, via, goal, numbers, map, faster) {
   const grid = keptDecoder(how, formulation, Math.max(how.n_points, 2 * how.n_basis));
   const intervals = grid.length - 1;
   const states = [...via.map(([u]) => u), 1].map((u) => {
@@ -238,7 +258,7 @@ function passThrough(how, smooth, formulation, via, goal, numbers, map) {
   });
   const asked = [...via.map(([, point]) => point), goal];
   const missing = states.map((state, j) => map(state).map((x, k) => asked[j][k] - x));
-  missing.push(goal.map(() => 0)); // the velocity at the goal stays as it is
+  missing.push(faster(states.at(-1)));
   const gain = gains(smooth, [...states, states.at(-1).subarray(how.n_basis + 2)], how.n_basis);
   numbers.forEach((own, k) => gain.forEach((row, j) => row.forEach((value, i) => (own[i] += missing[j][k] * value))));
 }

@@ -14,16 +14,14 @@ from kineme.errors import SpecificationError
 from kineme.library.library import ActionLibrary
 from kineme.output.atomic import whole_file
 from kineme.output.text import counted, in_markup
-from kineme.recognition.early.hypotheses import Early
 from kineme.studio.page.bundle import bundled
+from kineme.studio.snapshot.early import DRAWN
 from kineme.studio.snapshot.make import snapshot_of_library
 from kineme.studio.snapshot.snapshot import Snapshot
 
 _FOLDER = Path(__file__).parent
 _TOKENS = _FOLDER.parent / "web" / "tokens.css"
 _FROM_ABOVE = 0.8  # of the direction of the view: y is up where it is mostly along z
-#: People draw on a screen faster or slower than they showed: a factor of 7 either way is two standard deviations.
-_EARLY = Early(duration_spread=1.0)
 
 
 def library_page(library: ActionLibrary, title: str, most: int | None = None) -> tuple[str, Snapshot]:
@@ -39,7 +37,7 @@ def library_page(library: ActionLibrary, title: str, most: int | None = None) ->
             f"expected a library of movements in the plane or in space, got {library.n_dims} dimensions, which cannot "
             "be drawn; learn two or three columns of the recordings, in the shell with --columns"
         )
-    snapshot = snapshot_of_library(library, most, _EARLY)
+    snapshot = snapshot_of_library(library, most, DRAWN)
     return page_of(snapshot, title), snapshot
 
 

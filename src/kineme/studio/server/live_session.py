@@ -62,7 +62,7 @@ class LiveSession:
         version = self.studio.library.version
         if version != self._version:
             try:
-                self._stream = self.studio.library.stream()
+                self._stream = self.studio.stream()
             except SpecificationError:  # no symbols to recognize, or one movement
                 self._stream = None
             self._version = version

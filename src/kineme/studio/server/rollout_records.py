@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Any, Self
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -38,7 +38,7 @@ class Obstacle(Sent):
 
 
 class Operated(Sent):
-    """A movement as a sum over start and goal."""
+    """A primitive, in the formulation of the library or in another one."""
 
     what: What
     formulation: str | None = None
@@ -74,13 +74,14 @@ class Moved(BaseModel):
     warnings: list[str]
 
 
-class OperatorsOut(BaseModel):
-    """``positions = of_start * start + of_goal * goal + constant``, at shares of the demonstrated duration."""
+class PrimitiveOut(BaseModel):
+    """A primitive as the runtime reads it: its specification, and arrays as one block of bytes in base64."""
 
-    times: list[float]
-    of_start: list[float]
-    of_goal: list[float]
-    constant: Points
+    format: str
+    version: int
+    movements: dict[str, Any]
+    arrays: dict[str, tuple[str, int, int]] = Field(description="Kind, first byte and length of each.")
+    data: str
 
 
 class StylesOut(BaseModel):

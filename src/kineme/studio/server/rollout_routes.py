@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 from fastapi import APIRouter
 from fastapi.responses import Response
 
 from kineme.files.write_movement import encode_movement
 from kineme.studio.server.plain import numbers
-from kineme.studio.server.rollout_records import Exported, Moved, Operated, OperatorsOut, StylesOut, Wanted
-from kineme.studio.server.rollouts import learned_as, make, operators, styles_of
+from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
+from kineme.studio.server.rollouts import make, primitive_document, styles_of
 from kineme.studio.server.studio import Reads
 
 router = APIRouter(prefix="/api", tags=["movement"])
@@ -32,15 +31,12 @@ def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
     }
 
 
-@router.post(
-    "/rollout/operators", response_model=OperatorsOut | None, summary="A movement as a sum over start and goal"
-)
-def rollout_operators(studio: Reads, asked: Operated) -> dict[str, Any] | None:
-    """To follow a hand without a request for each picture; null where the movement is no such sum."""
-    learned = learned_as(studio, asked)
+@router.post("/primitive", response_model=PrimitiveOut | None, summary="A primitive for the runtime of the page")
+def primitive(studio: Reads, asked: Operated) -> Response:
+    """To follow a hand without a request for each picture, by ``/runtime/primitive.js``; null where that cannot be."""
     key = asked.model_dump_json()
-    found = studio.kept_some("operators", key, lambda: operators(learned))
-    return None if found is None else {name: numbers(np.asarray(one)) for name, one in found._asdict().items()}
+    document = studio.kept_some("primitive", key, lambda: primitive_document(studio, asked))
+    return Response(document, media_type="application/json")
 
 
 @router.get(

@@ -19,7 +19,7 @@ from kineme.primitives.styles.learn import learn_styles
 from kineme.primitives.styles.model import StyleModel
 from kineme.studio.server.rollout_records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
-from kineme.validation import Array
+from kineme.studio.snapshot.primitive import snapshot_of_primitive
 
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
@@ -31,15 +31,6 @@ class Made(NamedTuple):
 
     movement: Generated
     warnings: list[str]
-
-
-class Operators(NamedTuple):
-    """``positions = of_start start + of_goal goal + constant``: (T,), (T,) and (T, d), at `times` (T,)."""
-
-    times: Array
-    of_start: Array
-    of_goal: Array
-    constant: Array
 
 
 def learned_as(studio: Studio, asked: Operated) -> Learned:
@@ -83,33 +74,10 @@ def make(studio: Studio, asked: Wanted) -> Made:
     return Made(movement, list(dict.fromkeys([*(str(one.message) for one in caught), *said])))
 
 
-def operators(learned: Learned) -> Operators | None:
-    """The movement as a sum over start and goal; None where it is none, as where it is scaled with their distance."""
-    shown = learned.example
-    start, goal = (np.asarray(shown[k], dtype=np.float64) for k in (0, -1))
-    if len(learned.moving_columns) != shown.shape[1]:
-        return None
-
-    def path(x0: Array, g: Array) -> tuple[Array, Array]:
-        duration = float(learned.primitive.durations[0])
-        made = generate(
-            learned, MovementOptions(start=x0, goal=g, rate=(_SAMPLES // 2) / duration, meet_goal=True)
-        ).columns
-        return made["times"], made["positions"]
-
-    unit = np.full(len(start), float(np.ptp(shown, axis=0).max()) or 1.0)
-    with _WARNINGS, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        times, here = path(start, goal)
-        of_start = (path(start + unit, goal)[1] - here) / unit
-        of_goal = (path(start, goal + unit)[1] - here) / unit
-        a, b = of_start[:, :1], of_goal[:, :1]
-        constant = here - a * start - b * goal
-        turned = unit * np.where(np.arange(len(unit)) % 2, -0.7, 1.3)
-        other = path(start - turned, goal + turned)[1]
-    if not np.allclose(a * (start - turned) + b * (goal + turned) + constant, other, atol=1e-6 * unit.max()):
-        return None
-    return Operators(times, a[:, 0], b[:, 0], constant)
+def primitive_document(studio: Studio, asked: Operated) -> str:
+    """The primitive of what is asked for as JSON, for the runtime; ``null`` where only the server lets it move."""
+    made = snapshot_of_primitive(learned_as(studio, asked).primitive)
+    return "null" if made is None else made.to_json()
 
 
 def _learned(studio: Studio, what: What, formulation: str | None) -> Learned:

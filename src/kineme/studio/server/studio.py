@@ -16,8 +16,10 @@ from fastapi import Depends, Request
 from kineme.errors import KinemeError
 from kineme.library.library import ActionLibrary
 from kineme.library.storage.symbols import Symbol
+from kineme.recognition.early.stream import Live
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.studio.server.uploads import Uploads
+from kineme.studio.snapshot.early import DRAWN
 
 Made = TypeVar("Made")
 
@@ -136,7 +138,11 @@ class Studio:
 
     def _prepare(self) -> None:
         with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
-            self.library.stream()
+            self.stream()
+
+    def stream(self) -> Live:
+        """What recognizes one movement under way, by the library as it is now; see `kineme.ActionLibrary.stream`."""
+        return self.library.stream(early=DRAWN)
 
 
 def studio_of(request: Request) -> Studio:

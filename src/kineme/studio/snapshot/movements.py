@@ -13,8 +13,10 @@ from kineme.primitives.discrete.operators import decoder, smoothness_factor
 from kineme.studio.snapshot.snapshot import Snapshot
 
 
-def movement_parts(primitives: Primitives) -> Snapshot:
+def movement_parts(primitives: Primitives, *, learns: bool = True) -> Snapshot:
     """Header and arrays of C primitives, one of each class, and of their specification.
+
+    `learns` says whether the matrices are among them that fit other movements, and the same ones in other formulations.
 
     Weights are in single precision, as libraries store them; all else is in double. The matrix that fits the path has
     no goal in it, so that the runtime can fit any formulation: ``W = E (y - goal (g - x0))``, of which only `goal`
@@ -23,6 +25,7 @@ def movement_parts(primitives: Primitives) -> Snapshot:
     dmp = primitives.dmp
     header = {
         "formulation": dmp.formulation,
+        "n_dims": primitives.n_dims,
         "n_basis": dmp.n_basis,
         "n_points": dmp.n_points,
         "K": dmp.K,
@@ -30,7 +33,7 @@ def movement_parts(primitives: Primitives) -> Snapshot:
         "alpha": dmp.basis.phase.alpha,
         "overlap": dmp.overlap,
         "gating": dmp.gating,
-        "encodes": dmp.fit == "trajectory" and not dmp.preprocessing,
+        "encodes": learns and dmp.fit == "trajectory" and not dmp.preprocessing,
     }
     arrays: dict[str, NDArray[Any]] = {
         "weights": primitives.scaled_weights.astype(np.float32),

@@ -1,5 +1,5 @@
 // What it is: a word, how far along, the candidates with their bars. Rows stay where they are.
-import { byId, fill, make } from "../parts/elements.js";
+import { byId, fill, make, write } from "../parts/elements.js";
 
 const ROWS = 5;
 const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
@@ -30,15 +30,15 @@ export class AnswerPanel {
 
   /** @param {string} kind @param {string} word @param {string} note @param {string} state open, known, unknown */
   words(kind, word, note, state) {
-    byId("verdict-kind").textContent = kind;
-    byId("verdict").textContent = word;
-    byId("verdict-note").textContent = note || "\u00a0";
+    write(byId("verdict-kind"), kind);
+    write(byId("verdict"), word);
+    write(byId("verdict-note"), note || "\u00a0");
     byId("verdict").parentElement.dataset.state = state;
   }
 
   /** @param {string} text What the bars mean. */
   kind(text) {
-    if (byId("ranks-kind").textContent !== text) byId("ranks-kind").textContent = text;
+    write(byId("ranks-kind"), text);
   }
 
   /** @param {number} share */
@@ -55,8 +55,8 @@ export class AnswerPanel {
   }
 
   set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value, /** @type {(value: number) => string} */ text) {
-    if (one.name.textContent !== name) one.name.textContent = name;
-    one.value.textContent = value === null ? "" : text(value);
+    write(one.name, name);
+    write(one.value, value === null ? "" : text(value));
     one.bar.style.setProperty("--share", String(value ?? 0));
     one.element.classList.toggle("nothing", value === null);
   }

@@ -41,11 +41,13 @@ export function followPointer(canvas, hear) {
     last = -Infinity;
     hear.goes([sampleOf(event)].filter(later));
   });
-  canvas.addEventListener("pointermove", (event) => {
+  const goes = (/** @type {PointerEvent} */ event) => {
     if (event.pointerId !== pointer) return;
     const samples = samplesOf(event);
     if (samples.length) hear.goes(samples);
-  });
+  };
+  canvas.addEventListener("pointermove", goes);
+  canvas.addEventListener("pointerrawupdate", goes); // the same samples, without waiting for the next frame
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
 }

@@ -38,6 +38,3 @@ export function question(plan, formulation) {
   if (plan.obstacles.length) body.obstacles = plan.obstacles;
   return body;
 }
-
-/** Whether a matrix in the page gives the path: no via points and obstacles. @param {Plan} plan */
-export const isPlain = (plan) => !plan.via.length && !plan.obstacles.length;

@@ -1,8 +1,8 @@
-// The newest path of each formulation: at once from its operators, exactly from the server; never an old one after a new one.
+// The newest path of each formulation: at once by the runtime, with what is to be said of it from the server; never an old one after a new one.
 import { post } from "../parts/api.js";
 import { library } from "../parts/library_state.js";
-import { evaluate, operatorsOf } from "./operators.js";
-import { isPlain, question, what } from "./plan.js";
+import { question, what } from "./plan.js";
+import { moved, primitiveOf } from "./primitives.js";
 
 const SETTLED = 120; // how long nothing must change before the server is asked for what the page already drew [ms]
 
@@ -15,26 +15,27 @@ export class Rollouts {
     this.problem = "";
     this.asking = false;
     this.wanted = null;
-    this.operators = null;
+    this.primitive = null;
     this.timer = 0;
     this.preparing = "";
   }
 
   /** @param {any} plan */
   async prepare(plan) {
-    this.operators = null;
+    this.primitive = null;
     const key = (this.preparing = JSON.stringify(what(plan)));
-    const operators = await operatorsOf(what(plan), this.formulation, library().version);
-    if (this.preparing === key) this.operators = operators;
+    const primitive = await primitiveOf(what(plan), this.formulation, library().version);
+    if (this.preparing === key) this.primitive = primitive;
   }
 
   /** @param {any} plan The newest. */
   follow(plan) {
     this.wanted = question(plan, this.formulation);
     clearTimeout(this.timer);
-    if (!this.operators || !isPlain(plan)) return this.ask();
-    this.path = evaluate(this.operators, plan.start, plan.goal, plan.share * (plan.usual / lastOf(this.operators.times)));
-    this.changed(this.path);
+    const path = moved(this.primitive, this.wanted);
+    if (!path) return this.ask();
+    this.path = path;
+    this.changed(path);
     this.timer = setTimeout(() => this.ask(), SETTLED);
   }
 
@@ -47,7 +48,7 @@ export class Rollouts {
       try {
         const path = await post("/api/rollout", asked);
         this.problem = "";
-        if (!this.wanted || !this.operators || asked.via || asked.obstacles) this.path = path;
+        if (!this.wanted || !this.primitive || asked.obstacles) this.path = path;
       } catch (error) {
         this.problem = error.message;
       }
@@ -56,5 +57,3 @@ export class Rollouts {
     this.asking = false;
   }
 }
-
-const lastOf = (/** @type {number[]} */ times) => times[times.length - 1] || 1;

@@ -28,6 +28,7 @@ class Move {
     this.plan = null;
     this.version = -1;
     this.dragging = false;
+    this.named = null;
     this.on = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map((one) => [one.name, new Rollouts(one.name, () => this.redraw())]));
     this.handles = new Handles(this.camera, { moving: (on) => this.moving(on) });
@@ -83,7 +84,7 @@ class Move {
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
-    for (const one of this.rollouts.values()) Object.assign(one, { path: null, operators: null, problem: "" });
+    for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
     byId("duration").value = "0";
     this.picture.paths = [];
     this.picture.fit();
@@ -97,10 +98,10 @@ class Move {
     await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
-  /** Another style moves; its operators are asked for once the slider rests. @param {number[]|null} values */
+  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values */
   style(values) {
     this.plan.style = values;
-    for (const one of this.rollouts.values()) one.operators = null;
+    for (const one of this.rollouts.values()) one.primitive = null;
     this.changed();
     clearTimeout(this.resting);
     this.resting = setTimeout(() => this.prepare(), 400);
@@ -167,10 +168,18 @@ class Move {
     this.picture.board.draw();
     this.speed.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.velocities), look })));
     this.acceleration.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })));
-    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
+    this.legend(shown);
     const said = [...this.on].flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
     const text = [...new Set(said)].join(" ");
     if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
+  }
+
+  /** Not while a path follows the hand: it stays the same then. @param {any[]} shown */
+  legend(shown) {
+    const names = shown.map((one) => one.name).join();
+    if (this.named === names) return;
+    this.named = names;
+    fill(byId("move-legend"), make("li", {}, make("span", { class: "key recorded" }), "recorded"), ...shown.map((one) => make("li", {}, make("span", { class: `key ${one.key}` }), one.name)));
   }
 
   /** @param {string} name @param {boolean} on */

@@ -31,6 +31,11 @@ export function svg(tag, attributes, ...children) {
   return element;
 }
 
+/** Say something else; what stays the same costs no layout. @param {Element} element @param {string} text */
+export function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 /** Replace what an element holds. @param {Element} element @param {...any} children */
 export function fill(element, ...children) {
   element.replaceChildren(...children.filter((child) => child !== null && child !== undefined));

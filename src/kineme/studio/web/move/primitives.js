@@ -1,0 +1,32 @@
+// Primitives of the server, moved by the runtime that the page without a server has too: the path follows the hand.
+import { post } from "../parts/api.js";
+import { openPrimitive } from "../runtime/primitive.js";
+
+const SAMPLES = 201; // as many as the server answers with
+
+/** @type {Map<string, Promise<any>>} */
+const known = new Map();
+
+/** @param {any} what @param {string} formulation @param {number} version Of the library. @returns {Promise<any>} Null where only the server knows. */
+export function primitiveOf(what, formulation, version) {
+  const key = JSON.stringify([what, formulation, version]);
+  if (!known.has(key)) {
+    if (known.size > 60) known.clear();
+    known.set(key, post("/api/primitive", { what, formulation }).then((document) => document && openPrimitive(document)).catch(() => null));
+  }
+  return /** @type {Promise<any>} */ (known.get(key));
+}
+
+/**
+ * What the server would answer to the same question, but for its warnings.
+ * @param {any} primitive @param {any} question @returns {any} Null where there is none, or the server has to say why.
+ */
+export function moved(primitive, { start, goal, duration, via, obstacles }) {
+  if (!primitive || obstacles) return null;
+  try {
+    const { times, ...path } = primitive.rollout({ start, goal, duration, via, samples: SAMPLES });
+    return { times: [...times], ...path, warnings: [] };
+  } catch {
+    return null;
+  }
+}
