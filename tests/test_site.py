@@ -38,10 +38,10 @@ def test_code_is_no_formula(code):
 
 def test_docstrings_become_text_that_sphinx_reads():
     text = to_rest(
-        "Give *it* to `DMP` and ``x_i = a / b``, not ``max_angle=3``.\n\n    x' = v    Eq. (1)\n\nParameters\n"
+        "Give *it* a * to `DMP` and ``x_i = a / b``, not ``max_angle=3``.\n\n    x' = v    Eq. (1)\n\nParameters\n"
         "----------\nw_ : Rollout, optional\n    Of |x|.\n\nRaises\n------\nDataError\n    No."
     )
-    assert r"Give \*it\* to `DMP` and :math:`x_{i}=\frac{a}{b}`, not ``max_angle=3``." in text
+    assert r"Give *it* a \* to `DMP` and :math:`x_{i}=\frac{a}{b}`, not ``max_angle=3``." in text
     assert ".. math::\n\n   \\begin{array}{lll}\n   \\text{} & x'=v & \\quad\\text{Eq. (1)}" in text
     assert "w_ : `Rollout`, optional\n    Of \\|x\\|." in text
     assert text.endswith("Raises\n------\nDataError\n    No.")

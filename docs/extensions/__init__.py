@@ -6,12 +6,12 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from extensions import commands, equations, formats, hooks, links, mathjax, names, whole
+from extensions import commands, equations, formats, hooks, links, mathjax, messages, names, whole
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-_PAGES = (names.pages, commands.pages, formats.pages)
+_PAGES = (names.pages, commands.pages, formats.pages, messages.pages)
 
 
 def _write_pages(app: Sphinx) -> None:

@@ -28,7 +28,8 @@ def pages() -> Iterator[tuple[str, str]]:
     """File name and text of each page, in reStructuredText."""
     examples = _examples()
     names = sorted(name for name, command in main.commands.items() if not command.hidden)
-    lines = [*_title("Commands", "="), *_options(main, click.Context(main, info_name="kineme")), ".. list-table::", ""]
+    about = "What each of them takes and writes, with examples. ``kineme --version`` says which kineme it is."
+    lines = [*_title("Commands", "="), about, "", ".. list-table::", ""]
     for name in names:
         lines += [
             f"   * - :doc:`kineme {name} <kineme-{name}>`",

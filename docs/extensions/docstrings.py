@@ -54,8 +54,10 @@ def _prose(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    text = re.sub(r"([*|\\])", r"\\\1", text)
-    return re.sub(r"(?<=\w)_(?=\W|$)", r"\\_", text)
+    """Signs that are none of markup, escaped; an emphasized word stays one."""
+    parts = re.split(r"((?<!\w)\*\w+\*(?!\w))", text)
+    parts[::2] = [re.sub(r"(?<=\w)_(?=\W|$)", r"\\_", re.sub(r"([*|\\])", r"\\\1", part)) for part in parts[::2]]
+    return "".join(parts)
 
 
 def _literal(text: str) -> str:

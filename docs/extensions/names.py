@@ -18,7 +18,7 @@ def pages() -> Iterator[tuple[str, str]]:
             yield f"{one.path}.rst", _page(one)
     for file, title, names in _groups():
         yield f"{file}.rst", _group(title, names)
-    links = [f"* :doc:`{file}`" for file, _, _ in _groups()]
+    links = [f"* :doc:`{file}`: {_links(names)}" for file, _, names in _groups()]
     yield "index.rst", "\n".join(["Python", "======", "", *links, "", _toctree([one[0] for one in _groups()])])
 
 
@@ -33,6 +33,12 @@ def _groups() -> Iterator[tuple[str, str, list[Public]]]:
         for one in names:
             if one.path in modules:
                 yield one.path, one.path, [name for name in NAMES if name.module == one.path]
+
+
+def _links(names: list[Public]) -> str:
+    return ", ".join(
+        f"``{one.name}``" if isinstance(one.value, ModuleType) else f":doc:`{one.name} <{one.path}>`" for one in names
+    )
 
 
 def _file(title: str) -> str:

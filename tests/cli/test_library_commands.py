@@ -89,6 +89,22 @@ def test_annotate_merge_delete_and_history(folder):
     assert len(answer("library", "history", "-n", 2, "-l", folder)) == 2
 
 
+def test_changes_are_taken_back_one_after_the_other(folder):
+    answer("library", "rename", "CShape", "round", "-l", folder)
+    answer("library", "delete", "NShape", "-y", "-l", folder)
+    late = run("library", "undo", "--at", 2, "-l", folder)
+    assert late.returncode == 1
+    assert "the library is at version 3 by now" in late.stderr
+    assert answer("library", "undo", "--at", 3, "-l", folder) == {"undone": "delete", "to": 2, "version": 4}
+    done = start("library", "undo", "-l", folder)
+    assert done.stdout == "took back rename; as at version 1; version 5\n"
+    names = [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]]
+    assert names == ["CShape", "GShape", "NShape"]
+    answer("library", "undo", "-l", folder)
+    assert answer("library", "list", "-l", folder)["movements"] == 0
+    assert "has none left" in run("library", "undo", "-l", folder).stderr
+
+
 def test_deleting_asks_first(folder):
     assert run("library", "delete", "NShape", "-l", folder, input="n\n").returncode != 0
     assert answer("library", "list", "-l", folder)["movements"] == 21

@@ -7,6 +7,7 @@ import pytest
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, SpecificationError
+from kineme.library.learning import learn as learning
 from kineme.library.storage.undo import can_undo
 
 
@@ -81,6 +82,35 @@ def test_all_changes_are_taken_back_one_by_one_and_new_ones_after_an_undo_too(li
         library.undo()
     assert library.version == version
     assert library.verify() == []
+
+
+def test_all_batches_of_one_call_are_one_change(library, monkeypatch):
+    monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
+    before, version = _state(library), library.version
+    library.learn(draw_movements(10, 2, 9), ["wave", "other"] * 5)
+    assert library.version == version + 3
+    library.learn(draw_movements(10, 2, 17), ["later"] * 10)  # another call: not taken back with it
+    assert library.undo() == (version + 7, version + 3, "learn")
+    assert library.undo() == (version + 8, version, "learn")
+    assert _state(library) == before
+    assert library.verify() == []
+
+
+def test_what_others_change_between_two_batches_is_a_change_of_its_own(library, monkeypatch):
+    monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
+    before, version = _state(library), library.version
+
+    def other(done, total):
+        if done == 4:
+            with ActionLibrary(library.folder) as one:
+                one.rename("push", "shove")
+
+    library.learn(draw_movements(8, 2, 9), ["wave", "other"] * 4, progress=other)
+    assert sorted(one.action for one in library.history()[version:]) == ["learn", "learn", "rename"]
+    while library.undo().to > version:
+        pass
+    assert _state(library) == before
+    assert not {"shove"} & {one.name for one in library.symbols()}
 
 
 def test_an_undo_of_another_version_than_the_one_looked_at_is_refused(library):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import numpy as np
@@ -85,6 +86,43 @@ def center(page, selector):
     box = page.locator(selector).first.bounding_box()
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
+
+class Hand:
+    """A program that sends movements to a studio."""
+
+    def __init__(self, running, name):
+        from websockets.sync.client import connect
+
+        address = running.address.replace("http", "ws") + "/api/live"
+        self.connection = connect(address, additional_headers={"Authorization": f"Bearer {running.token}"})
+        self.name = name
+
+    def __enter__(self):
+        self.socket = self.connection.__enter__()
+        self._tell({"name": self.name})
+        return self
+
+    def __exit__(self, *error):
+        self.connection.__exit__(*error)
+
+    def _tell(self, message):
+        self.socket.send(json.dumps(message))
+
+    def send(self, times, positions):
+        """Samples of a movement."""
+        self._tell({"samples": np.column_stack((times, positions)).tolist()})
+
+    def finish(self):
+        """It is over."""
+        self._tell({"finish": True})
+
+
+#: What is painted in the drawing area, as a number.
+PIXELS = """() => {
+  const canvas = document.getElementById("draw-canvas");
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  return pixels.reduce((sum, value, k) => (sum * 31 + value * (k % 9973)) % 2147483647, 7);
+}"""
 
 #: Drop a file with a name and a text on the page, wherever it is.
 DROP = """([name, text]) => {

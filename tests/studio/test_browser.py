@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+import re
 import signal
 from itertools import product
 from threading import Thread
@@ -14,8 +14,10 @@ from browser_samples import (
     HOSTILE,
     INKED,
     LETTERS,
+    PIXELS,
     SHOWN,
     UNANSWERED,
+    Hand,
     center,
     draw,
     letters,
@@ -24,7 +26,7 @@ from browser_samples import (
     show,
     wait_for_text,
 )  # fmt: skip
-from studio_samples import Running, Served, running
+from studio_samples import ROOT, Running, Served, running
 
 import kineme
 from browsing import Pages, wait_until
@@ -297,16 +299,22 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     assert page.evaluate("document.activeElement.id") != "naming-name"
 
 
-def test_the_program_that_the_page_shows_sends_samples(opened, served_letters, capsys):
+def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_letters, monkeypatch):
     page = opened(served_letters)
-    program = page.locator("#live-source-text pre").first.text_content()
-    made: dict[str, object] = {}
-    exec(program, made)
-    samples = letters("Sine")[SHOWN].positions[::20].tolist()
-    thread = Thread(target=lambda: asyncio.run(made["main"](served_letters.token, samples)))
-    thread.start()  # a loop of its own: the browser's runs here
+    shown = page.locator("#live-source-text pre").all_text_contents()
+    documented = re.findall(r"```(?:py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL)
+    host = served_letters.address.removeprefix("http://")
+    assert shown == [one.strip().replace("127.0.0.1:8420", host) for one in documented]
+    monkeypatch.setenv("KINEME_STUDIO_TOKEN", served_letters.token)
+    monkeypatch.setattr("builtins.print", lambda *_: None)
+    thread = Thread(target=exec, args=(shown[0], {}))
+    thread.start()
+    wait_for_text(page, "#sources li .source-name", "Live source connected: hand tracker")
+    wait_until(page, ANSWERED)
     thread.join(30)
-    assert "'answer':" in capsys.readouterr().out
+    wait_until(page, "document.querySelectorAll('#sources li').length === 0")
+    assert page.is_visible("#ranks .rank-value >> nth=0")
+    assert page.evaluate("document.activeElement.id") != "naming-name"  # nobody asked for it
 
 
 def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
@@ -371,6 +379,12 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     assert page.inner_text("#channels-note") == "Movements of this library have 2 columns; 3 are chosen. Choose 2."
     page.locator("#channels input").nth(2).uncheck()
     page.click("#zoom-in")
+    page.route("**/spotted", lambda route: None)  # a search that takes long
+    page.click("#spot")
+    wait_for_text(page, "#spot", "Cancel")
+    page.click("#spot")
+    wait_for_text(page, "#spans-state", "Canceled; nothing was changed.")
+    page.unroute("**/spotted")
     page.click("#spot")
     wait_until(page, "document.querySelectorAll('#spans tbody tr').length >= 2")
     named = [page.input_value(f"#spans tbody tr:nth-child({k}) input[type=text]") for k in (1, 2)]
@@ -437,9 +451,33 @@ def test_movements_in_space_turn(opened, studio, tmp_path):
     with kineme.ActionLibrary(tmp_path / "space", create=True) as library:
         for k, shape in enumerate(shapes):
             library.learn([kineme.Trajectory(t, shape), kineme.Trajectory(t, 1.1 * shape)], [f"in space {k}"] * 2)
-    page = opened(studio(tmp_path / "space"))
+    running = studio(tmp_path / "space")
+    page = opened(running)
     assert page.inner_text("#draw-empty-title") == "Movements in space"
     assert "additional_headers" in page.inner_text("#live-source-text")
+    with Hand(running, "hand <b>tracker</b>") as hand:
+        hand.send(t, 1.05 * shapes[0])
+        wait_for_text(page, "#sources .source-name", "Live source connected: hand <b>tracker</b>")
+        wait_until(page, "document.getElementById('draw-empty').hidden")
+        before = page.evaluate(PIXELS)
+        page.locator("#draw-canvas").press("ArrowLeft")
+        wait_until(page, f"before => ({PIXELS})() !== before", before)
+        hand.finish()
+        wait_until(page, ANSWERED)
+        page.fill("#naming-name", "from the hand")
+        hand.send(t, shapes[1])  # while it is being named: it waits
+        wait_until(page, "document.getElementById('sources').classList.contains('waits')")
+        page.press("#naming-name", "Enter")
+        wait_for_text(page, "#verdict-kind", "Learned")
+        page.get_by_role("button", name="Ignore hand").click()
+        shown = page.evaluate(PIXELS)
+        hand.send(t + 9, shapes[1])
+        page.get_by_role("button", name="Ignore hand").click()
+        wait_until(page, f"before => ({PIXELS})() !== before", shown)
+    wait_until(page, ANSWERED)  # it went without an end: asked for as a whole
+    with kineme.ActionLibrary(tmp_path / "space", read_only=True) as library:
+        learned = library.movements("from the hand")[0]
+        np.testing.assert_allclose(learned.positions, 1.05 * shapes[0], atol=1e-6)
     page.keyboard.press("3")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
     before = center(page, ".handle.goal")

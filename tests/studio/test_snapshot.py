@@ -107,6 +107,20 @@ def test_what_the_runtime_lacks_is_refused(settings, d, message):
         snapshot_of_recognizer(recognizer)
 
 
+def test_what_a_refusal_says_to_do_helps(tmp_path):
+    demos, recognizer = draw_shapes([2, 2], 3), kineme.Recognizer(max_angle=0.5)
+    with (
+        kineme.ActionLibrary(tmp_path / "one", create=True, recognizer=recognizer) as library,
+        kineme.ActionLibrary(tmp_path / "other", create=True, recognizer=kineme.Recognizer()) as other,
+    ):
+        library.learn(demos)
+        with pytest.raises(SpecificationError, match=r"other\.learn\(library\.movements\(symbol\.name\)\)"):
+            snapshot_of_library(library)
+        for symbol in library.symbols():
+            other.learn(library.movements(symbol.name))
+        assert snapshot_of_library(other).header["classes"] == [one.name for one in library.symbols()]
+
+
 def test_a_library_without_symbols_is_refused(tmp_path):
     library = kineme.ActionLibrary(tmp_path / "actions", create=True)
     with library, pytest.raises(SpecificationError, match="symbol"):

@@ -18,6 +18,7 @@ from kineme.studio.page.write_page import library_page
 from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import parsed_samples
 from kineme.studio.server.live_socket import _Client
+from kineme.studio.server.live_sources import MOST, Follower, Sources
 from kineme.studio.snapshot.early import DRAWN
 
 
@@ -94,6 +95,9 @@ NONSENSE = [
     '{"reset": 1}',
     '{"finish": "yes"}',
     '{"__proto__": 1}',
+    '{"name": 7}',
+    '{"name": "  "}',
+    '{"name": "' + "x" * 101 + '"}',
     "[" * 50_000,
     '{"samples": ' + json.dumps([[0, 1, 2]] * 10_001) + "}",
 ]
@@ -225,7 +229,7 @@ def test_a_client_that_does_not_read_delays_nobody_and_is_told_the_newest_versio
             await reads.wait()
             sent.append(text)
 
-        client = _Client(SimpleNamespace(send_text=send_text), None)
+        client = _Client(SimpleNamespace(send_text=send_text), None, Sources())
         for version in (3, 4, 5):
             client.tell_of(version)  # returns at once: the next client is told
             await asyncio.sleep(0)
@@ -235,6 +239,113 @@ def test_a_client_that_does_not_read_delays_nobody_and_is_told_the_newest_versio
         return sent
 
     assert asyncio.run(told()) == ['{"changed": 3}', '{"changed": 5}']
+
+
+def _shown(socket, done):
+    """What a page was told of one source, put together, once that is what is waited for."""
+    seen = {"samples": []}
+    while not done(seen):
+        message = socket.receive_json()
+        if "source" in message:
+            new = message["source"]
+            before = seen["samples"] if new.get("movement") == seen.get("movement") else []
+            seen = {**new, "samples": [*before, *new.get("samples", [])]}
+    return seen
+
+
+def test_pages_are_shown_the_movements_of_programs_and_not_those_of_pages(client):
+    with client.websocket_connect(LIVE) as page, client.websocket_connect(LIVE) as hand:
+        page.send_json({"watch": True})
+        hand.send_json({"name": " hand <b>tracker</b> "})
+        assert _shown(page, lambda seen: "name" in seen)["name"] == "hand <b>tracker</b>"
+        state = _draw(hand, 2)
+        seen = _shown(page, lambda seen: len(seen["samples"]) == 60)
+        assert seen["samples"] == samples(2)
+        assert (seen["state"], seen["ended"]) == (state, None)
+        with client.websocket_connect(LIVE) as late:  # it sees the movement from its begin
+            late.send_json({"watch": True})
+            assert _shown(late, lambda seen: seen["samples"])["samples"] == samples(2)
+        hand.send_json({"finish": True})
+        answer = _said(hand, "answer")
+        assert _shown(page, lambda seen: seen.get("ended"))["ended"] == {"answer": answer}
+        hand.send_json({"reset": True})
+        _draw(hand, 1)
+        assert _shown(page, lambda seen: len(seen["samples"]) == 60)["samples"] == samples(1)
+        _draw(page, 3)  # a page: not shown to itself, nor to others
+        hand.close()
+        assert _shown(page, lambda seen: seen.get("gone"))["id"] == seen["id"]
+        assert not client.app.state.sources.sources
+
+
+def test_samples_that_a_stream_skips_are_not_shown_and_of_a_long_movement_the_last_ones_are():
+    sources = Sources()
+    source, page = sources.add(), Follower(sources)
+    source.update(np.array([[0.0, 1, 2], [0.2, 1, 3], [0.1, 9, 9], [0.2, 9, 9], [0.3, 1, 4]]), {})
+    assert page.news()[0]["samples"] == [[0.0, 1, 2], [0.2, 1, 3], [0.3, 1, 4]]
+    source.update(np.array([[0.4, 1, 2, 3]]), {})
+    source.update(np.array([[0.3, 9, 9], [0.5, 1, 5]]), {})
+    assert page.news()[0]["samples"] == [[0.5, 1, 5]]
+    assert page.news() == []
+    source.update(np.column_stack((1 + np.arange(MOST), np.ones((MOST, 2)))), {})
+    assert len(page.news()[0]["samples"]) == len(Follower(sources).news()[0]["samples"]) == MOST
+
+
+def test_what_a_program_sends_last_is_told_although_it_has_gone():
+    sources = Sources()
+    source, page, late = sources.add(), Follower(sources), Follower(sources)
+    assert page.news()[0]["samples"] == []
+    source.update(np.array([[0.0, 1, 2]]), {})
+    source.end({"answer": None})
+    sources.remove(source)
+    last, gone = page.news()
+    assert (last["samples"], last["ended"]) == ([[0.0, 1, 2]], {"answer": None})
+    assert gone == {"id": 1, "gone": True}
+    assert page.news() == late.news() == []
+
+
+def test_a_movement_that_is_over_is_shown_until_the_next_one_begins():
+    sources = Sources()
+    source = sources.add()
+    source.end({"answer": None})  # of nothing
+    assert source.ended is None
+    row = np.array([[0.0, 1, 2]])
+    source.update(row, {"n": 1})
+    source.end({"error": "too short"})
+    source.end({"answer": None})
+    source.reset()
+    assert (source.movement, source.ended) == (1, {"error": "too short"})
+    source.update(row, {"n": 2})
+    assert (source.movement, source.ended, len(source.samples)) == (2, None, 1)
+    source.reset()
+    assert (source.movement, source.samples) == (3, [])
+
+
+def test_a_page_that_does_not_read_delays_no_program_and_is_told_all_of_it_in_the_end():
+    async def told() -> tuple[list[dict], int]:
+        sent: list[str] = []
+        reads = asyncio.Event()
+
+        async def send_text(text: str) -> None:
+            await reads.wait()
+            sent.append(text)
+
+        sources = Sources()
+        page = _Client(SimpleNamespace(send_text=send_text), None, sources)
+        page._watch()
+        source = sources.add()
+        for k in range(500):
+            source.update(np.array([[k, 1.0, 2.0]]), {"k": k})  # returns at once
+            await asyncio.sleep(0)
+        reads.set()
+        while sum(len(json.loads(one)["source"]["samples"]) for one in sent if "source" in one) < 500:
+            await asyncio.sleep(0.01)
+        return [json.loads(one) for one in sent if "source" in one], len(sent)
+
+    messages, n = asyncio.run(told())
+    assert n <= 4  # not one for each sample
+    assert messages[-1]["source"]["state"] == {"k": 499}
+    rows = [row for one in messages for row in one["source"]["samples"]]
+    assert rows == [[k, 1.0, 2.0] for k in range(500)]
 
 
 def test_changes_are_told_again_after_the_library_could_not_be_read():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -75,6 +77,41 @@ def test_a_real_websocket_is_guarded(studio):
     with _live(studio) as client:
         client.send(json.dumps({"samples": samples(2)}))
         assert json.loads(client.recv())["state"]["ranked"][0]["name"] == "kind 2"
+
+
+NODE = ["node", "--experimental-websocket"]  # node 20 has it under this option
+HAS_WEBSOCKET = shutil.which("node") is not None and (
+    subprocess.run([*NODE, "-e", "WebSocket"], capture_output=True, check=False).returncode == 0
+)
+PROGRAMS = dict(re.findall(r"```(py|js)\n(.*?)```", (ROOT / "docs" / "guide" / "studio.md").read_text(), re.DOTALL))
+
+
+@pytest.mark.parametrize("language", ["py", "js"])
+def test_the_programs_of_the_page_run_and_are_shown(studio, language):
+    if language == "js" and not HAS_WEBSOCKET:
+        pytest.skip("this machine has no node with websockets")
+    assert len(PROGRAMS[language].strip().splitlines()) < 13
+    program = PROGRAMS[language].replace("127.0.0.1:8420", studio.address.removeprefix("http://"))
+    command = [sys.executable, "-c", program] if language == "py" else [*NODE, "-e", program]
+    with _live(studio) as page:
+        page.send(json.dumps({"watch": True}))
+        done = subprocess.run(
+            command,
+            env=os.environ | {"KINEME_STUDIO_TOKEN": TOKEN},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert "answer" in done.stdout.splitlines()[-1]
+        shown = [json.loads(page.recv(10))]
+        while not shown[-1].get("source", {}).get("gone"):
+            shown.append(json.loads(page.recv(10)))
+    sources = [one["source"] for one in shown if "source" in one]
+    assert {one["name"] for one in sources if one.get("samples")} == {"hand tracker"}
+    assert sum(len(one.get("samples", [])) for one in sources) == 100
+    assert "label" in sources[-2]["ended"]["answer"]
 
 
 def test_messages_of_many_megabytes_end_their_websocket_alone(studio):

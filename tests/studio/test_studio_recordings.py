@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import os
+import signal
+import subprocess
 import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +21,8 @@ from studio_samples import BEARER, drawing
 from kineme import ActionLibrary
 from kineme.errors import DataError
 from kineme.files.recordings import read_recordings
-from kineme.studio.server import bodies, own_folder, read_upload, uploads
+from kineme.studio.server import bodies, own_folder, read_upload, recording_routes, uploads
+from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError
 
 
@@ -84,7 +92,7 @@ def test_other_columns_are_read_where_they_are_asked_for(client):
 
 
 def test_what_is_read_apart_is_what_is_read_here(tmp_path):
-    for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses())):
+    for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses()[0])):
         path = tmp_path / name
         path.write_bytes(data)
         direct = read_recordings(path)
@@ -98,14 +106,49 @@ def test_what_is_read_apart_is_what_is_read_here(tmp_path):
         assert direct.sources == again.sources
 
 
-def _poses():
-    t, x = drawing(1)
-    q = np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1))
-    q[:, 1] = np.linspace(0, 0.5, len(t))
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
+def _poses(*kinds, heads="t,x,y,qw,qx,qy,qz", rest=0.6):
+    """A recording that turns as it moves, with rests between, and when each movement begins and ends."""
+    times, rows, spans, now = [], [], [], 0.0
+    for k in kinds or (1,):
+        t, x = drawing(k, seed=50)
+        still = np.arange(0, rest, 0.025)
+        moves = np.concatenate((np.repeat(x[:1], len(still), axis=0), x)) - x[0]
+        half = 0.3 * np.column_stack((moves, moves[:, 0] * moves[:, 1]))
+        angle = np.linalg.norm(half, axis=1, keepdims=True)
+        rows.append(np.column_stack((moves, np.cos(angle), np.sinc(angle / np.pi) * half)))
+        times.append(now + np.concatenate((still, rest + t)))
+        spans.append((now + rest, now + rest + t[-1]))
+        now += rest + t[-1] + 0.025
     text = io.StringIO()
-    np.savetxt(text, np.column_stack((t, x, q)), "%.9f", ",", header="t,x,y,qw,qx,qy,qz", comments="")
-    return text.getvalue().encode()
+    np.savetxt(
+        text, np.column_stack((np.concatenate(times), np.concatenate(rows))), "%.9f", ",", header=heads, comments=""
+    )
+    return text.getvalue().encode(), spans
+
+
+@pytest.mark.parametrize("head", ["q", "orientation."])
+def test_orientations_that_are_chosen_by_their_channel_are_those_of_the_reader(tmp_path, open_studio, head):
+    client = open_studio(tmp_path / "poses")
+    four = [head + axis for axis in "wxyz"]
+    data, spans = _poses(0, 1, 2, heads=",".join(("t", "x", "y", *four)))
+    read = _send(client, data).json()
+    channels = read["tables"][0]["channels"]
+    assert [(one["kind"], one["columns"]) for one in channels[2:]] == [("orientation", four)]
+    chosen = [channels[k]["name"] for k in (2, 0)]  # not all of them, and in another order
+    body = {"channels": chosen, "spans": [{"begin": a, "end": b, "label": f"k{i}"} for i, (a, b) in enumerate(spans)]}
+    learned = client.post(f"/api/recordings/{read['recording']}/learn", json=body)
+    assert learned.status_code == 200, learned.text
+    (tmp_path / "a.csv").write_bytes(data)
+    (whole,) = read_recordings(tmp_path / "a.csv", columns=[*four, "x"]).demonstrations
+    library = client.app.state.studio.library
+    assert library.channels == whole.channels
+    for one, (begin, end) in zip(library.movements(), spans, strict=True):
+        inside = (whole.times >= begin - 1e-9) & (whole.times <= end + 1e-9)
+        np.testing.assert_allclose(one.recorded, whole.recorded[inside], atol=1e-6)
+    other = _send(client, _poses(1, 0, heads=",".join(("t", "x", "y", *four)))[0], "b.csv").json()["recording"]
+    for asked in ({"channels": chosen}, {}):
+        found = client.post(f"/api/recordings/{other}/spotted", json=asked).json()["spans"]
+        assert [one["label"] for one in found] == ["k1", "k0"]
 
 
 FILES = {
@@ -163,8 +206,6 @@ def test_reading_ends_where_it_takes_too_long_or_too_much(tmp_path):
 
 
 def _received(files, data, name="a.csv"):
-    import asyncio
-
     async def chunks():
         yield data
 
@@ -218,6 +259,66 @@ def test_a_file_that_does_not_come_whole_leaves_nothing_and_is_no_error(client, 
     client.portal.call(send, "/api/recordings")
     assert not list(client.app.state.studio.uploads._folder.path.iterdir())
     assert "Traceback" not in caplog.text
+
+
+def _gone(after):
+    """A request whose client goes after so many looks."""
+    looks = iter(range(1000))
+
+    async def is_disconnected():
+        return next(looks) >= after
+
+    return SimpleNamespace(is_disconnected=is_disconnected)
+
+
+def test_a_child_that_reads_is_ended_where_nobody_waits(tmp_path, monkeypatch):
+    monkeypatch.setattr(work_module, "PERIOD", 0.02)
+    files, children = uploads.Uploads(seconds=60), []
+    key = _received(files, b"t,x,y\n")
+    popen = subprocess.Popen
+
+    def sleeping(command, **how):
+        children.append(popen(["sleep", "60"], **how))
+        return children[0]
+
+    monkeypatch.setattr(uploads.subprocess, "Popen", sleeping)
+    work, start = work_module.Work(), time.perf_counter()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check))
+        with pytest.raises(work_module.StoppedError):
+            asyncio.run(waiting)
+    assert time.perf_counter() - start < 10
+    assert children[0].returncode == -signal.SIGKILL
+    files.close()
+
+
+def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, monkeypatch):
+    key = _send(client, _table(0, 1)[0]).json()["recording"]
+    path = f"/api/recordings/{key}/spotted"
+    assert client.get(path).json() == {"share": None}
+    seen, begun = [], Event()
+    real = recording_routes.annotate
+
+    def slow(store, one, error_rate, progress):
+        if begun.is_set():
+            return real(store, one, error_rate, progress)
+        begun.set()
+        for k in range(1000):
+            progress(0.001 * k * one.demonstrations.durations[0])
+            seen.append(client.get(path).json()["share"])
+        raise AssertionError
+
+    monkeypatch.setattr(recording_routes, "annotate", slow)
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(client.post, path, json={})
+        begun.wait(20)
+        while len(seen) < 3:
+            time.sleep(0.01)
+        second = client.post(path, json={})
+        assert first.result(20).status_code == 499
+    assert second.status_code == 200
+    assert seen[:3] == pytest.approx([0, 0.001, 0.002])
+    assert client.get(path).json() == {"share": None}
 
 
 def test_a_disk_that_is_full_is_said():

@@ -149,6 +149,21 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     say(as_json, data, text)
 
 
+@library.command(short_help="Take back the last change.")
+@library_option
+@click.option("--at", "expected", type=ID, help="Only if this is still the last version, as history lists it.")
+@json_option
+def undo(folder: Path, expected: int | None, as_json: bool) -> None:
+    """Take back the last change, whoever made it, as a new version; again, the one before.
+
+    All that one call of kineme learn stored is one change. kineme library history lists the changes.
+    """
+    with opened(folder, read_only=False) as actions:
+        undone = actions.undo(expected)
+        data = {"undone": undone.action, "to": undone.to, "version": undone.version}
+    say(as_json, data, lambda: f"took back {data['undone']}; as at version {data['to']}; version {data['version']}")
+
+
 @library.command(short_help="Check every byte of a library.")
 @library_option
 @json_option

@@ -13,7 +13,7 @@ from kineme.kernels.base import Kernel
 
 @dataclass(frozen=True)
 class Canberra(Kernel):
-    r"""Canberra similarity: k(x, y) = 1/n Σ_i (1 - |x_i - y_i| / (|x_i| + |y_i|)), with 0/0 = 0.
+    r"""Canberra similarity: ``k(x, y) = 1/n Σ_i (1 - |x_i - y_i| / (|x_i| + |y_i|))``, with 0/0 = 0.
 
     An instance of Eq. (5) that has no width: it compares ratios, so multiplying a coordinate by any
     number but zero changes nothing.

@@ -20,7 +20,7 @@ _PYTHON_CALL = 100
 
 @dataclass(frozen=True, repr=False)
 class DistanceKernel(Kernel):
-    r"""k(x, y) = h(Σ_j g(d(x_j, y_j))), Eq. (5), for functions of your own.
+    r"""``k(x, y) = h(Σ_j g(d(x_j, y_j)))``, Eq. (5), for functions of your own.
 
     Nothing is claimed about positive semi-definiteness: it depends on the functions. With
     h(z) = exp(-z) it holds if g(d(x, y)) is conditionally negative definite (Schoenberg), as for

@@ -14,7 +14,7 @@ from kineme.kernels.base import Kernel
 
 @dataclass(frozen=True)
 class Laplacian(Kernel):
-    r"""Laplacian: k(x, y) = exp(-Σ_i |x_i - y_i| / σ), Eq. (5) with d = |x - y|, g(z) = z / σ, h(z) = exp(-z).
+    r"""Laplacian: ``k(x, y) = exp(-Σ_i |x_i - y_i| / σ)``, Eq. (5) with d = |x - y|, g(z) = z / σ, h(z) = exp(-z).
 
     Positive semi-definite for every σ: a product over coordinates of exp(-|t| / σ), whose Fourier
     transform is a Cauchy density (Bochner, Schur). Its power k^t is the Laplacian with σ / t, so it is

@@ -18,7 +18,7 @@ _STRIP = 2**17
 
 @dataclass(frozen=True)
 class RBF(Kernel):
-    r"""Radial basis function: k(x, y) = exp(-‖x - y‖² / (2 σ²)), Eq. (6).
+    r"""Radial basis function: ``k(x, y) = exp(-‖x - y‖² / (2 σ²))``, Eq. (6).
 
     Positive semi-definite for every σ: it is the characteristic function of a Gaussian (Bochner).
     Its power k^t is the RBF with σ / √t, so it is infinitely divisible.

@@ -14,7 +14,7 @@ from kineme.kernels.base import Kernel
 
 @dataclass(frozen=True)
 class TruncatedEuclidean(Kernel):
-    r"""Truncated Euclidean (TrE): k(x, y) = 1/n Σ_i max(0, m - min(m, |x_i - y_i|) / σ), Eq. (7), (8).
+    r"""Truncated Euclidean (TrE): ``k(x, y) = 1/n Σ_i max(0, m - min(m, |x_i - y_i|) / σ)``, Eq. (7), (8).
 
     Positive semi-definite for every m, σ > 0. For σ <= 1 each term is max(0, m - |t| / σ) with
     t = x_i - y_i: a triangle, whose Fourier transform is a squared sinc, never negative (Bochner).

@@ -305,7 +305,8 @@ class ActionLibrary:
     def undo(self, expected: int | None = None) -> Undone:
         """Take back the last change that was not taken back yet, whoever made it, as a new version.
 
-        Called again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
+        All that one call of `learn` stored is one change, unless somebody else changed the library meanwhile. Called
+        again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
         new id, as if it were learned again. Who showed a movement, and its number of dimensions, stay known.
 
         Parameters

@@ -79,19 +79,23 @@ def spot(
 ) -> list[Spotted]:
     """Find movements like the references in a recording; see `Recognizer.spot`.
 
-    `progress` is called now and then with the share of the windows that is compared.
+    `progress` is called now and then, between long steps too, with the share of the windows that is compared; what it
+    raises ends the search.
     """
     check_error_rate(error_rate)
     check_count("max_pieces", max_pieces, 1)
+    tell: Progress = progress or _tell_nobody
     comparison, references, calibration = known = known._replace(calibration=calibration_of_cut(known))
+    tell(0.0)
     lasting = durations_of(references)
     whole = _as_timed(recording) if lasting is not None else as_recording(recording)
     whole = comparison.checked([whole], "a recording")[0]
     durations = None if lasting is None else Durations(float(lasting.min()) / _FASTER, float(lasting.max()) * _SLOWER)
     windows = candidate_windows(whole, durations, max_pieces)
+    tell(0.0)
     if not len(windows.bouts):  # nothing moves for as long as a movement takes
         return []
-    chosen, best = _chosen(known, windows, error_rate, progress)
+    chosen, best = _chosen(known, windows, error_rate, tell)
     least = 0.0 if lasting is None else _LEAST_UNKNOWN * float(lasting.min())
     unknown = _left_over(chosen, windows.bouts, whole.times, least)
     rows = np.concatenate((chosen, unknown))
@@ -122,9 +126,11 @@ def _as_timed(recording: MovementsLike) -> Trajectory:
     return as_recording(recording)
 
 
-def _chosen(
-    known: Templates, windows: Windows, error_rate: float, progress: Progress | None
-) -> tuple[Rows, NDArray[np.intp]]:
+def _tell_nobody(share: float) -> None:
+    """Nobody wants to know how far it is."""
+
+
+def _chosen(known: Templates, windows: Windows, error_rate: float, progress: Progress) -> tuple[Rows, NDArray[np.intp]]:
     """Samples of the known movements found, rows (n, 2), first and one past the last, and the class of each."""
     if not len(windows):
         return np.empty((0, 2), dtype=np.intp), np.empty(0, dtype=np.intp)
@@ -134,6 +140,7 @@ def _chosen(
     around = surroundings(motion, windows.bouts, compared.rows)
     manner = Manner()
     for _ in range(_PASSES - 1):
+        progress(1.0)
         scored = score_windows(compared, typical, around, manner, error_rate)
         chosen = _best_windows(compared.rows, scored)
         manner = manner_of(compared, typical, chosen, scored.best)

@@ -13,6 +13,7 @@ from kineme.library.learning.serialize import evenly_sampled, serialize
 from kineme.library.storage.channels import channels_to_text
 from kineme.library.storage.read import people_by_movement
 from kineme.library.storage.rows import Row, among, as_text, listed, next_key
+from kineme.library.storage.schema import CONTINUES
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.symbols import add_members, keys_by_name
@@ -23,11 +24,12 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 
 @dataclass(frozen=True, eq=False)
 class Committed:
-    """The result of storing one batch."""
+    """The result of storing one batch, which made `version`; None if nothing changed."""
 
     added: int
     symbols: tuple[str, ...]
     ids: NDArray[np.int64]
+    version: int | None
 
 
 def serialize_new(store: Store, demos: Demonstrations, batch: Batch, new: list[int]) -> None:
@@ -37,10 +39,13 @@ def serialize_new(store: Store, demos: Demonstrations, batch: Batch, new: list[i
     batch.row_of = dict(zip(new, range(len(new)), strict=True))
 
 
-def commit(store: Store, batch: Batch) -> Committed:
-    """Store what is new, and assign it to the symbols of its labels; where nothing changes, no version is made."""
+def commit(store: Store, batch: Batch, continues: int | None = None) -> Committed:
+    """Store what is new, and assign it to the symbols of its labels; where nothing changes, no version is made.
+
+    `continues` is the version of what was learned before in the same call: an undo takes back both.
+    """
     if not batch.row_of and (ids := _all_stored(store, batch)) is not None:
-        return Committed(0, (), ids)
+        return Committed(0, (), ids, None)
     detail: dict[str, Any] = {}
     with store.writing("learn", detail) as change:
         stored = find_stored(change.connection, batch)  # again, since another process may have written meanwhile
@@ -54,7 +59,9 @@ def commit(store: Store, batch: Batch) -> Committed:
         detail |= {"added": len(new), "known": len(keys) - len(new), "symbols": list(made)}
         if people := _insert_people(change, batch, keys):
             detail["people"] = people
-    return Committed(len(new), made, np.array(keys, dtype=np.int64))
+        if continues is not None:
+            detail[CONTINUES] = continues
+    return Committed(len(new), made, np.array(keys, dtype=np.int64), change.version)
 
 
 def _all_stored(store: Store, batch: Batch) -> NDArray[np.int64] | None:

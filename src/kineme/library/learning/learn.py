@@ -1,4 +1,7 @@
-"""Learn movements: describe new ones and store them in batches, each of which is one version."""
+"""Learn movements: describe new ones and store them in batches, each of which is one version.
+
+An undo takes back all batches of one call, unless somebody else has changed the library between them.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.library.learning.commit import commit, serialize_new
+from kineme.library.learning.commit import Committed, commit, serialize_new
 from kineme.library.learning.deduplicate import Batch, find_stored
 from kineme.library.learning.serialize import check, digests, evenly_sampled
 from kineme.library.storage.source import Source
@@ -85,17 +88,18 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
     people = _as_names(demos, "group", groups)
     sources = _as_sources(source, len(demos))
     where = _as_places(places, sources)
-    reports = []
+    reports: list[Committed] = []
     with ThreadPoolExecutor(1, "kineme-library") as pool:
-        pending: Future[Any] | None = None
-        done = 0
+        pending: Future[Committed] | None = None
+        done, version = 0, None
         for start, stop in _ranges(demos):
             rows = slice(start, stop)
             batch = _prepared(store, _part(demos, start, stop), (names[rows], people[rows], sources[rows], where[rows]))
             if pending is not None:  # one batch is written while the next one is described
                 reports.append(pending.result())
+                version = reports[-1].version or version
                 done = _tell(progress, done + len(reports[-1].ids), len(demos))
-            pending = pool.submit(commit, store, batch)
+            pending = pool.submit(commit, store, batch, version)
         if pending is not None:
             reports.append(pending.result())
             _tell(progress, done + len(reports[-1].ids), len(demos))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Row, among, has_table, listed, next_key, parsed_column, select
-from kineme.library.storage.schema import BLOBS, COLUMNS, OPTIONAL_BLOBS, UNDO
+from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, UNDO
 from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.versions import Change
 
@@ -37,10 +37,11 @@ def undo(store: Store, expected: int | None = None) -> Undone:
         undone = _effective(change.connection, last)
         if undone == 0:
             raise SpecificationError("expected a change to take back, the library has none left; nothing was changed")
-        action = select(change.connection, "version", "id = :v", {"v": undone})[0][2]
-        detail |= {"to": undone - 1}
-        _return_to(change, undone - 1)
-    return Undone(change.version, undone - 1, action)
+        action = _version(change.connection, undone)[2]
+        to = _begin(change.connection, undone) - 1
+        detail |= {"to": to}
+        _return_to(change, to)
+    return Undone(change.version, to, action)
 
 
 def can_undo(store: Store) -> bool:
@@ -52,12 +53,26 @@ def can_undo(store: Store) -> bool:
 def _effective(connection: sqlite3.Connection, version: int) -> int:
     """The version whose change the library is at: that of the state that an undo returned to, else the version."""
     while version > 0:
-        row = select(connection, "version", "id = :v", {"v": version})[0]
+        row = _version(connection, version)
         to = parsed_column("version", row, "detail", dict).get("to")
         if row[2] != UNDO or not isinstance(to, int) or not 0 <= to < version:
             return version
         version = to
     return 0
+
+
+def _begin(connection: sqlite3.Connection, version: int) -> int:
+    """The first of the versions in a row that one call made."""
+    while version > 1:
+        row = _version(connection, version)
+        if row[2] == UNDO or parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
+            break
+        version -= 1
+    return version
+
+
+def _version(connection: sqlite3.Connection, version: int) -> Row:
+    return select(connection, "version", "id = :v", {"v": version})[0]
 
 
 def _return_to(change: Change, version: int) -> None:

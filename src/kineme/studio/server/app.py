@@ -24,6 +24,7 @@ from kineme.studio.server import (
 from kineme.studio.server.access import Guard
 from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
+from kineme.studio.server.live_sources import Sources
 from kineme.studio.server.refusals import answer_errors
 from kineme.studio.server.static_files import StaticFiles
 from kineme.studio.server.studio import Studio
@@ -86,6 +87,7 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
     changes = app.state.changes = Changes(app.state.studio)
+    app.state.sources = Sources()
     app.state.studio.warm_up()
     watching = asyncio.create_task(changes.watch())
     try:

@@ -1,4 +1,7 @@
-"""The websocket: samples in, what the movement is out, and word of every change of the library."""
+"""The websocket: samples in, what the movement is out, and word of every change of the library.
+
+Clients that watch are the pages: they are told of the movements of all others, the programs.
+"""
 
 from __future__ import annotations
 
@@ -13,22 +16,24 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from kineme.errors import KinemeError, TrajectoryError
 from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import LiveSession, parsed_samples
+from kineme.studio.server.live_sources import Follower, Source, Sources, parsed_name
 from kineme.studio.server.studio import Studio
 from kineme.validation import Array
 
 router = APIRouter()
 
 _WAITING = 64  # messages of one client that wait; it is not read on before
-_WORDS = '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true} or {"watch": true}'
+_PAUSE = 1 / 60  # seconds between what a client is told unasked; what comes meanwhile is told at once
+_WORDS = '{"samples": [[t, x, y, ...], ...]}, {"reset": true}, {"finish": true}, {"name": "..."} or {"watch": true}'
 
 
 @router.websocket("/api/live")
 async def live(socket: WebSocket) -> None:
-    """Recognize a movement while its samples arrive, and tell of changes."""
+    """Recognize a movement while its samples arrive, and tell of changes and of other programs' movements."""
     studio: Studio = socket.app.state.studio
     changes: Changes = socket.app.state.changes
     await socket.accept()
-    client = _Client(socket, studio)
+    client = _Client(socket, studio, socket.app.state.sources)
     changes.listen(client.tell_of)
     reading = asyncio.create_task(client.read())
     try:
@@ -41,10 +46,11 @@ async def live(socket: WebSocket) -> None:
 
 
 class _Told(NamedTuple):
-    """What a client sent: samples, a command, or what was wrong with it; `_END` at the end."""
+    """What a client sent: samples, a command, its name, or what was wrong with it; `_END` at the end."""
 
     samples: Array | None = None
     command: str | None = None
+    name: str | None = None
     wrong: str | None = None
 
 
@@ -54,31 +60,47 @@ _END = _Told()
 class _Client:
     """One websocket, with a task that reads and one that answers."""
 
-    def __init__(self, socket: WebSocket, studio: Studio) -> None:
+    def __init__(self, socket: WebSocket, studio: Studio, sources: Sources) -> None:
         self.socket, self.studio, self.session = socket, studio, LiveSession(studio)
+        self._sources = sources
+        self._source: Source | None = None  # of a program, once it has sent something
+        self._follower: Follower | None = None  # of a page
         self._waiting: asyncio.Queue[_Told] = asyncio.Queue(_WAITING)
         self._held: _Told | None = None
         self._turn = asyncio.Lock()
-        self._version = -1  # of the library, that the client is to know
+        self._version = self._told = -1  # of the library, that the client is to know, and that it knows
         self._telling: asyncio.Task[None] | None = None
 
     def tell_of(self, version: int) -> None:
         """Send the version that the library has now, without waiting for a client that does not read."""
         self._version = version
+        self._tell_soon()
+
+    def _tell_soon(self) -> None:
         if self._telling is None or self._telling.done():
             self._telling = asyncio.create_task(self._tell())
 
     def leave(self) -> None:
-        """Tell nothing more."""
+        """Tell nothing more, and be shown no more."""
+        self._sources.leave(self._tell_soon)
+        if self._source is not None:
+            self._sources.remove(self._source)
         if self._telling is not None:
             self._telling.cancel()
 
     async def _tell(self) -> None:
-        told = -1
         with suppress(WebSocketDisconnect, RuntimeError):
-            while told != self._version:
-                told = self._version
-                await self._send({"changed": told})
+            while news := self._news():
+                for one in news:
+                    await self._send(one)
+                await asyncio.sleep(_PAUSE)
+
+    def _news(self) -> list[dict[str, Any]]:
+        """What the client is to be told that it did not ask for."""
+        changed = [] if self._told == self._version else [{"changed": self._version}]
+        self._told = self._version
+        shown = [] if self._follower is None else self._follower.news()
+        return [*changed, *({"source": one} for one in shown)]
 
     async def read(self) -> None:
         """Queue what arrives, and an empty one at the end."""
@@ -113,13 +135,49 @@ class _Client:
 
     async def _answer(self, told: _Told) -> dict[str, Any] | None:
         run = asyncio.get_running_loop().run_in_executor
+        source = self._shown(told)
         if told.samples is not None:
-            return {"state": await run(self.studio.live, self.session.update, told.samples)}
+            state = await run(self.studio.live, self.session.update, told.samples)
+            if source is not None:
+                source.update(told.samples, state)
+            return {"state": state}
         if told.command == "finish":
-            return {"answer": await run(self.studio.live, self.session.finish)}
+            return await self._finish(source)
         if told.command == "reset":
             self.session.reset()
+            if source is not None:
+                source.reset()
+        elif told.command == "watch":
+            self._watch()
+        elif told.name is not None and source is not None:
+            source.rename(told.name)
         return None if told.wrong is None else {"error": told.wrong}
+
+    async def _finish(self, source: Source | None) -> dict[str, Any]:
+        try:
+            run = asyncio.get_running_loop().run_in_executor
+            ended: dict[str, Any] = {"answer": await run(self.studio.live, self.session.finish)}
+        except KinemeError as error:
+            ended = {"error": str(error)}
+        if source is not None:
+            source.end(ended)
+        return ended
+
+    def _shown(self, told: _Told) -> Source | None:
+        """What the pages are shown of this client, if it is a program."""
+        if self._source is None and self._follower is None and (told.samples is not None or told.name is not None):
+            self._source = self._sources.add()
+        return self._source
+
+    def _watch(self) -> None:
+        """It is a page: it is shown the movements of programs, and its own are not shown to others."""
+        if self._follower is None:
+            self._follower = Follower(self._sources)
+            self._sources.listen(self._tell_soon)
+            self._tell_soon()
+        if self._source is not None:
+            self._sources.remove(self._source)
+            self._source = None
 
     async def _send(self, message: dict[str, Any]) -> None:
         text = json.dumps(message, allow_nan=False, ensure_ascii=False)
@@ -132,11 +190,13 @@ def _parsed(message: Any) -> _Told:
         told = json.loads(message.get("text") or "")
     except (ValueError, RecursionError):
         return _Told(wrong=f"expected JSON: {_WORDS}; got something else")
-    if isinstance(told, dict) and "samples" in told:
-        try:
+    try:
+        if isinstance(told, dict) and "samples" in told:
             return _Told(samples=parsed_samples(told["samples"]))
-        except TrajectoryError as error:
-            return _Told(wrong=str(error))
+        if isinstance(told, dict) and "name" in told:
+            return _Told(name=parsed_name(told["name"]))
+    except TrajectoryError as error:
+        return _Told(wrong=str(error))
     for command in ("finish", "reset", "watch"):
         if isinstance(told, dict) and told.get(command) is True:
             return _Told(command=command)

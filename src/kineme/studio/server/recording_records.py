@@ -89,3 +89,9 @@ class SpottedOut(BaseModel):
 
     spans: list[SpannedOut]
     rests: list[RestOut]
+
+
+class SearchedOut(BaseModel):
+    """How much of a recording is searched, from 0 to 1; null where nothing is searched."""
+
+    share: float | None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Header, Request
-from starlette.concurrency import run_in_threadpool
 
 from kineme.errors import SpecificationError
 from kineme.files.annotations.label_table import LabelRow
@@ -20,9 +20,18 @@ from kineme.movements.channels.channel import recorded_names
 from kineme.movements.trajectories.movements import axis_names
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.plain import numbers
-from kineme.studio.server.recording_records import LearnSpans, Span, SpottedOut, Spotting, UploadOut
+from kineme.studio.server.recording_records import (
+    ChannelsAsked,
+    LearnSpans,
+    SearchedOut,
+    Span,
+    SpottedOut,
+    Spotting,
+    UploadOut,
+)
 from kineme.studio.server.records import Learned
 from kineme.studio.server.studio import Reads, Studio, Writes
+from kineme.studio.server.work import Work, while_wanted
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
@@ -40,8 +49,9 @@ async def send(
 ) -> dict[str, Any]:
     """The bytes of one file of any format; ``X-File-Name`` is its name, percent-encoded. The last eight are kept."""
     key = await studio.uploads.receive(x_file_name, request.stream())
+    work = Work()
     async with studio.uploads.readers:
-        read = await run_in_threadpool(studio.uploads.recordings, key)
+        read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
     plots = [_plot(read, k) for k in range(len(read))]
     return {
         "recording": key,
@@ -53,28 +63,47 @@ async def send(
 
 
 @router.post("/{key}/spotted", response_model=SpottedOut, summary="What happens when in a recording")
-def spotted(studio: Reads, key: str, asked: Spotting) -> dict[str, Any]:
-    """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample."""
-    one = _one(studio, key, asked.table, asked.channels)
-    found = annotate(studio.library.store, one, asked.error_rate)
+async def spotted(studio: Reads, request: Request, key: str, asked: Spotting) -> dict[str, Any]:
+    """Movements of the library's symbols, and motion that is like none; times are seconds since the first sample.
+
+    A search ends where the client that asked for it goes, and where another one of the same recording begins.
+    """
+    work = studio.works.begin(key)
+    try:
+        return await while_wanted(request, studio.long, work, lambda: _spotted(studio, key, asked, work))
+    finally:
+        studio.works.end(key, work)
+
+
+@router.get("/{key}/spotted", response_model=SearchedOut, summary="How much of a recording is searched")
+def searched(studio: Reads, key: str) -> dict[str, Any]:
+    """The share that is done; null where nothing is searched."""
+    return {"share": studio.works.share(key)}
+
+
+def _spotted(studio: Studio, key: str, asked: Spotting, work: Work) -> dict[str, Any]:
+    work.check()  # it may have waited for others
+    one = _one(studio, key, asked, work.check)
+    duration = float(one.demonstrations.durations[0])
+    found = annotate(studio.library.store, one, asked.error_rate, lambda done: work.tell(done / duration))
     if found.problems:
         raise SpecificationError(found.problems[0].what)
     spans = [
         {"begin": each.span[0], "end": each.span[1], "label": each.symbol, "p": numbers(each.p_value)}
         for each in found.annotations
     ]
-    return {"spans": spans, "rests": _rests(spans, float(one.demonstrations.durations[0]))}
+    return {"spans": spans, "rests": _rests(spans, duration)}
 
 
 @router.post("/{key}/learn", response_model=Learned, summary="Learn stretches of a recording")
 def learn(studio: Writes, key: str, asked: LearnSpans) -> dict[str, Any]:
     """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one."""
-    one = _one(studio, key, asked.table, asked.channels)
+    one = _one(studio, key, asked)
+    columns = _columns_of(studio.uploads.recordings(key), asked.channels) if asked.channels else None
     pieces = labeled_pieces(
         one, LabelTable("of the spans", tuple(map(_row, range(len(asked.spans)), asked.spans)), True)
     )
-    options = {"columns": list(asked.channels)} if asked.channels else None
-    report = learn_recordings(studio.library.store, pieces, options)
+    report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
 
@@ -82,12 +111,14 @@ def _row(k: int, span: Span) -> LabelRow:
     return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
 
 
-def _one(studio: Studio, key: str, table: str | None, channels: list[str] | None) -> Recordings:
+def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = lambda: None) -> Recordings:
     """One table of a recording, in the columns that are asked for, or those of the library where it has them."""
-    read = studio.uploads.recordings(key, channels or ())
+    read = studio.uploads.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
-    if not channels and ours and list(ours) != _columns(read) and set(ours) <= set(_columns(read)):
-        read = studio.uploads.recordings(key, ours)
+    wanted = _columns_of(read, asked.channels) if asked.channels else list(ours)
+    if wanted != _columns(read) and (asked.channels or (ours and set(ours) <= set(_columns(read)))):
+        read = studio.uploads.recordings(key, wanted, check)
+    table = asked.table
     names = [_name(read, k) for k in range(len(read))]
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
@@ -102,6 +133,12 @@ def _name(read: Recordings, k: int) -> str:
 def _columns(read: Recordings) -> list[str]:
     demos = read.demonstrations
     return list(axis_names(demos.n_dims) if demos.channels is None else recorded_names(demos.channels))
+
+
+def _columns_of(read: Recordings, names: Sequence[str]) -> list[str]:
+    """The columns of channels, such as the four of an orientation; other names are those of columns."""
+    known = {one.name: one.columns for one in read.demonstrations.channels or ()}
+    return [column for name in names for column in known.get(name, (name,))]
 
 
 def _table(read: Recordings, k: int) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from starlette.types import Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.storage.sqlite_errors import BusyError
+from kineme.studio.server.work import StoppedError
 
 _LOG = logging.getLogger("kineme.studio")
 
@@ -58,6 +59,9 @@ def answer_errors(app: FastAPI) -> None:
     async def forbidden(_: Request, error: Any) -> JSONResponse:
         return answer(403, str(error))
 
+    async def stopped(_: Request, __: Any) -> JSONResponse:
+        return answer(499, "expected somebody to wait for the answer; it was stopped")
+
     async def invalid(_: Request, error: Any) -> JSONResponse:
         return answer(422, _first(error))
 
@@ -76,6 +80,7 @@ def answer_errors(app: FastAPI) -> None:
         (MissingError, missing),
         (ConflictError, conflict),
         (PermissionError, forbidden),
+        (StoppedError, stopped),
         (RequestValidationError, invalid),
         (ClientDisconnect, gone),
         (HTTPException, other),

@@ -19,12 +19,14 @@ from kineme.library.storage.symbols import Symbol
 from kineme.recognition.early.stream import Live
 from kineme.studio.server.refusals import ConflictError, MissingError
 from kineme.studio.server.uploads import Uploads
+from kineme.studio.server.work import Works
 from kineme.studio.snapshot.early import DRAWN
 
 Made = TypeVar("Made")
 
 _WRITERS = 4  # changes that are worked on at once; each holds a thread until it has its turn
 _KEPT = 200  # things of one kind
+_LONG = 4  # files that are read or searched at once; others wait
 
 
 class Shown(NamedTuple):
@@ -52,13 +54,17 @@ class Studio:
         self.uploads = Uploads()
         self.writers = asyncio.Semaphore(_WRITERS)
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
+        self.long = ThreadPoolExecutor(_LONG, "kineme-long")
+        self.works = Works()
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
 
     def close(self) -> None:
         """Close the library, once no thread reads or writes it, and delete what was sent."""
-        self.live.shutdown(wait=False, cancel_futures=True)
+        self.works.close()
+        for pool in (self.live, self.long):
+            pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
 

@@ -10,7 +10,9 @@ import secrets
 import shutil
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Sequence
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 from urllib.parse import unquote
@@ -24,9 +26,14 @@ from kineme.studio.server.refusals import MissingError
 SECONDS = 60.0  # to read one file
 BYTES = 2 * 2**30  # of memory for it
 HELD = 2**30  # bytes of what was read from all files
+PERIOD = 0.2  # seconds between looks whether anybody waits
 _READERS = 2  # files that are read at once
 _KEPT = 8  # files
 _LONGEST = 200  # bytes of a name
+
+
+def _go_on() -> None:
+    """Whoever asked still waits."""
 
 
 class Uploads:
@@ -73,8 +80,10 @@ class Uploads:
                 self._forget(old)
         return key
 
-    def recordings(self, key: str, columns: Sequence[str] = ()) -> Recordings:
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = _go_on) -> Recordings:
         """What a file holds, in these columns or in those that are found.
+
+        `check` is called again and again, and raises where nobody waits any more.
 
         Raises
         ------
@@ -90,7 +99,7 @@ class Uploads:
             )
         read = self._read.get((key, asked))
         if read is None:
-            read = self._read_apart(path, {"columns": list(asked)} if asked else {})
+            read = self._read_apart(path, {"columns": list(asked)} if asked else {}, check)
             with self._turn:
                 if key in self._kept:
                     self._hold((key, asked), read)
@@ -107,31 +116,47 @@ class Uploads:
         for which in [one for one in self._read if one[0] == key]:
             self._read.pop(which)
 
-    def _read_apart(self, path: Path, options: dict[str, object]) -> Recordings:
+    def _read_apart(self, path: Path, options: dict[str, object], check: Callable[[], object]) -> Recordings:
         result = path.with_name(f"{secrets.token_hex(4)}.npz")
         command = [sys.executable, "-m", "kineme.studio.server.read_upload", str(path), str(result)]
         command += [str(self.memory), str(math.ceil(2 * self.seconds))]
         try:
-            done = subprocess.run(
-                command, input=json.dumps(options), capture_output=True, text=True, timeout=self.seconds, check=False
-            )
-            if done.returncode == REFUSED:
+            code = _run(command, json.dumps(options), self.seconds, check)
+            if code == REFUSED:
                 raise DataError(result.read_text(encoding="utf-8").replace(f"{path.parent}/", ""))
-            if done.returncode:
-                raise DataError(f"expected a recording, reading {path.name} ended with code {done.returncode}")
+            if code:
+                raise DataError(f"expected a recording, reading {path.name} ended with code {code}")
             if result.stat().st_size > self.held:
                 raise DataError(
                     f"expected a recording of at most {self.held / 2**20:.0f} MB of numbers, {path.name} holds more; "
                     "send a part of it, or learn it with kineme learn"
                 )
             return load(result)
-        except subprocess.TimeoutExpired:
+        except TimeoutError:
             raise DataError(
                 f"expected a recording that is read within {self.seconds:g} s, {path.name} takes longer; "
                 "send a part of it, or learn it with kineme learn"
             ) from None
         finally:
             result.unlink(missing_ok=True)
+
+
+def _run(command: Sequence[str], given: str, seconds: float, check: Callable[[], object]) -> int:
+    """The exit code of a child process; it is ended after so many seconds (TimeoutError), and where `check` raises."""
+    end, pipe = time.monotonic() + seconds, subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as child:
+        try:
+            told: str | None = given
+            while True:
+                with suppress(subprocess.TimeoutExpired):
+                    child.communicate(told, timeout=min(PERIOD, max(end - time.monotonic(), 0.0)))
+                    return child.returncode
+                told = None  # once: what was not written yet is kept
+                check()
+                if time.monotonic() >= end:
+                    raise TimeoutError
+        finally:
+            child.kill()  # if it has not ended
 
 
 def _bytes(read: Recordings) -> int:

@@ -21,6 +21,12 @@ from kineme.recognition.known_classes import KnownClasses
 from kineme.studio.snapshot.snapshot import Snapshot
 from kineme.validation import Array
 
+#: What to do about a library whose recognizer the runtime does not have.
+_AGAIN = (
+    "learn the same movements in another library: other = ActionLibrary(folder, create=True, recognizer=Recognizer()), "
+    "then other.learn(library.movements(symbol.name)) for every symbol in library.symbols()"
+)
+
 
 def recognition_parts(known: KnownClasses) -> Snapshot:
     """Header and arrays of what recognizes movements.
@@ -110,8 +116,7 @@ def rotation_rule(procrustes: Procrustes) -> dict[str, Any]:
     if d == 3 and prior is None and procrustes.max_angle > 0:
         raise SpecificationError(
             "expected movements in space to be compared under a rotation prior, with max_angle=0 or with max_angle=pi, "
-            f"got max_angle={procrustes.max_angle:.3g}: the page has no limit in between; make a library with one of "
-            "these"
+            f"got max_angle={procrustes.max_angle:.3g}: the page has no limit in between; {_AGAIN}"
         )
     matrix = None if prior is None else prior.matrix(d).ravel().tolist()
     return {"n_dims": d, "max_angle": float(procrustes.max_angle), "prior": matrix}
@@ -139,7 +144,7 @@ def _classifier(classifier: Classifier) -> dict[str, Any]:
             return {"classifier": name}
     raise SpecificationError(
         "expected the classifier to be one of auto, nearest-each, nearest and prototype, got svm, which the page does "
-        "not have; make a library with one of the others"
+        f"not have; {_AGAIN}"
     )
 
 

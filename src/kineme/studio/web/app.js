@@ -38,6 +38,7 @@ const draw = startDraw((message) => live.send(message));
 const live = new Live({
   state: draw.state,
   answer: draw.answer,
+  source: draw.source,
   error: (text) => draw.error(text) || say(text, { failed: true }),
   changed: (version) => version !== library().version && tried(refresh),
   here: () => (connected(true), draw.renewed(), tried(refresh)),

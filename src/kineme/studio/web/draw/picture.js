@@ -1,5 +1,6 @@
 // The drawing on its canvas: ink, the predicted rest, the arrival, the pen of the keyboard.
 import { Board, color } from "../parts/canvas.js";
+import { ground } from "../parts/ground.js";
 import { line, mark } from "../parts/lines.js";
 
 const FINGER = 10; // radius of the replayed point [px]
@@ -11,19 +12,34 @@ export class Picture {
     this.rest = [];
     this.pen = null;
     this.replayed = null;
+    /** @type {import("./frame.js").Frame|null} Of a movement that was not drawn here. */
+    this.frame = null;
     this.board = new Board(canvas, () => this.paint());
+    this.board.resized = () => this.frame?.include([], this.board);
   }
 
-  /** @param {number[]} sample Of [t, x, y] or [x, y], the last two. */
-  pixel(sample) {
-    const [x, y] = sample.slice(-2);
-    return [x * this.board.height, (1 - y) * this.board.height];
+  /** @param {number[]} point */
+  pixel(point) {
+    if (this.frame) return this.frame.camera.toScreen(point);
+    return [point[0] * this.board.height, (1 - point[1]) * this.board.height];
+  }
+
+  /** Whether what is shown is in space. */
+  get turns() {
+    return this.frame !== null && this.frame.turns;
+  }
+
+  /** @param {number} dx Pixels. @param {number} dy */
+  turn(dx, dy) {
+    this.frame?.camera.turn(dx, dy);
+    this.board.draw();
   }
 
   paint() {
     const { context } = this.board;
-    const ink = this.ink.map((one) => this.pixel(one));
-    const rest = this.rest.map(([x, y]) => this.pixel([x, y]));
+    const ink = this.ink.map((one) => this.pixel(one.slice(1)));
+    const rest = this.rest.map((one) => this.pixel(one));
+    if (this.turns) ground(context, this.frame.camera, this.frame.low, this.frame.high);
     if (rest.length && ink.length) line(context, [ink[ink.length - 1], ...rest], { color: color("--predicted"), width: 3, dash: [2, 9] });
     line(context, ink, { color: color("--ink"), width: 5, alpha: this.replayed === null ? 1 : 0.35 });
     if (ink.length) mark(context, ink[0], "dot", 6, color("--ink"));

@@ -6,10 +6,14 @@ const USUAL = 0.55; // of the canvas's height, what people draw
 /** The larger side of a path. @param {number[][]} path */
 const side = (path) => Math.max(...[0, 1].map((k) => Math.max(...path.map((point) => point[k] ?? 0)) - Math.min(...path.map((point) => point[k] ?? 0))));
 
+/** @returns {number|null} Larger side of a movement of the library, a usual one. */
+export function usualSide() {
+  const sides = library().symbols.filter((/** @type {any} */ one) => one.path?.length).map((/** @type {any} */ one) => side(one.path)).filter((/** @type {number} */ size) => size > 0);
+  return sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1] ?? null;
+}
+
 /** @returns {number} Height of the canvas in the units of the library: a power of ten, so that it stays as the library grows. */
 export function canvasHeight() {
-  const sides = library().symbols.filter((/** @type {any} */ one) => one.path?.length).map((/** @type {any} */ one) => side(one.path)).filter((/** @type {number} */ size) => size > 0);
-  if (!sides.length) return 1;
-  const middle = sides.sort((/** @type {number} */ a, /** @type {number} */ b) => a - b)[sides.length >> 1];
-  return 10 ** Math.round(Math.log10(middle / USUAL));
+  const middle = usualSide();
+  return middle === null ? 1 : 10 ** Math.round(Math.log10(middle / USUAL));
 }

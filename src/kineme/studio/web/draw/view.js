@@ -3,9 +3,11 @@ import { post } from "../parts/api.js";
 import { byId } from "../parts/elements.js";
 import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
+import { followTurns } from "../parts/turning.js";
 import { currentView, show } from "../parts/views.js";
 import { chooseToMove } from "../move/chosen.js";
 import { AnswerPanel } from "./answer_panel.js";
+import { Follow } from "./follow.js";
 import { followKeys } from "./keyboard_pen.js";
 import { describeLiveSource } from "./live_source.js";
 import { startNaming } from "./naming.js";
@@ -38,6 +40,7 @@ class Draw {
     this.height = 1;
     this.label = null;
     this.waits = false;
+    this.follow = new Follow(this);
     this.naming = startNaming({ drawn: () => this.whole, learned: (name) => this.learned(name) });
     this.listen();
   }
@@ -51,6 +54,7 @@ class Draw {
     };
     followPointer(byId("draw-canvas"), hear);
     followKeys(byId("draw-canvas"), hear);
+    followTurns(byId("draw-canvas"), () => this.picture.turns, (dx, dy) => this.picture.turn(dx, dy));
     byId("draw-clear").addEventListener("click", () => this.clear());
     byId("draw-replay").addEventListener("click", () => this.picture.replay(() => {}));
     byId("draw-move").addEventListener("click", () => this.move());
@@ -67,7 +71,7 @@ class Draw {
     byId("draw-empty").hidden = this.picture.ink.length > 0;
     byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
-      ? "This library holds movements that a mouse cannot draw. Send samples from a program instead."
+      ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or drop a recording in Recordings."
       : symbols.length || readOnly
         ? "In one stroke, with mouse, pen or finger. What it is appears while you draw."
         : "Draw a movement in one stroke, then give it a name. One drawing is enough to be recognized again.";
@@ -77,7 +81,7 @@ class Draw {
 
   /** @param {string} kind */
   begins(kind) {
-    if (!takesDrawings()) return false;
+    if (!takesDrawings() || this.picture.turns) return false;
     this.clear();
     this.drawing = true;
     this.kind = kind;
@@ -104,9 +108,18 @@ class Draw {
     if (ink.length < LEAST) return this.panel.words("Too short", "–", "Press, draw, and let go at the end.", "open");
     this.whole = { times: ink.map(([t]) => t), positions: ink.map(([, ...point]) => inLibrary(point, this.height)) };
     this.naming.allow(true);
-    if (!library().symbols.length) return this.isNew();
+    if (!library().symbols.length) return this.answered(null);
     this.waits = true;
     if (!this.sending.finish()) this.askOnce();
+  }
+
+  /** @param {any} answer To the whole movement; null where there is too little to compare with. */
+  answered(answer) {
+    this.waits = false;
+    this.naming.allow(true);
+    if (answer !== null) this.show(answer);
+    else if (library().symbols.length) this.cannotCompare();
+    else this.isNew();
   }
 
   /** There is nothing to compare with. */
@@ -131,7 +144,7 @@ class Draw {
   async askOnce() {
     const asked = this.whole;
     const answer = await tried(() => post("/api/recognize", asked));
-    if (answer && asked === this.whole) this.show(answer);
+    if (answer && asked === this.whole) this.answered(answer);
   }
 
   /** @param {any} state Of the server, while drawing. */
@@ -145,13 +158,11 @@ class Draw {
 
   /** @param {any} answer Of the websocket, to the whole movement. */
   answer(answer) {
-    if (this.sending.answered() && this.waits) this.show(answer);
+    if (this.sending.answered() && this.waits) this.answered(answer);
   }
 
   /** @param {any} answer */
   show(answer) {
-    this.waits = false;
-    if (answer === null) return this.cannotCompare();
     this.panel.final(answer);
     this.label = answer.label;
     byId("draw-move").disabled = answer.label === null;
@@ -172,9 +183,9 @@ class Draw {
     return about;
   }
 
-  /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched. */
+  /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched, as while programs move. */
   focusName() {
-    if (this.kind !== "touch" && currentView() === "draw") this.naming.focus();
+    if (!["touch", "program"].includes(this.kind) && currentView() === "draw") this.naming.focus();
   }
 
   /** @param {string|null} name */
@@ -186,6 +197,7 @@ class Draw {
     byId("draw-move").disabled = name === null;
     const alone = library().symbols.length < 2;
     if (name !== null) this.panel.words("Learned", name, alone ? "Now draw something else and name it: two names can be told apart." : "Draw it again, anywhere and in any size.", "known");
+    byId("sources").classList.remove("waits");
     byId("draw-canvas").focus({ preventScroll: true });
   }
 
@@ -196,6 +208,8 @@ class Draw {
   }
 
   clear() {
+    this.follow.leave();
+    byId("sources").classList.remove("waits");
     Object.assign(this.picture, { ink: [], rest: [], replayed: null });
     this.picture.board.draw();
     this.whole = null;
@@ -213,5 +227,6 @@ class Draw {
 /** @param {(message: any) => boolean} send @returns {any} What hears the server. */
 export function startDraw(send) {
   const draw = new Draw(send);
-  return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), renewed: () => draw.sending.renewed() };
+  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed());
+  return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
 }

@@ -2,6 +2,8 @@
 import { Board, color } from "../parts/canvas.js";
 import { line, mark } from "../parts/lines.js";
 import { byId } from "../parts/elements.js";
+import { ground } from "../parts/ground.js";
+import { followTurns } from "../parts/turning.js";
 import { extent } from "./plan.js";
 
 const LEGEND_ROOM = 40; // at the lower edge [px]
@@ -16,8 +18,7 @@ export class MovePicture {
     this.board = new Board(byId("move-canvas"), () => this.paint());
     this.board.resized = () => (this.fit(), turned());
     this.turned = turned;
-    this.board.canvas.addEventListener("pointerdown", (event) => this.grab(event));
-    this.board.canvas.addEventListener("keydown", (event) => this.key(event));
+    followTurns(this.board.canvas, () => !this.camera.flat, (dx, dy) => this.turn(dx, dy));
   }
 
   /** Points that must be in the picture: those one can take hold of, and paths unless they run far away. */
@@ -79,10 +80,7 @@ export class MovePicture {
     const { path } = this.plan;
     const low = [0, 1, 2].map((k) => Math.min(...path.map((/** @type {number[]} */ p) => p[k])));
     const high = [0, 1, 2].map((k) => Math.max(...path.map((/** @type {number[]} */ p) => p[k])));
-    for (let k = 0; k <= 6; k += 1) {
-      const [x, y] = [0, 1].map((axis) => low[axis] + ((high[axis] - low[axis]) * k) / 6);
-      for (const ends of [[[x, low[1]], [x, high[1]]], [[low[0], y], [high[0], y]]]) line(this.board.context, ends.map(([a, b]) => this.camera.toScreen([a, b, low[2]])), { color: color("--line"), width: 1 });
-    }
+    ground(this.board.context, this.camera, low, high);
   }
 
   /** Where a path is now. @param {any} path */
@@ -93,23 +91,6 @@ export class MovePicture {
     const [before, after] = [path.times[next - 1] - path.times[0], path.times[next] - path.times[0]];
     const share = (this.time - before) / (after - before);
     return path.positions[next].map((/** @type {number} */ value, /** @type {number} */ k) => path.positions[next - 1][k] + share * (value - path.positions[next - 1][k]));
-  }
-
-  /** @param {PointerEvent} event */
-  grab(event) {
-    if (this.camera.flat || event.button !== 0) return;
-    this.board.canvas.setPointerCapture(event.pointerId);
-    const go = (/** @type {PointerEvent} */ now) => this.turn(now.movementX, now.movementY);
-    this.board.canvas.addEventListener("pointermove", go);
-    this.board.canvas.addEventListener("lostpointercapture", () => this.board.canvas.removeEventListener("pointermove", go), { once: true });
-  }
-
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    const step = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] }[event.key];
-    if (!step || this.camera.flat) return;
-    event.preventDefault();
-    this.turn(step[0], step[1]);
   }
 
   turn(/** @type {number} */ dx, /** @type {number} */ dy) {

@@ -1,5 +1,5 @@
 // Recordings: a file, its channels, what was found in it, corrected and learned.
-import { post } from "../parts/api.js";
+import { get, post } from "../parts/api.js";
 import { learnSpans } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
@@ -10,16 +10,18 @@ import { markRow, showSpans } from "./spans.js";
 import { COLORS, Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
+const ASKED = 400; // how often it is asked how much is searched [ms]
 
 class Recordings {
   constructor() {
     this.read = null;
-    this.looking = false;
+    /** @type {AbortController|null} Of the search that is under way. */
+    this.search = null;
     const page = { choose: (/** @type {number} */ k) => this.choose(k), changed: () => this.changed() };
     this.page = page;
     this.timeline = new Timeline(page);
     startDropping((recording, name) => this.open(recording, name));
-    byId("spot").addEventListener("click", () => this.spot());
+    byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
     for (const [id, factor] of /** @type {[string, number][]} */ ([["zoom-in", 0.6], ["zoom-out", 1 / 0.6]])) byId(id).addEventListener("click", () => this.timeline.zoom(factor));
@@ -30,6 +32,8 @@ class Recordings {
 
   /** @param {any} recording @param {string} name */
   open(recording, name) {
+    this.search?.abort();
+    this.over("");
     this.read = recording;
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
@@ -85,19 +89,33 @@ class Recordings {
   }
 
   async spot() {
-    this.looking = true;
+    const path = `/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`;
+    const search = (this.search = new AbortController());
     this.allow();
     byId("spans-state").textContent = "Looking …";
-    const answer = await tried(() => post(`/api/recordings/${encodeURIComponent(this.read.recording)}/spotted`, this.body()));
-    this.looking = false;
-    this.allow();
-    byId("spans-state").textContent = "";
-    if (!answer) return;
+    const timer = setInterval(() => this.tell(path, search), ASKED);
+    const answer = await tried(() => post(path, this.body(), search.signal));
+    clearInterval(timer);
+    if (this.search === search) this.over(search.signal.aborted ? "Canceled; nothing was changed." : "");
+    if (!answer || search.signal.aborted) return;
     this.timeline.spans = answer.spans;
     this.choose(-1);
     this.changed();
     const known = answer.spans.filter((/** @type {any} */ one) => one.label !== null).length;
     byId("spans-state").textContent = `${counted(known, "known movement")}, ${answer.spans.length - known} unknown.${answer.spans.length ? " Choose one to drag its edges." : ""}`;
+  }
+
+  /** How much is searched. @param {string} path @param {AbortController} search */
+  async tell(path, search) {
+    const told = await get(path).catch(() => null);
+    if (this.search === search && told?.share) byId("spans-state").textContent = `Looking … ${Math.floor(100 * told.share)} %`;
+  }
+
+  /** @param {string} text */
+  over(text) {
+    this.search = null;
+    this.allow();
+    byId("spans-state").textContent = text;
   }
 
   /** A span in the middle of what is shown; the first one of a short recording is all of it. */
@@ -130,7 +148,8 @@ class Recordings {
     const names = new Set(this.chosenChannels());
     const wrong = mismatch(table.channels.filter((/** @type {any} */ one) => names.has(one.name)), library());
     byId("channels-note").textContent = wrong;
-    byId("spot").disabled = wrong !== "" || this.looking;
+    byId("spot").textContent = this.search ? "Cancel" : "Find movements";
+    byId("spot").disabled = wrong !== "" && !this.search;
     byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((one) => one.label !== null);
   }
 

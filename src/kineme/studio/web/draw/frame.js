@@ -1,0 +1,40 @@
+// What the canvas shows of a movement that was not drawn on it: wide enough from the start, wider when it leaves.
+import { Camera } from "../parts/camera.js";
+
+const WIDER = 0.25; // of the size, on the side on which it leaves
+
+export class Frame {
+  /** @param {number} size Of a usual movement. */
+  constructor(size) {
+    this.camera = new Camera();
+    this.size = size;
+    /** @type {number[]} */
+    this.low = [];
+    /** @type {number[]} */
+    this.high = [];
+  }
+
+  /** Whether the movement is in space and can be turned. */
+  get turns() {
+    return !this.camera.flat;
+  }
+
+  /** @param {number[][]} points That are to be seen. @param {import("../parts/canvas.js").Board} board */
+  include(points, board) {
+    for (const point of points) this.grow(point.slice(0, 3));
+    if (this.low.length) this.camera.fit([this.low, this.high], board.width, board.height);
+  }
+
+  /** @param {number[]} point */
+  grow(point) {
+    if (!this.low.length) {
+      this.low = point.map((value) => value - this.size / 2);
+      this.high = point.map((value) => value + this.size / 2);
+    }
+    point.forEach((value, k) => {
+      const more = WIDER * (this.high[k] - this.low[k]);
+      if (value < this.low[k]) this.low[k] = value - more;
+      if (value > this.high[k]) this.high[k] = value + more;
+    });
+  }
+}
