@@ -58,9 +58,10 @@ def samples(k, seed=99):
 class Running:
     """A studio in a process of its own, as the command starts it."""
 
-    def __init__(self, folder, *options):
+    def __init__(self, folder, *options, program=None):
         environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "KINEME_STUDIO_TOKEN": TOKEN}
-        command = [sys.executable, "-m", "kineme", "studio", "-l", str(folder), "--no-open", *map(str, options)]
+        kineme = ["-m", "kineme"] if program is None else ["-c", program]
+        command = [sys.executable, *kineme, "studio", "-l", str(folder), "--no-open", *map(str, options)]
         self.process = subprocess.Popen(
             command,
             stdout=subprocess.PIPE,
@@ -102,8 +103,8 @@ class Served:
 
 
 @contextmanager
-def running(folder, *options):
-    one = Running(folder, *options)
+def running(folder, *options, program=None):
+    one = Running(folder, *options, program=program)
     try:
         yield one
     finally:

@@ -264,3 +264,22 @@ def test_on_a_network_and_for_reading_only_it_says_so_and_leaves_nothing_with_a_
     _, _, err = one.end(signal.SIGHUP)
     assert "give it to those you trust" in err
     assert not list(tmp_path.glob("kineme-studio-*"))
+
+
+@pytest.mark.parametrize("busy", ["_prepare", "close"])
+def test_it_ends_soon_whatever_still_runs(folder, busy):
+    """Recognition is being compiled, by threads that Python joins, or closing waits: neither holds it up for long."""
+    program = f"""
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from kineme.cli import main
+from kineme.studio.server.studio import Studio
+
+Studio.{busy} = lambda self: ThreadPoolExecutor(1).submit(time.sleep, 60).result()
+main()
+"""
+    with running(folder, program=program) as one:
+        began = time.monotonic()
+        assert one.end()[0] == 0
+    assert time.monotonic() - began < 15

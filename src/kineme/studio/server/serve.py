@@ -13,9 +13,13 @@ import socket
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from threading import Timer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kineme.errors import DataError, SpecificationError
+
+if TYPE_CHECKING:
+    from kineme.studio.server.studio import Studio
 
 LOOPBACK = "127.0.0.1"
 PORT = 8420  # unless it is taken
@@ -60,8 +64,11 @@ def serve(options: Options, ready: Callable[[str], object]) -> None:
         hosts = () if is_loopback(options.host) else own_names(options.host)
         config = config_of(create_app(options.folder, token, read_only=options.read_only, hosts=hosts))
         address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/?token={token}"
+        server = _server(config, lambda: ready(address))
         with suppress(KeyboardInterrupt):
-            _server(config, lambda: ready(address)).run(sockets=[listening])
+            server.run(sockets=[listening])
+        config.app.state.studio.join()
+        server.last_resort.cancel()
 
 
 def config_of(app: Any) -> Any:
@@ -74,6 +81,7 @@ def config_of(app: Any) -> Any:
         access_log=False,
         ws="websockets-sansio",
         ws_max_size=_MESSAGE,
+        ws_per_message_deflate=False,  # it takes longer than it saves, and a small message can expand to a large one
         server_header=False,
         proxy_headers=False,
         timeout_graceful_shutdown=1,
@@ -93,20 +101,25 @@ def _server(config: Any, ready: Callable[[], object]) -> Any:
     import uvicorn
 
     class Server(uvicorn.Server):
+        last_resort = Timer(_GRACE, _end_at_once, [config.app.state.studio])  # also where the event loop itself waits
+
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
             _end_with_the_terminal(self)
             ready()
 
         async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-            try:
-                async with asyncio.timeout(_GRACE):
-                    await super().shutdown(sockets)
-            except TimeoutError:
-                config.app.state.studio.uploads.close()
-                os._exit(0)  # a thread that computes cannot be ended otherwise; the library loses nothing
+            self.last_resort.daemon = True
+            self.last_resort.start()
+            await super().shutdown(sockets)
 
     return Server(config)
+
+
+def _end_at_once(studio: Studio) -> None:
+    """End the process: a thread that computes cannot be ended otherwise, and the library loses nothing."""
+    studio.uploads.close()
+    os._exit(0)
 
 
 def _end_with_the_terminal(server: Any) -> None:

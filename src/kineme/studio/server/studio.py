@@ -56,6 +56,7 @@ class Studio:
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
         self.works = Works()
+        self._warming: list[Thread] = []
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
@@ -67,6 +68,13 @@ class Studio:
             pool.shutdown(wait=False, cancel_futures=True)
         self.library.close()
         self.uploads.close()
+
+    def join(self) -> None:
+        """Wait for what its threads still compute, after it is closed; the threads that they share end with them."""
+        for pool in (self.live, self.long):
+            pool.shutdown()
+        for thread in self._warming:
+            thread.join()
 
     def shown(self) -> Shown:
         """The symbols as they are now."""
@@ -140,7 +148,9 @@ class Studio:
 
     def warm_up(self) -> None:
         """Prepare recognition for the library as it is now, beside all else: the next drawing is answered at once."""
-        Thread(target=self._prepare, name="kineme-warm-up", daemon=True).start()  # nobody waits for it at the end
+        thread = Thread(target=self._prepare, name="kineme-warm-up", daemon=True)
+        thread.start()
+        self._warming = [one for one in self._warming if one.is_alive()] + [thread]
 
     def _prepare(self) -> None:
         with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
