@@ -256,7 +256,9 @@ def test_on_a_network_and_for_reading_only_it_says_so_and_leaves_nothing_with_a_
     folder, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a terminal that closes is passed over after nohup
     one = Running(folder, "--host", "0.0.0.0", "--read-only")
+    signal.signal(signal.SIGHUP, before)
     assert "for reading only" in one.line
     port = one.address.rpartition(":")[2]
     assert httpx.post(f"http://127.0.0.1:{port}/api/library/undo", headers=BEARER).status_code == 403
