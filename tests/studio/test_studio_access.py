@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 
 import pytest
+from click.testing import CliRunner
 from starlette.websockets import WebSocketDisconnect
 from studio_samples import BEARER, LIVE, TOKEN, asked
 
+from kineme.cli import main
 from kineme.studio.server import access, bodies
 from kineme.studio.server.studio import Studio
 
@@ -42,6 +44,36 @@ def test_the_address_with_the_token_sets_a_cookie_that_scripts_and_other_sites_c
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
     assert client.get("/api/library", headers=bare).status_code == 200  # the client kept it
+
+
+def test_the_address_of_the_browser_opens_once_and_does_not_hold_the_token(folder, open_studio):
+    client, bare, once = (
+        open_studio(folder, once="a-code-for-tests"),
+        {"Authorization": ""},
+        {"once": "a-code-for-tests"},
+    )
+    for path, code in (
+        ("/", ""),
+        ("/", "another"),
+        ("/api/library", "a-code-for-tests"),
+        ("/index.html", once["once"]),
+    ):
+        assert client.get(path, params={"once": code}, headers=bare).status_code == 401
+    answer = client.get("/", params=once, headers=bare, follow_redirects=False)
+    assert (answer.status_code, TOKEN in answer.headers["set-cookie"]) == (303, True)
+    assert client.get("/api/library", headers=bare).status_code == 200
+    client.cookies.clear()
+    assert client.get("/", params=once, headers=bare).status_code == 401
+    assert client.get("/", params={"once": ""}, headers=bare).status_code == 401
+
+
+def test_other_users_of_the_machine_do_not_see_the_token(monkeypatch):
+    opened = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("kineme.studio.server.serve.serve", lambda options, ready: ready("/?token=T", "/?once=C"))
+    told = CliRunner().invoke(main, ["studio", "-l", "actions"])
+    assert (told.exit_code, opened, "/?token=T" in told.output) == (0, ["/?once=C"], True)
 
 
 @pytest.mark.parametrize(("site", "status"), [("cross-site", 200), (None, 200), ("none", 303), ("same-origin", 303)])

@@ -37,12 +37,12 @@ def studio(folder: Path, port: int | None, no_open: bool, read_only: bool, host:
     """  # noqa: D301 - a backspace tells click to keep the lines
     from kineme.studio.server.serve import Options, is_loopback, serve
 
-    def ready(address: str) -> None:
+    def ready(address: str, once: str) -> None:
         _say(folder, address, read_only)
         if not is_loopback(host):
             write("others on the network reach it with this address, unencrypted: give it to those you trust", err=True)
         if not no_open and _has_display():
-            webbrowser.open(address)
+            webbrowser.open(once)  # without the token, which others on this machine would see
 
     serve(Options(folder, host, port, read_only), ready)
 

@@ -30,12 +30,15 @@ class Guard:
     ----------
     app : ASGI application
     token : str
+    once : str
+        What opens the page one time in the place of the token: other users of the machine see the address that a
+        browser is started with. Empty for none.
     hosts : sequence of str
         Names beside those of the loopback under which the server may be asked, from `--host`; with one, any address.
     """
 
-    def __init__(self, app: ASGIApp, token: str, hosts: tuple[str, ...] = ()) -> None:
-        self.app, self.token = app, token
+    def __init__(self, app: ASGIApp, token: str, once: str = "", hosts: tuple[str, ...] = ()) -> None:
+        self.app, self.token, self._once = app, token, once
         self.names = {"localhost", *map(str.lower, hosts)}
         self.any_address = bool(hosts)
         self.cookie = "kineme_" + hashlib.sha256(token.encode()).hexdigest()[:12]  # two studios on one machine
@@ -78,10 +81,16 @@ class Guard:
         told += [_cookies(headers.get("cookie", "")).get(self.cookie, "")]
         if scope["type"] == "websocket" or scope["path"] == "/":
             told += _query(scope).get("token", [])
-        return any(hmac.compare_digest(one.encode(), self.token.encode()) for one in told)
+        return _is_among(told, self.token) or self._uses_once(scope)
+
+    def _uses_once(self, scope: Scope) -> bool:
+        used = bool(self._once) and _is_page(scope) and _is_among(_query(scope).get("once", []), self._once)
+        if used:
+            self._once = ""
+        return used
 
     def _opens(self, scope: Scope) -> bool:
-        return scope["type"] == "http" and scope["path"] == "/" and "token" in _query(scope)
+        return _is_page(scope) and not {"token", "once"}.isdisjoint(_query(scope))
 
     async def _set_cookie(self, send: Send, asked: Mapping[str, str]) -> None:
         cookie = f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
@@ -104,6 +113,14 @@ def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
         return ipaddress.ip_address(name)
     except ValueError:
         return None
+
+
+def _is_page(scope: Scope) -> bool:
+    return scope["type"] == "http" and scope["path"] == "/"
+
+
+def _is_among(told: list[str], secret: str) -> bool:
+    return any(hmac.compare_digest(one.encode(), secret.encode()) for one in told)
 
 
 def _is_linked(headers: Mapping[str, str]) -> bool:

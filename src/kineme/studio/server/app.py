@@ -44,7 +44,9 @@ ROUTERS = (
 )
 
 
-def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts: tuple[str, ...] = ()) -> FastAPI:
+def create_app(
+    folder: str | Path, token: str, *, once: str = "", read_only: bool = False, hosts: tuple[str, ...] = ()
+) -> FastAPI:
     """The studio of one library, for any ASGI server.
 
     Parameters
@@ -53,6 +55,8 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
         Of the library; it is made if there is none, unless read only.
     token : str
         What every request must know, as a cookie or as ``Authorization: Bearer``; ``/?token=...`` sets the cookie.
+    once : str, default ""
+        What sets it one time, as ``/?once=...``; empty for none.
     read_only : bool, default False
         Refuse every change.
     hosts : tuple of str
@@ -81,7 +85,7 @@ def create_app(folder: str | Path, token: str, *, read_only: bool = False, hosts
     app.add_middleware(LooksAfterChanges)
     app.add_middleware(LimitedBodies)
     app.add_middleware(StaticFiles)
-    app.add_middleware(Guard, token=token, hosts=hosts)
+    app.add_middleware(Guard, token=token, once=once, hosts=hosts)
     return app
 
 

@@ -38,8 +38,10 @@ class Options(NamedTuple):
     read_only: bool = False
 
 
-def serve(options: Options, ready: Callable[[str], object]) -> None:
-    """Serve a library until interrupted; `ready` is called with the address once it can be opened.
+def serve(options: Options, ready: Callable[[str, str], object]) -> None:
+    """Serve a library until interrupted; once it can be opened, `ready` is called with its address.
+
+    The second argument of `ready` is an address for the browser of this machine, without the token: it opens once.
 
     Raises
     ------
@@ -59,12 +61,12 @@ def serve(options: Options, ready: Callable[[str], object]) -> None:
         ) from error
     from kineme.studio.server.access import own_names
 
-    token = _token()
+    token, once = _token(), secrets.token_urlsafe(24)
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
-        config = config_of(create_app(options.folder, token, read_only=options.read_only, hosts=hosts))
-        address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/?token={token}"
-        server = _server(config, lambda: ready(address))
+        config = config_of(create_app(options.folder, token, once=once, read_only=options.read_only, hosts=hosts))
+        address = f"http://{_name(options.host)}:{listening.getsockname()[1]}/"
+        server = _server(config, lambda: ready(f"{address}?token={token}", f"{address}?once={once}"))
         with suppress(KeyboardInterrupt):
             server.run(sockets=[listening])
         config.app.state.studio.join()
