@@ -120,7 +120,6 @@ docs: $(DEV)/ready
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py
-	$(DEV)/bin/python docs/make_interactive.py
 
 reference: $(DEV)/ready
 	$(DEV)/bin/python docs/make_reference.py

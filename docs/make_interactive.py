@@ -1,6 +1,6 @@
 """Write the interactive figure of the concepts: its two matrices, its style and its script, as one piece of HTML.
 
-``python docs/make_interactive.py`` writes ``docs/concepts/interactive/primitive.html``, which the page includes.
+The build of the site writes ``docs/concepts/interactive/primitive.html``, which the page includes.
 """
 
 from __future__ import annotations
@@ -61,5 +61,8 @@ def html(made: dict[str, Any]) -> str:
     )
 
 
-if __name__ == "__main__":
-    (FOLDER / "primitive.html").write_text(html(matrices()), encoding="utf-8")
+def write(path: Path = FOLDER / "primitive.html") -> None:
+    """Write the figure; one that is the same is left alone, so that its page is not read again."""
+    text = html(matrices())
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from make_interactive import FOLDER, FORMULATIONS, N_BASIS, N_POINTS, html, matrices
+from make_interactive import FOLDER, FORMULATIONS, N_BASIS, N_POINTS, html, matrices, write
 
 import kineme
 
 NODE = shutil.which("node")
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
 _SHAPE = "Spoon"
 _ASK = """
 const figure = require(process.argv[1]);
@@ -32,8 +30,15 @@ def data():
     return matrices()
 
 
-def test_the_page_holds_the_matrices_of_today(data):
-    written = (FOLDER / "primitive.html").read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The figure, as the build of the site writes it."""
+    path = tmp_path_factory.mktemp("figure") / "primitive.html"
+    write(path)
+    return path.read_text(encoding="utf-8")
+
+
+def test_the_page_holds_the_matrices_of_today(data, written):
     parts = written.split('<script type="application/json">')
     held, _, after = parts[1].partition("</script>")
     fresh_before, _, fresh = html(data).partition('<script type="application/json">')
@@ -68,21 +73,10 @@ def test_the_script_learns_and_moves_as_kineme_does(data, name):
     np.testing.assert_allclose(answer["basis"], dmp.basis.design(np.linspace(0, 1, 5)), atol=1e-6)
 
 
-@pytest.fixture
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, headless=True, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium is installed")
-def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser):
+def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser, written):
     page_file = tmp_path / "page.html"
     picture = '<p class="primitive-picture">a picture</p>'
-    figure = (FOLDER / "primitive.html").read_text(encoding="utf-8")
-    page_file.write_text(f"<!doctype html><meta charset=utf-8><title>x</title>{picture}{figure}", encoding="utf-8")
+    page_file.write_text(f"<!doctype html><meta charset=utf-8><title>x</title>{picture}{written}", encoding="utf-8")
     page = browser.new_page(viewport={"width": 900, "height": 700})
     said = []
     page.on("pageerror", lambda error: said.append(str(error)))

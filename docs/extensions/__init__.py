@@ -6,6 +6,8 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import make_interactive
+
 from extensions import commands, equations, formats, hooks, links, mathjax, messages, names, whole
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ def _write_pages(app: Sphinx) -> None:
         path = folder / file
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    make_interactive.write()
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
