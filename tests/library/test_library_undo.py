@@ -96,6 +96,22 @@ def test_all_batches_of_one_call_are_one_change(library, monkeypatch):
     assert library.verify() == []
 
 
+def test_what_others_change_between_two_batches_ends_what_one_undo_takes_back(library, monkeypatch):
+    monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
+    version, commit = library.version, learning.commit
+
+    def after_another(store, batch, continues):
+        if continues is not None:
+            with ActionLibrary(library.folder) as one:
+                one.rename("push", "shove")
+        return commit(store, batch, continues)
+
+    monkeypatch.setattr(learning, "commit", after_another)
+    library.learn(draw_movements(8, 2, 9), ["wave", "other"] * 4)
+    assert [one.action for one in library.history()[version:]] == ["learn", "rename", "learn"]
+    assert library.undo() == (version + 4, version + 2, "learn")
+
+
 def test_what_others_change_between_two_batches_is_a_change_of_its_own(library, monkeypatch):
     monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 4)
     before, version = _state(library), library.version
