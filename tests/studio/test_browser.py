@@ -188,10 +188,12 @@ def test_two_tabs_show_the_same_library_and_undo_takes_back(opened, studio, tmp_
     one.get_by_role("button", name="Rename").click()
     one.keyboard.type("first")
     one.keyboard.press("Enter")
-    wait_until(other, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+    for page in (one, other):
+        wait_until(page, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
     other.locator("body").press("Control+z")
-    wait_until(one, "![...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
-    assert sorted(one.locator(".card-name").all_inner_texts()) == sorted(LETTERS)
+    for page in (one, other):
+        wait_until(page, "![...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'first')")
+        assert sorted(page.locator(".card-name").all_inner_texts()) == sorted(LETTERS)
     one.evaluate("import('/parts/changes.js').then((changes) => changes.undo(5))")  # as the message about the renaming
     wait_until(
         one, "document.querySelector('.toast.failed')?.textContent.includes('look at what has changed') ?? false"
