@@ -176,6 +176,32 @@ def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
     assert "kind 1" in _symbols(client)
 
 
+def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
+    a, b = (_symbols(client)[f"kind {k}"]["id"] for k in (0, 1))
+    changes = [
+        (f"symbols/{a}/rename", {"name": "wave"}, "Renamed kind 0 to wave"),
+        (f"symbols/{a}/describe", {"text": "a hand"}, "wave: description \u201ca hand\u201d instead of none"),
+        (f"symbols/{a}/describe", {"text": "two"}, "wave: description \u201ctwo\u201d instead of \u201ca hand\u201d"),
+        (f"symbols/{a}/split", {"ids": [1], "name": "half"}, "Split 1 movement off wave as half"),
+        ("symbols/merge", {"ids": [a, b], "into": "\u202eboth"}, "Merged wave, kind 1 into \\u202eboth"),
+        ("movements/assign", {"ids": [7, 8], "symbol": "half"}, "Assigned 2 movements to half"),
+        ("movements/assign", {"ids": [7], "symbol": None}, "Took the name off 1 movement"),
+        ("movements/delete", {"ids": [8]}, "Deleted 1 movement"),
+        ("movements", asked(8, label="new"), "Learned 1 movement; new: new"),
+        ("undo", {}, "Took a change back: as at version 9"),
+        ("undo", {"to": 3}, "Restored version 3"),
+    ]
+    for path, body, _ in changes:
+        assert client.post(f"/api/library/{path}", json=body).status_code == 200
+    shown = client.get("/api/library/history").json()["versions"]
+    assert [one["said"] for one in shown[-2::-1]] == [words for _, _, words in changes]
+    assert shown[-1]["said"] == "Learned 12 movements; new: kind 0, kind 1, kind 2, kind 3"
+    assert [one["number"] for one in shown if not one["can_restore"]] == [12, 3]
+    assert _symbols(client)["wave"]["description"] == "a hand"
+    late = client.post("/api/library/undo", json={"version": 11, "to": 2})
+    assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 12)
+
+
 def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):
     writing = Store.writing
 

@@ -149,19 +149,23 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     say(as_json, data, text)
 
 
-@library.command(short_help="Take back the last change.")
+@library.command(short_help="Take back the last change, or restore a version.")
 @library_option
 @click.option("--at", "expected", type=ID, help="Only if this is still the last version, as history lists it.")
+@click.option("--to", type=ID, help="Restore this earlier version, as history lists it; 0 is the empty library.")
 @json_option
-def undo(folder: Path, expected: int | None, as_json: bool) -> None:
+def undo(folder: Path, expected: int | None, to: int | None, as_json: bool) -> None:
     """Take back the last change, whoever made it, as a new version; again, the one before.
 
-    All that one call of kineme learn stored is one change. kineme library history lists the changes.
+    All that one call of kineme learn stored is one change. kineme library history lists the changes. With --to, the
+    library is as it was at that version: versions between stay in the history, and undo takes the restoring back. What
+    was undone is done again by restoring the version that was taken back.
     """
     with opened(folder, read_only=False) as actions:
-        undone = actions.undo(expected)
+        undone = actions.undo(expected, to)
         data = {"undone": undone.action, "to": undone.to, "version": undone.version}
-    say(as_json, data, lambda: f"took back {data['undone']}; as at version {data['to']}; version {data['version']}")
+    done = f"took back {data['undone']}; as at" if to is None else "restored"
+    say(as_json, data, lambda: f"{done} version {data['to']}; version {data['version']}")
 
 
 @library.command(short_help="Check every byte of a library.")

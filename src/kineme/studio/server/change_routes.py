@@ -8,9 +8,9 @@ from fastapi import APIRouter, Query
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes
-from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
+from kineme.studio.server.change_records import Assign, Back, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import VERSION, AsOf, Learned, SymbolKey, Version
+from kineme.studio.server.records import VERSION, Learned, SymbolKey, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Writes
 
@@ -79,12 +79,12 @@ def delete_symbol(
     return {"version": changes.delete_symbol(studio.library.store, studio.symbol(key, version).name)}
 
 
-@router.post("/undo", response_model=Version, summary="Take back the last change")
-def undo(studio: Writes, asked: AsOf | None = None) -> dict[str, Any]:
-    """As a new version; again, the one before. 409 if another change came since the version that is named."""
-    expected = None if asked is None else asked.version
+@router.post("/undo", response_model=Version, summary="Take back the last change, or restore a version")
+def undo(studio: Writes, asked: Back | None = None) -> dict[str, Any]:
+    """As a new version; again, the change before. 409 if another change came since the version that is named."""
+    expected, to = (None, None) if asked is None else (asked.version, asked.to)
     try:
-        return {"version": studio.library.undo(expected).version}
+        return {"version": studio.library.undo(expected, to).version}
     except SpecificationError as error:
         if expected is not None and studio.library.version != expected:
             raise ConflictError(str(error)) from None
