@@ -14,6 +14,7 @@ from kineme.files.write_movement import WRITERS
 from kineme.library.recognition.members import described
 from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
+from kineme.output.text import printable
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.history import listed_history
@@ -98,7 +99,7 @@ def _library(studio: Studio) -> dict[str, Any]:
     drawn = {one["id"]: one for one in _listed(studio, np.array([key for key in typical if key], dtype=np.int64))}
     channels = library.channels
     return {
-        "folder": str(library.folder),
+        "folder": printable(library.folder),
         "version": shown.version,
         "n_movements": len(library),
         "n_dims": library.n_dims,
