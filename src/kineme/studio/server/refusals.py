@@ -34,10 +34,10 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008, "reason": text[:100]})
         return
-    seen = scope["method"] == "GET" and any(
+    as_page = scope["method"] == "GET" and any(
         name == b"accept" and b"text/html" in value for name, value in scope["headers"]
     )
-    kind, body = (b"text/html; charset=utf-8", _page(text)) if seen else (b"application/json", _plain(text))
+    kind, body = (b"text/html; charset=utf-8", _page(text)) if as_page else (b"application/json", _plain(text))
     headers = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
     if status in {408, 413}:  # the rest of the body is not read
         headers.append((b"connection", b"close"))
