@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from moving_picture import moving_picture
 from PIL import Image
+from tutorial_figures import gestures, place
 from walk_through import walk
 
 import kineme
@@ -256,6 +257,8 @@ FIGURES = {
     "styles": styles,
     "three-issues": three_issues,
     "many-goals": many_goals,
+    "gestures": gestures,
+    "place": place,
 }
 
 
