@@ -44,7 +44,7 @@ test-pythons:
 	test -n "$$found" && test -z "$$failed"
 
 test-lowest: .venv-lowest/ready
-	.venv-lowest/bin/pytest -p no:cacheprovider
+	.venv-lowest/bin/pytest -n 2 --dist loadscope -p no:cacheprovider
 
 package: .venv-package/ready
 	.venv-package/bin/python -m release $(PYTHONS)

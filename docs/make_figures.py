@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from moving_picture import moving_picture
 from PIL import Image
+from tutorial_figures import gestures, place
 from walk_through import walk
 
 import kineme
@@ -23,7 +24,9 @@ from kineme.control import ObstacleAvoidance
 from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
 from kineme.primitives.styles.figure import draw_morph
 
-_COLORS = 128  # of a picture of the tutorial
+_COLORS = 128  # of a picture of a tutorial
+#: Tutorials that draw their own pictures -> what the names of these begin with.
+TUTORIALS = {"action-library": "library", "unlabeled-to-a-planner": "planner"}
 _FEWEST = 20  # answers that a point of the reliability diagram stands for
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
 LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
@@ -254,19 +257,21 @@ FIGURES = {
     "styles": styles,
     "three-issues": three_issues,
     "many-goals": many_goals,
+    "gestures": gestures,
+    "place": place,
 }
 
 
-def library_pictures(folder: Path) -> None:
-    """Those of the tutorial, drawn by its own commands, in few colors so that they are small."""
-    page = Path(__file__).parent / "tutorials" / "action-library.md"
+def tutorial_pictures(folder: Path, tutorial: str, prefix: str) -> None:
+    """PREFIX-NAME.png is NAME.png of a tutorial, drawn as it is walked, in few colors so that it is small."""
+    page = Path(__file__).parent / "tutorials" / f"{tutorial}.md"
     with TemporaryDirectory() as place:
         for _ in walk(page, Path(place)):
             pass
-        for name in re.findall(r"\]\(\.\./images/library-(.+?)\.png\)", page.read_text(encoding="utf-8")):
+        for name in re.findall(rf"\]\(\.\./images/{prefix}-(.+?)\.png\)", page.read_text(encoding="utf-8")):
             with Image.open(next(Path(place).rglob(f"{name}.png"))) as picture:
                 few = picture.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE)
-                few.save(folder / f"library-{name}.png", optimize=True)
+                few.save(folder / f"{prefix}-{name}.png", optimize=True)
 
 
 def main(folder: Path) -> None:
@@ -277,7 +282,8 @@ def main(folder: Path) -> None:
     (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
     for name in SCRIPTS:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
-    library_pictures(folder)
+    for tutorial, prefix in TUTORIALS.items():
+        tutorial_pictures(folder, tutorial, prefix)
 
 
 if __name__ == "__main__":

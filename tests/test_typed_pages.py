@@ -54,6 +54,8 @@ passing: kineme.styles.AveragePrimitive = kineme.styles.average(primitives).cond
 reveal_type(recognizer.spot(movement))
 reveal_type(recognizer.stream().update(0.0, [0.0, 0.0]))
 reveal_type(kineme.anchoring.propose(demos))
+for proposal in kineme.anchoring.propose(demos):
+    reveal_type(proposal)
 reveal_type(primitives.controller(0.01))
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +74,9 @@ class Proposals:
 
     def __len__(self) -> int:
         return len(self.proposals)
+
+    def __iter__(self) -> Iterator[Proposal]:
+        return iter(self.proposals)
 
     def __getitem__(self, index: int) -> Proposal:
         if not -len(self) <= index < len(self):

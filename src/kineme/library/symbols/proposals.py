@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 from warnings import warn
@@ -47,6 +48,9 @@ class LibraryProposals:
     def __getitem__(self, index: int) -> Proposal:
         one = self.by_position[index]
         return replace(one, members=self.ids[one.members], medoid=int(self.ids[one.medoid]))
+
+    def __iter__(self) -> Iterator[Proposal]:
+        return (self[index] for index in range(len(self)))
 
     @property
     def left_over(self) -> Ids:
