@@ -132,7 +132,9 @@ def test_a_gripper_that_closes_while_the_arm_moves_is_said_with_its_speed():
 
 def test_joints_beyond_a_stop_need_another_goal_and_not_another_place():
     robot = load("panda")
-    with pytest.raises(InfeasibleError, match=r"position of panda_joint1 .* No speed helps: choose another goal .*joints"):
+    with pytest.raises(
+        InfeasibleError, match=r"position of panda_joint1 .* No speed helps: choose another goal .*joints"
+    ):
         move(swing(robot, 5.0, distance=3.0), robot)
 
 
