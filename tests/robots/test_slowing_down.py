@@ -119,7 +119,7 @@ def test_a_gripper_that_waits_for_a_stand_is_not_timed_without_one(closes, opens
 
 
 def test_a_gripper_that_closes_while_the_arm_moves_is_said_with_its_speed():
-    """A rest at the beginning is left early when the goal is new; the gripper that closed in it then closes in motion."""
+    """A rest at the beginning is left early when the goal is new; a gripper that closed in it closes in motion."""
     robot = load("ur5e")
     for closes, moving in ((25, True), (75, False)):
         grip = np.where(np.arange(150) >= closes, 1.0, 0.0)
