@@ -91,6 +91,14 @@ def test_other_columns_are_read_where_they_are_asked_for(client):
     assert client.post(f"/api/recordings/{key}/spotted", json={"table": "none"}).status_code == 400
 
 
+def test_of_each_file_the_columns_asked_for_last_are_kept(client):
+    data, _ = _table(0, 1, heads="t,a,b")
+    kept, keys = client.app.state.studio.uploads._read, [_send(client, data).json()["recording"] for _ in range(2)]
+    for columns in (["a"], ["b"], ["b", "a"]):
+        client.app.state.studio.uploads.recordings(keys[0], columns)
+    assert list(kept) == [(keys[0], ()), (keys[1], ()), (keys[0], ("b", "a"))]
+
+
 def test_what_is_read_apart_is_what_is_read_here(tmp_path):
     for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses()[0])):
         path = tmp_path / name
