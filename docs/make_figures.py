@@ -266,9 +266,9 @@ FIGURES = {
 }
 
 
-def pictures_of_page(folder: Path, name: str, prefix: str) -> None:
+def pictures_of_page(folder: Path, walked: str, prefix: str) -> None:
     """PREFIX-NAME.png is NAME.png of a page, drawn as it is walked, in few colors so that it is small."""
-    page = Path(__file__).parent / f"{name}.md"
+    page = Path(__file__).parent / f"{walked}.md"
     with TemporaryDirectory() as place:
         for _ in walk(page, Path(place)):
             pass
@@ -286,8 +286,8 @@ def main(folder: Path) -> None:
     (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
     for name in SCRIPTS:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
-    for name, prefix in DRAWING.items():
-        pictures_of_page(folder, name, prefix)
+    for walked, prefix in DRAWING.items():
+        pictures_of_page(folder, walked, prefix)
 
 
 if __name__ == "__main__":
