@@ -232,6 +232,11 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
         page.click("#undo")
         wait_until(page, "n => document.querySelectorAll('.card-open').length === n", left)
     assert sorted(names.all_inner_texts()) == sorted(LETTERS)
+    page.click("#history summary")
+    page.get_by_role("button", name="Restore version 6").click()
+    page.keyboard.press("Enter")
+    wait_until(page, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'part')")
+    wait_until(page, "document.querySelector('#versions li').textContent.includes('Restored version 6')")
 
 
 def test_hostile_names_are_text(opened, studio, tmp_path):

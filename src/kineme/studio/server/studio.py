@@ -56,6 +56,7 @@ class Studio:
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
         self.works = Works()
+        self.warm = -1  # the version of the library that recognition is prepared for
         self._warming: list[Thread] = []
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
@@ -153,8 +154,12 @@ class Studio:
         self._warming = [one for one in self._warming if one.is_alive()] + [thread]
 
     def _prepare(self) -> None:
-        with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
-            self.stream()
+        with suppress(KinemeError):  # closed meanwhile
+            version = self.library.version
+            with suppress(KinemeError):  # too little to recognize with, as in a new library
+                self.stream()
+            if self.library.version == version:
+                self.warm = version
 
     def stream(self) -> Live:
         """What recognizes one movement under way, by the library as it is now; see `kineme.ActionLibrary.stream`."""

@@ -35,6 +35,9 @@ async function takeBack(version) {
   });
 }
 
+/** The state of an earlier version again; refused if somebody has changed the library since it was looked at. @param {number} number @param {number} seen */
+export const restore = (number, seen) => change(() => post("/api/library/undo", { version: seen, to: number }), `Version ${number} is restored.`);
+
 const of = (/** @type {string} */ id) => `/api/library/symbols/${encodeURIComponent(id)}`;
 
 /** @param {{times: number[], positions: number[][]}} drawn @param {string|null} label */
