@@ -1,4 +1,4 @@
-"""Tables and sentences of docs/beside-others.md and docs/migrating, from the files of results."""
+"""Tables and sentences of docs/beside-others.md, docs/migrating and a tutorial, from the files of results."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 from typing import Any
 
+import million_tables
 from make_tables import DOCS, METHODS, OURS, PERTURBED, RESULTS, SHOWN
 
 #: Rows of the speed table: file of results, what was measured there, what it is called on the page.
@@ -46,7 +47,7 @@ def tables() -> dict[str, dict[str, str]]:
         "repeated said": _repeated_said(),
         "conditions": _conditions(),
     }
-    return {"beside-others.md": beside} | {
+    return {"beside-others.md": beside, "tutorials/a-million-movements.md": million_tables.tables()} | {
         f"migrating/{row['details']['page']}.md": {row["details"]["page"]: _migrated(row)} for row in _rows("migrating")
     }
 
