@@ -10,6 +10,7 @@
 # make evaluate  recognition beside its rivals, in out/
 # make figures  the pictures of docs/
 # make docs   the whole site, in out/docs/index.html, without network; GALLERY=0 does not run the examples
+# make check-docs   that site in a browser: its search, widths, accessibility
 # make reference  docs/reference/names.md, from the stubs that list the public names
 # make tables  the tables of results in docs/, from the files of the benchmark and the evaluation
 # make scene  what draws the arm in the page of kineme move --view, from the npm packages; vendored.json names them
@@ -20,7 +21,7 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs figures reference tables scene lock clean
+.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -43,7 +44,7 @@ test-pythons:
 	test -n "$$found" && test -z "$$failed"
 
 test-lowest: .venv-lowest/ready
-	.venv-lowest/bin/pytest -p no:cacheprovider
+	.venv-lowest/bin/pytest -n 2 --dist loadscope -p no:cacheprovider
 
 package: .venv-package/ready
 	.venv-package/bin/python -m release $(PYTHONS)
@@ -117,6 +118,10 @@ evaluate: .venv-rivals/ready
 GALLERY ?= 1
 docs: $(DEV)/ready
 	$(DEV)/bin/sphinx-build -b html -W --keep-going -j 2 --quiet -D plot_gallery=$(GALLERY) -d out/doctrees docs out/docs
+
+# The site that make docs built, in a browser: its search, its widths, and what readers with other senses meet.
+check-docs: $(DEV)/ready
+	KINEME_SITE=out/docs $(DEV)/bin/pytest -p no:cacheprovider tests/test_built_site.py
 
 figures: $(DEV)/ready
 	$(DEV)/bin/python docs/make_figures.py

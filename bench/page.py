@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import kineme
+from bench.browser import chromium
 from bench.movements import SEED, even_movements
 from bench.rows import Row
 from bench.space import lifted
@@ -40,21 +39,12 @@ _SCRIPT = """({ movements, repeats }) => {
 
 
 def measure(quick: bool) -> list[Row]:
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        print("page: the package playwright is not installed")
-        return []
-    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        print("page: no chromium is installed")
-        return []
     rows = []
-    with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
-        browser = started.chromium.launch(executable_path=chromium, headless=True)
+    with chromium("page") as browser, tempfile.TemporaryDirectory() as folder:
+        if browser is None:
+            return []
         for n_dims, each in ((2, 1),) if quick else ((2, 1), (2, 3), (3, 1)):
             rows += _of_one(browser, Path(folder) / f"{n_dims}-{each}", n_dims, each, 2 if quick else 5)
-        browser.close()
     return rows
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import kineme
+from bench.browser import chromium
 from bench.movements import SEED
 from bench.rows import Row
 from bench.studio import _TOKEN, MEDIAN, OF_EACH, P99, SYMBOLS, _filled, _running
@@ -35,26 +35,18 @@ _OF_DRAGGING = (
 
 
 def measure(quick: bool) -> list[Row]:
-    try:
-        import fastapi  # noqa: F401
-        import websockets  # noqa: F401
-        from playwright.sync_api import sync_playwright
-    except ImportError as error:
-        print(f"studio_in_browser: {error}")
-        return []
-    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        print("studio_in_browser: no chromium is installed")
+    if not find_spec("fastapi") or not find_spec("websockets"):
+        print("studio_in_browser: the extra studio is not installed")
         return []
     symbols = 20 if quick else SYMBOLS
-    with tempfile.TemporaryDirectory() as temporary, sync_playwright() as started:
+    with tempfile.TemporaryDirectory() as temporary, chromium("studio_in_browser") as browser:
+        if browser is None:
+            return []
         folder = Path(temporary) / "actions"
         drawn = _filled(folder, symbols)
         with _running(folder) as socket:
             address = socket.replace("ws://", "http://").replace("/api/live", f"/?token={_TOKEN}")
-            browser = started.chromium.launch(executable_path=chromium, headless=True)
             rows = _rows(browser, address, drawn, quick)
-            browser.close()
     named = f"{symbols} symbols of {OF_EACH} movements"
     return [
         Row(f"{what}, {named}", unit, value, target=None if quick else target, details=details)

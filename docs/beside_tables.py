@@ -1,4 +1,4 @@
-"""Tables and sentences of docs/beside-others.md, docs/migrating and a tutorial, from the files of results."""
+"""Tables of docs/beside-others.md, docs/migrating and a tutorial, from the results and docs/features.toml."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 from typing import Any
 
+import feature_table
 import million_tables
 from make_tables import DOCS, METHODS, OURS, PERTURBED, RESULTS, SHOWN
 
@@ -46,6 +47,8 @@ def tables() -> dict[str, dict[str, str]]:
         "repeated": _repeated(),
         "repeated said": _repeated_said(),
         "conditions": _conditions(),
+        "features": feature_table.table(),
+        "features found": feature_table.sources(),
     }
     return {"beside-others.md": beside, "tutorials/a-million-movements.md": million_tables.tables()} | {
         f"migrating/{row['details']['page']}.md": {row["details"]["page"]: _migrated(row)} for row in _rows("migrating")

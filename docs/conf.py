@@ -26,12 +26,11 @@ extensions = [
     "extensions",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["extensions", "**/README.md"]
+exclude_patterns = ["extensions", "templates", "**/README.md"]
 default_role = "literal"  # between single backticks in docstrings
 nitpicky = True
 highlight_language = "text"
 smartquotes_action = "D"  # dashes, and quotes as they are written
-pygments_style, pygments_dark_style = "friendly", "monokai"
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_dmath_allow_digits = myst_dmath_allow_space = False
@@ -76,13 +75,17 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = "kineme"
 html_static_path = ["static"]
+templates_path = ["templates"]
+html_search_scorer = str(DOCS / "extensions" / "search.js")
+html_show_search_summary = False  # it would be fetched, which a browser refuses for files
+html_use_index = html_domain_indices = False  # the search reads the entries
 html_css_files = ["kineme.css", "gallery.css"]
 html_favicon = html_logo = "static/kineme.svg"
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
-    "logo": {"text": "kineme", "alt_text": "kineme"},
-    "header_links_before_dropdown": 6,
+    "logo": {"text": "kineme"},
+    "header_links_before_dropdown": 8,
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
     "navigation_with_keys": False,
@@ -90,9 +93,9 @@ html_theme_options = {
     "show_toc_level": 2,
     "footer_start": ["copyright"],
     "footer_end": [],
-    "pygments_light_style": "friendly",
-    "pygments_dark_style": "monokai",
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
     "search_as_you_type": True,
 }
-html_sidebars = {"index": []}
+html_sidebars = {"index": [], "beside-others": []}
 mathjax_path = "mathjax/tex-chtml.js"

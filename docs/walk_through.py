@@ -78,7 +78,7 @@ def _normal(line: str) -> str:
 def _run_python(text: str, name: str, folder: Path, names: dict[str, Any]) -> Step:
     printed = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
-        exec(compile(text, name, "exec"), names)
+        exec(compile(text, name, "exec", dont_inherit=True), names)
     return Step(text, shown_by(text), printed.getvalue().splitlines(), 0)
 
 

@@ -1,15 +1,21 @@
 """What docs/beside-others.md and docs/migrating say of others is what was measured."""
 
 import json
+import pkgutil
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import kineme
+from kineme.cli import main as commands
+
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs"))
 import beside_tables  # noqa: E402
+import feature_table  # noqa: E402
 from walk_through import walk  # noqa: E402
 
 MIGRATED = json.loads((ROOT / "bench" / "results" / "migrating.json").read_text(encoding="utf-8"))["rows"]
@@ -19,6 +25,39 @@ MIGRATED = json.loads((ROOT / "bench" / "results" / "migrating.json").read_text(
 def test_the_pages_show_what_was_measured(page):
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     assert text == beside_tables.filled(text, beside_tables.tables()[page]), "run make tables"
+
+
+VERSIONS, FEATURES = feature_table.features()
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+def test_public_names_give_each_feature_that_we_claim(feature):
+    answer, *names = FEATURES[feature]["kineme"]
+    assert bool(names) == (answer != "no")
+    for name in names:
+        first, _, command = name.partition(" ")
+        if command:
+            assert command in commands.commands
+        else:
+            assert first.split(".")[1] in kineme.__all__
+            pkgutil.resolve_name(name)
+
+
+def test_features_are_said_of_libraries_whose_version_is_named():
+    assert {library for cells in FEATURES.values() for library in cells} == {"kineme", *VERSIONS}
+    assert "| rhythmic DMPs | `RhythmicDMP` | no | no | yes |" in feature_table.table()
+    assert "\n- pydmps 0.2. discrete DMPs: `pydmps.dmp_discrete.DMPs_discrete`; " in feature_table.sources()
+
+
+@pytest.mark.parametrize("library", VERSIONS)
+def test_the_others_have_the_names_that_are_given(library):
+    names = [name for cells in FEATURES.values() for name in cells.get(library, [""])[1:]]
+    pytest.importorskip(
+        names[0].partition(".")[0], reason=f"{library} is not installed; make bench and make evaluate do"
+    )
+    assert metadata.version(library) == VERSIONS[library], "look at its features again: docs/features.toml"
+    for name in names:
+        pkgutil.resolve_name(name)
 
 
 def _protocol(**means):

@@ -52,6 +52,14 @@ def test_a_page_that_shows_another_result_is_found_out(tmp_path):
     assert next(walk(page, tmp_path)).shown == ["1", "2"]
 
 
+def test_python_of_a_page_means_what_it_means_to_a_reader(tmp_path):
+    """Annotations are evaluated, as where the block is copied into a file."""
+    page = tmp_path / "page.md"
+    page.write_text("```python\ndef f(x: Missing) -> None: ...\n```\n")
+    with pytest.raises(NameError):
+        list(walk(page, tmp_path))
+
+
 _COMMAND = re.compile(r"^    (?:.*\| )?kineme (.+?)(?:  +#.*| > .*)?$", re.MULTILINE)
 
 

@@ -6,7 +6,7 @@ import shlex
 
 import click
 import pytest
-from extensions import commands, equations, formats, public, typeset, whole
+from extensions import commands, equations, formats, public, readers, routes, typeset, whole
 from extensions.docstrings import to_rest
 from walk_through import DOCS
 
@@ -24,13 +24,18 @@ from kineme.cli import main
         ("exp(-‖x - y‖² / (2 σ²))", r"\exp \left(-\frac{\lVert x-y\rVert ^2}{2\sigma ^2}\right)"),
         ("2 sqrt(K)", r"2\sqrt{K}"),
         ("x0^(1 - a)", "x_{0}^{1-a}"),
+        ("S A' (A S A')^-1 e", "SA'(ASA')^{-1}e"),
+        ("|p - p*|^2", r"\lvert p-p^{*}\rvert ^2"),
+        ("1 / (h (2 pi)^4)", r"\frac{1}{h(2\pi )^4}"),
     ],
 )
 def test_formulas_are_typeset(formula, tex):
     assert typeset.to_tex(formula) == tex
 
 
-@pytest.mark.parametrize("code", ['fit="forcing"', "value = other", "(a", "a)", "max_angle: 3", "", "kineme.DMP"])
+@pytest.mark.parametrize(
+    "code", ['fit="forcing"', "value = other", "(a", "a)", "max_angle: 3", "max_angle=3", "sum(q[t])", "", "kineme.DMP"]
+)
 def test_code_is_no_formula(code):
     with pytest.raises(typeset.NoFormulaError):
         typeset.to_tex(code)
@@ -45,6 +50,29 @@ def test_docstrings_become_text_that_sphinx_reads():
     assert ".. math::\n\n   \\begin{array}{lll}\n   \\text{} & x'=v & \\quad\\text{Eq. (1)}" in text
     assert "w_ : `Rollout`, optional\n    Of \\|x\\|." in text
     assert text.endswith("Raises\n------\nDataError\n    No.")
+
+
+def test_code_over_two_lines_and_formulas_with_words_are_read():
+    text = to_rest("``p = a\nb`` with ``phi = t / period`` and ``u = t / h``, ``goal + duration * v``")
+    assert text.count(":math:") == 3
+    assert r":math:`\phi =\frac{t}{\text{period}}`" in text
+    assert text.rstrip().endswith("``goal + duration * v``")
+
+
+def test_every_route_of_the_studio_is_on_its_page():
+    described = routes.description()
+    text = dict(routes.pages())["routes.md"]
+    for path, ways in described["paths"].items():
+        assert all(f"### {way.upper()} {path}\n" in text for way in ways)
+    assert all(f"\n### {name}\n" in text for name in described["components"]["schemas"])
+    assert "Takes [Wanted](#json-Wanted)." in text
+    assert "| `error_rate` (optional) | number; above 0; below 1; default `0.05` |" in text
+
+
+def test_arrows_of_the_navigation_have_names():
+    context = {"generate_toctree_html": lambda kind: '<a href="#">Robots</a><details><summary></summary></details>'}
+    readers.mend_page(None, "index", "page.html", context, None)
+    assert 'aria-label="Pages below Robots"' in context["generate_toctree_html"]("sidebar")
 
 
 def test_every_command_has_a_page():

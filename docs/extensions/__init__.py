@@ -8,12 +8,25 @@ from typing import TYPE_CHECKING
 
 import make_interactive
 
-from extensions import commands, equations, formats, hooks, links, mathjax, messages, names, whole
+from extensions import (
+    commands,
+    entries,
+    equations,
+    formats,
+    hooks,
+    links,
+    mathjax,
+    messages,
+    names,
+    readers,
+    routes,
+    whole,
+)
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-_PAGES = (names.pages, commands.pages, formats.pages, messages.pages)
+_PAGES = (names.pages, commands.pages, formats.pages, messages.pages, routes.pages)
 
 
 def _write_pages(app: Sphinx) -> None:
@@ -36,6 +49,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", _write_pages)
     app.connect("autodoc-process-docstring", hooks.read_docstring, priority=100)
     app.connect("autodoc-skip-member", hooks.skip_member)
+    app.connect("doctree-read", entries.add_messages)
+    app.connect("env-purge-doc", entries.forget)
+    app.connect("env-updated", entries.keep)
+    app.connect("html-page-context", readers.mend_page, priority=900)
     app.connect("build-finished", mathjax.copy_mathjax)
     app.connect("build-finished", whole.check_site, priority=900)
     app.add_directive("cited-in", equations.CitedIn)

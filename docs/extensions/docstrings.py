@@ -8,10 +8,12 @@ from itertools import groupby
 from extensions.public import PUBLIC
 from extensions.typeset import NoFormulaError, to_tex
 
-_CODE = re.compile(r"(``.+?``|`[^`]+`)")
+_CODE = re.compile(r"(``[^`]+``|`[^`]+`)")
 _INDENTED = re.compile(r"(?:(?<=\n\n)|\A)((?: {4}\S.*\n?|\n(?= {4}\S))+)(?=\n|\Z)")
 _HEADING = re.compile(r"\n\n(?=[A-Z][A-Za-z ]+\n-{3,}\n)")
-_IS_FORMULA = re.compile(r" [-=+~<>]|[\^/]|\w \w")
+_IS_FORMULA = re.compile(r" [-=+~<>]|[\^/]|[\w)] \w|sqrt\(")
+#: Signs that only formulas have, whatever words stand in them.
+_FORMULA_FOR_CERTAIN = re.compile(r"\^|\b(?:exp|log|ln|sqrt|atan2|cot|phi|tau|alpha|theta|period|integral)\b(?!_)")
 
 
 def to_rest(docstring: str) -> str:
@@ -63,11 +65,11 @@ def _plain(text: str) -> str:
 def _literal(text: str) -> str:
     if not text.startswith("``"):
         return text
-    inside = text.strip("`")
+    inside = " ".join(text.strip("`").split())
     if '"' in inside or not _IS_FORMULA.search(inside):
         return text
     try:
-        return f":math:`{to_tex(inside)}`"
+        return f":math:`{to_tex(inside, words=bool(_FORMULA_FOR_CERTAIN.search(inside)))}`"
     except NoFormulaError:
         return text
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
 
+from extensions.tables import kind, table
 from kineme.files.annotations import writers as annotations
 from kineme.files.formats import DATA_SETS, FORMATS
 from kineme.files.write_movement import WRITERS
@@ -53,14 +54,14 @@ def _formats() -> Iterator[str]:
         raise ValueError(f"expected a line for every format, found none for {covered ^ set(FORMATS)}")
     rows = [(_code(endings), what, _extra(extra)) for endings, (what, extra) in _READ.items()]
     rows += [(f"a folder with {_code(name)}", what, _extra(extra)) for name, (what, extra) in _FOLDERS.items()]
-    yield from _table(("ending", "what it is", "extra"), rows)
+    yield from table(("ending", "what it is", "extra"), rows)
     yield "\n## Movements that are written\n\n`kineme generate -o`, `kineme.write_movement`, without rounding.\n"
-    yield from _table(("ending", "what it is"), [(_code(one), _WRITTEN[one]) for one in WRITERS])
+    yield from table(("ending", "what it is"), [(_code(one), _WRITTEN[one]) for one in WRITERS])
     yield '\nPrimitives: `primitives.save("wave.kineme")`, `kineme generate --save`. Joints of an arm, bags and goals:'
     yield "[On the joints of an arm](../../guide/robots.md).\n\n## Annotations that are written\n"
     yield "`kineme annotate -o`, see [Long recordings](../../guide/long-recordings.md).\n"
     rows = [(name, _code(" ".join(one.endings)), _ANNOTATIONS[name]) for name, one in annotations.WRITERS.items()]
-    yield from _table(("name", "ending", "what it is"), rows)
+    yield from table(("name", "ending", "what it is"), rows)
     yield f"\n## Figures\n\n{_code(' '.join(f'.{kind}' for kind in FIGURES))}, byte for byte the same at every run."
 
 
@@ -70,28 +71,17 @@ def _schemas() -> Iterator[str]:
     yield "# JSON schemas\n\n## Grounding of a symbol\n"
     yield f"{schema['description']}\n\nWritten by `kineme library ground`; the schema itself by"
     yield f"`kineme library schema`. Its name is `{schema['$id']}`.\n"
-    yield from _table(("key", "kind", "what it is"), list(_keys(schema, "")))
+    yield from table(("key", "kind", "what it is"), list(_keys(schema, "")))
     yield f"\n```{{dropdown}} The schema\n~~~json\n{json.dumps(schema, indent=1)}\n~~~\n```"
 
 
 def _keys(schema: dict[str, Any], path: str) -> Iterator[tuple[str, str, str]]:
     for name, one in schema.get("properties", {}).items():
         needed = "" if name in schema.get("required", []) else " (optional)"
-        yield f"`{path}{name}`{needed}", _kind(one), one.get("description", "").replace("|", r"\|")
+        yield f"`{path}{name}`{needed}", kind(one), one.get("description", "").replace("|", r"\|")
         yield from _keys(one, f"{path}{name}.")
         if isinstance(items := one.get("items"), dict):
             yield from _keys(items, f"{path}{name}[].")
-
-
-def _kind(one: dict[str, Any]) -> str:
-    if "const" in one:
-        return f"`{json.dumps(one['const'])}`"
-    if "enum" in one:
-        return " or ".join(f"`{json.dumps(value)}`" for value in one["enum"])
-    if "$ref" in one:
-        return one["$ref"].rpartition("/")[2]
-    kinds = one.get("type") or " or ".join(_kind(each) for each in one.get("oneOf", one.get("anyOf", [])))
-    return " or ".join(kinds) if isinstance(kinds, list) else str(kinds)
 
 
 def _code(endings: str) -> str:
@@ -100,10 +90,3 @@ def _code(endings: str) -> str:
 
 def _extra(name: str) -> str:
     return f"`{name}`" if name else ""
-
-
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
-    yield f"| {' | '.join(head)} |"
-    yield "|---" * len(head) + "|"
-    for row in rows:
-        yield f"| {' | '.join(row)} |"

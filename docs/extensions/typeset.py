@@ -7,16 +7,20 @@ Of anything else, as code, `to_tex` says that it is no formula.
 from __future__ import annotations
 
 import re
+from itertools import accumulate
 
 _GREEK = (
     "alpha beta gamma delta epsilon eta theta kappa lambda mu nu xi pi rho sigma tau phi psi omega Phi Psi Omega Sigma"
 )
 _FUNCTIONS = "exp log ln max min sin cos tan arccos det"
 _WORDS = {"mean": r"\operatorname{mean}", "trace": r"\operatorname{trace}"}
+_WORDS |= {"lam": r"\lambda ", "integral": r"\int ", "conj": r"\operatorname{conj}", "cot": r"\cot "}
+_WORDS |= {"atan": r"\operatorname{atan}"}
 _WORDS |= {name: rf"\{name} " for name in f"{_GREEK} {_FUNCTIONS} sqrt sum".split()}
 _SIGNS = {
     "<=": r"\le ", ">=": r"\ge ", "->": r"\to ", "~": r"\sim ", "*": r"\cdot ", "·": r"\cdot ", "×": r"\times ",
-    "Σ": r"\sum ", "σ": r"\sigma ", "τ": r"\tau ", "π": r"\pi ", "²": "^2", "∞": r"\infty ", "≤": r"\le ", ",": r",\ ",
+    "Σ": r"\sum ", "σ": r"\sigma ", "τ": r"\tau ", "π": r"\pi ", "²": "^2", "⋆": "^{*}", "∫": r"\int ",
+    "∞": r"\infty ", "≤": r"\le ", ",": r",\ ",
 }  # fmt: skip
 #: What opens a group -> what closes it, and both in TeX. Bars are told apart before.
 _GROUPS = {
@@ -26,9 +30,11 @@ _GROUPS = {
     "⟪": ("⟫", r"\lvert ", r"\rvert "),
 }
 _ENDS_A_TERM = ("+", "-", "=", ",", "<", ">", "<=", ">=", "->", "~")
+#: An index of a lower-case name, a keyword with its value, and functions with a name of their own, as ``max_angle``.
+_IS_CODE = re.compile(r"[a-z]\[|\w=\S|\b(?:max|min)_|\bsum\(")
 _TOKEN = re.compile(
     r"(?P<space>\s*)(?:(?P<dots>\.\.\.)|“(?P<text>[a-z]+)”|(?P<number>\d+(?:\.\d+)?)|(?P<word>[A-Za-z]+)(?P<digits>\d+)?(?P<primes>'*)"
-    r"|_(?P<index>[A-Za-z0-9]+)|(?P<sign><=|>=|->|[-+=/*^<>,~Σστπ²∞≤·×])|(?P<open>[(\[⟦⟪])|(?P<close>[)\]⟧⟫]))"
+    r"|_(?P<index>[A-Za-z0-9]+)|(?P<sign><=|>=|->|[-+=/*^<>,~Σστπ²⋆∫∞≤·×])|(?P<open>[(\[⟦⟪])|(?P<close>[)\]⟧⟫]))"
 )
 
 
@@ -44,9 +50,13 @@ def to_tex(formula: str, words: bool = False) -> str:
     NoFormulaError
         It holds a word that is no symbol, or a sign that formulas do not have.
     """
-    text = re.sub(r"\|([^|]*)\|", r"⟪\1⟫", re.sub("‖([^‖]*)‖", r"⟦\1⟧", formula.strip(" .")))
+    text = re.sub(r"(?<!\.)\.$", "", formula.strip())
+    text = re.sub(r"\|([^|]*)\|", r"⟪\1⟫", re.sub("‖([^‖]*)‖", r"⟦\1⟧", text))
+    text = re.sub(r"(?<=\w)\*(?![ \w])", "⋆", re.sub(r"\^(-\d+|\d\d+)", r"^(\1)", text))
+    if _IS_CODE.search(text):
+        raise NoFormulaError(formula)
     if words:
-        text = re.sub(r"(?<!_)\b([a-z]{3,})\b", lambda word: word[0] if word[0] in _WORDS else f"“{word[0]}”", text)
+        text = re.sub(r"(?<![_a-zA-Z])[a-z]{3,}(?![a-z])", _symbol_or_text, text)
     tokens, at = [], 0
     while at < len(text):
         if (found := _TOKEN.match(text, at)) is None:
@@ -56,7 +66,12 @@ def to_tex(formula: str, words: bool = False) -> str:
     tex, remaining = _sequence(tokens)
     if remaining or not tex:
         raise NoFormulaError(formula)
-    return tex
+    tex = re.sub(r" \}(?=$|[_^)},])", "}", re.sub(r"(^|[({=])\\text\{ ", r"\1\\text{", tex))
+    return tex.strip()
+
+
+def _symbol_or_text(word: re.Match[str]) -> str:
+    return word[0] if word[0] in _WORDS else f"“{word[0]}”"
 
 
 def _sequence(tokens: list[re.Match[str]]) -> tuple[str, list[re.Match[str]]]:
@@ -97,8 +112,9 @@ def _fraction(above: str | None, below: str) -> str:
 
 def _bare(text: str) -> str:
     """Without the parentheses around all of it."""
-    inside = text[1:-1]
-    return inside if re.fullmatch(r"\([^()]*\)", text) else text
+    found = re.fullmatch(r"(?:\\left)?\((.*?)(?:\\right)?\)", text)
+    depths = list(accumulate({"(": 1, ")": -1}.get(sign, 0) for sign in text))
+    return found[1] if found and min(depths[text.index("(") : -1]) > 0 else text
 
 
 def _one(token: re.Match[str]) -> str:

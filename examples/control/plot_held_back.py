@@ -24,7 +24,7 @@ for name, options in ways.items():
         measured[name][k] = robot
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3), width_ratios=(1.3, 1))
+figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3), width_ratios=(1.3, 1), layout="constrained")
 right.plot(*primitive.rollout().positions[0].T, color="0.8", linewidth=6, label="demonstrated")
 for (name, path), style in zip(measured.items(), ("--", "-"), strict=True):
     left.plot(dt * np.arange(steps), path[:, 0], style, label=f'feedback="{name}"')

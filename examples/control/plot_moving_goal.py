@@ -21,7 +21,7 @@ for name, told in (("goal alone", None), ("goal and its velocity", velocity)):
     paths[name] = np.array([controller.step(goal=goal, goal_velocity=told).position for goal in goals])
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2))
+figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
 left.plot(*goals.T, ":", color="black", label="goal")
 left.plot(*goals[-1], "*", color="black", markersize=9)
 for (name, path), style in zip(paths.items(), ("--", "-"), strict=True):

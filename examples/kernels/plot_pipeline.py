@@ -22,7 +22,7 @@ print(f"accuracy of the nearest neighbor, one left out at a time: {accuracy:.3f}
 
 # %%
 plane = make_pipeline(features, PCA(2)).fit_transform(letters)
-figure, axes = plt.subplots(figsize=(6.4, 4.2))
+figure, axes = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
 markers = "os^vDPX*<"
 for marker, name in zip(markers, kineme.datasets.PAPER_LETTERS, strict=True):
     own = plane[letters.labels == name]

@@ -21,7 +21,7 @@ paths = {
 }
 
 # %%
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4))
+figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained")
 for (name, path), style, width in zip(paths.items(), ("-", "-", "--"), (6, 1.5, 1.5), strict=True):
     color = "0.8" if width > 2 else None
     (line,) = left.plot(*path.positions[0].T, style, color=color, linewidth=width, label=name)

@@ -21,7 +21,7 @@ print(f"{least[0]:.2f} s instead of {primitive.durations[0]:.2f} s")
 
 # %%
 fastest = primitive.rollout(duration=least, position_limits=(low, high))
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2))
+figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.2), layout="constrained")
 left.plot(*plain.positions[0].T, color="0.8", linewidth=5, label="as demonstrated")
 left.plot(*inside.positions[0].T, label="within limits")
 left.axvspan(-32, low[0], color="C1", alpha=0.15, linewidth=0)

@@ -19,7 +19,7 @@ goals = start + shares[:, None] * (goal - start)
 
 # %%
 # With a share of 0 the goal is the start: the original formulation does not move at all. Below 0 it mirrors.
-figure, panels = plt.subplots(1, 3, figsize=(9, 3), sharex=True, sharey=True)
+figure, panels = plt.subplots(1, 3, figsize=(9, 3), sharex=True, sharey=True, layout="constrained")
 for axes, formulation in zip(panels, ("original", "bio-inspired", "amplitude-scaled"), strict=True):
     primitive = kineme.DMP(formulation).learn(demo)
     paths = primitive.rollout(goal=goals, velocity=[0.0, 0.0]).positions

@@ -20,7 +20,7 @@ selection = kineme.DMP().choose(noisy)
 print(f"{selection.dmp.n_basis} basis functions, ridge {selection.dmp.ridge:g}: {100 * selection.error:.2f} %")
 
 # %%
-figure, panels = plt.subplots(1, 3, figsize=(9, 3), sharex=True, sharey=True)
+figure, panels = plt.subplots(1, 3, figsize=(9, 3), sharex=True, sharey=True, layout="constrained")
 for axes, n in zip(panels, (6, selection.dmp.n_basis, 95), strict=True):
     dmp = selection.dmp if n == selection.dmp.n_basis else kineme.DMP(n_basis=n, ridge=1e-12)
     path = dmp.learn(noisy[:1]).rollout().positions[0]

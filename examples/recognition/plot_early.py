@@ -26,7 +26,7 @@ for t, x in zip(movement.times[::10], movement.positions[::10], strict=True):
 # %%
 names = [*recognizer.classes_, "unknown"]
 evidence = np.array([[share.get(name, np.nan) for name in names] for share in shares])
-figure, (left, right) = plt.subplots(1, 2, figsize=(8.5, 3), width_ratios=(1.8, 1))
+figure, (left, right) = plt.subplots(1, 2, figsize=(8.5, 3), width_ratios=(1.8, 1), layout="constrained")
 left.stackplot(movement.times[::10], np.nan_to_num(evidence).T, labels=names, alpha=0.8)
 left.axvline(decided, color="black", linestyle="--")
 left.set(xlabel="time [s]", ylabel="share of the evidence", ylim=(0, 1), xlim=(0, movement.times[-1]))

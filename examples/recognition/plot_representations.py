@@ -26,7 +26,7 @@ movements = {
 answers = recognizer.recognize(list(movements.values()))
 
 # %%
-figure, (drawn, axes) = plt.subplots(1, 2, figsize=(9, 3.4), width_ratios=(1, 6))
+figure, (drawn, axes) = plt.subplots(1, 2, figsize=(9, 3.4), width_ratios=(1, 6), layout="constrained")
 left = np.zeros(len(answers))
 for name in answers[0].responsibilities:
     share = np.array([answer.responsibilities[name] for answer in answers])

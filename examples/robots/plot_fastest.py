@@ -20,7 +20,7 @@ panda = robots.load("panda")
 made = {"as demonstrated": robots.move(path, panda), "fastest": robots.move(path, panda, timing="fastest")}
 
 # %%
-figure, panels = plt.subplots(2, 2, figsize=(8.5, 4.2), sharex="col", sharey="row")
+figure, panels = plt.subplots(2, 2, figsize=(8.5, 4.2), sharex="col", sharey="row", layout="constrained")
 for column, (name, one) in zip(panels.T, made.items(), strict=True):
     first = one.first
     times = one.trajectory.times[first:] - one.trajectory.times[first]

@@ -103,6 +103,9 @@ def test_changes_are_taken_back_one_after_the_other(folder):
     answer("library", "undo", "-l", folder)
     assert answer("library", "list", "-l", folder)["movements"] == 0
     assert "has none left" in run("library", "undo", "-l", folder).stderr
+    assert start("library", "undo", "--to", 3, "-l", folder).stdout == "restored version 3; version 7\n"
+    names = [one["name"] for one in answer("library", "list", "-l", folder)["symbols"]]
+    assert names == ["GShape", "round"]
 
 
 def test_deleting_asks_first(folder):

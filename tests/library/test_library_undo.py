@@ -177,3 +177,45 @@ def test_the_past_and_libraries_open_for_reading_undo_nothing(library):
     past = library.at(library.version)
     assert not can_undo(past.store)
     past.close()
+
+
+def test_every_version_is_restored_and_an_undo_takes_that_back(library):
+    states = [{}, _state(library)]
+    for name in ("annotate", "merge", "delete movements", "learn"):
+        CHANGES[name](library)
+        states.append(_state(library))
+    for to in (2, 3, 0, 4):
+        last = library.version
+        assert library.undo(last, to=to) == (last + 1, to, "restore")
+        assert _state(library) == states[to]
+        library.undo()
+        assert _state(library) == states[5]
+    assert library.verify() == []
+
+
+def test_what_was_undone_is_done_again_by_restoring_it(library):
+    version, before = library.version, _state(library)
+    library.rename("wave", "hello")
+    library.undo()
+    assert library.undo(to=version + 1) == (version + 3, version + 1, "restore")
+    assert "hello" in library
+    library.undo()  # takes back the restoring: the change stays undone
+    assert _state(library) == before
+    library.undo()
+    assert _state(library) == {}
+
+
+def test_a_version_that_cannot_be_restored_is_refused(library):
+    seen = library.version
+    library.rename("wave", "hello")
+    with pytest.raises(
+        SpecificationError, match=f"replace version {seen}, the library is at version {seen + 1} by now"
+    ):
+        library.undo(seen, to=0)
+    for to in (seen + 1, -1, True, 1.0, "1"):
+        with pytest.raises(SpecificationError, match=f"expected a version before {seen + 1} to restore"):
+            library.undo(to=to)
+    library.undo()
+    with pytest.raises(SpecificationError, match=f"the library is as at version {seen}; nothing was changed"):
+        library.undo(to=seen)
+    assert library.version == seen + 2

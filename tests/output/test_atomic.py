@@ -107,6 +107,44 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
     remove_leftovers(tmp_path / "nowhere" / "x")
     with pytest.raises(FileNotFoundError, match="expected a folder"):
         write_atomically(Path(tmp_path / "nowhere" / "x"), b"")
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(FileNotFoundError, match=r"expected a folder .* a file of that name is there"):
+        write_atomically(Path(tmp_path / "file" / "x"), b"")
+
+
+@pytest.mark.parametrize(("kind", "remedy"), [(errno.EACCES, "allow writing in"), (errno.EIO, "choose another folder")])
+def test_a_folder_that_takes_no_file_is_named_and_the_hidden_name_is_not(tmp_path, monkeypatch, kind, remedy):
+    def refused(path, *_, **__):
+        raise OSError(kind, "Refused", str(path))
+
+    for act, name, whole in ((Path.write_bytes, "write_bytes", write_atomically), (Path.mkdir, "mkdir", _in_folder)):
+        monkeypatch.setattr(Path, name, refused)
+        with pytest.raises(OSError, match=f"expected to write .*new, the system refuses: refused; {remedy}") as caught:
+            whole(tmp_path / "new", b"")
+        monkeypatch.setattr(Path, name, act)
+        assert str(os.getpid()) not in str(caught.value).replace(str(tmp_path), "")
+    with pytest.raises(OSError, match="Refused"), whole_file(tmp_path / "new"):  # of another file: as it is
+        refused(tmp_path / "other")
+
+
+def _in_folder(path, _):
+    with whole_folder(path):
+        pass
+
+
+def test_the_longest_name_that_is_not_refused_can_be_written(tmp_path):
+    assert write_atomically(tmp_path / ("x" * 228), b"x").read_bytes() == b"x"
+    with pytest.raises(
+        OSError, match=r"expected a name of at most 228 bytes to write, got x{20}\.\.\., which is longer"
+    ):
+        write_atomically(tmp_path / ("x" * 229), b"x")
+
+
+def test_a_file_that_is_there_is_named(tmp_path):
+    (tmp_path / "there").write_bytes(b"old")
+    new = whole_file(tmp_path / "there", replace=False)
+    with pytest.raises(FileExistsError, match=r"expected a new file to write, .*there is there; choose"), new:
+        pass
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "/", "there"])

@@ -232,6 +232,11 @@ def test_symbols_are_merged_split_deleted_and_all_of_it_taken_back(opened, studi
         page.click("#undo")
         wait_until(page, "n => document.querySelectorAll('.card-open').length === n", left)
     assert sorted(names.all_inner_texts()) == sorted(LETTERS)
+    page.click("#history summary")
+    page.get_by_role("button", name="Restore version 6").click()
+    page.keyboard.press("Enter")
+    wait_until(page, "[...document.querySelectorAll('.card-name')].some((one) => one.textContent === 'part')")
+    wait_until(page, "document.querySelector('#versions li').textContent.includes('Restored version 6')")
 
 
 def test_hostile_names_are_text(opened, studio, tmp_path):
@@ -399,8 +404,22 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     assert float(page.input_value("#spans tbody tr:nth-child(1) td:nth-child(2) input")) < before
     page.click("#learn-spans")
     wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'from a file')")
+    assert not page.is_visible("#learn-file")
+    rows = [
+        (k, *row)
+        for k in (5, 6)
+        for one in letters("Angle")[k : k + 1]
+        for row in zip(one.times, *one.positions.T, strict=True)
+    ]
+    labeled = "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},of a file\n" for k, t, x, y in rows)
+    page.evaluate(DROP, ["labeled.csv", labeled])
+    wait_for_text(page, "#recording-name", "labeled.csv")
+    assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
+    page.click("#learn-file")
+    wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'of a file')")
     with kineme.ActionLibrary(tmp_path / "letters", read_only=True) as library:
         assert len(library["from a file"].members) == 1
+        assert len(library["of a file"].members) == 2
 
 
 def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):

@@ -121,3 +121,24 @@ def test_an_empty_library_is_refused_and_nothing_is_written(tmp_path):
 
 def test_equal_libraries_give_equal_pages(library, tmp_path):
     assert library_page(library, "t")[0] == library_page(library, "t")[0]
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("nowhere/page.html", "expected a folder nowhere to write page.html into, there is none; create it"),
+        ("file/page.html", "expected a folder file to write page.html into, a file of that name is there"),
+        ("folder", "'folder' is a directory"),
+        (f"{'x' * 300}.html", "the system refuses: file name too long; check its name"),
+        (f"{'x' * 240}.html", "which is longer; choose a shorter one"),
+        ("/proc/page.html", "expected to write /proc/page.html, the system refuses"),
+    ],
+)
+def test_where_no_page_can_be_written_is_said_in_words(library, tmp_path, monkeypatch, where, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_bytes(b"")
+    done = CliRunner().invoke(main, ["page", "-l", "actions", "-o", where])
+    assert done.exit_code in {1, 2}
+    assert words in done.stderr
+    assert "[Errno" not in done.stderr

@@ -88,6 +88,22 @@ def test_a_link_on_another_page_opens_it_too(client, site, status):
     assert "SameSite=Strict" in answer.headers["set-cookie"]
 
 
+def test_a_browser_without_the_token_is_told_so_on_a_page(client):
+    asked = {"Authorization": "", "Accept": "text/html,application/xhtml+xml,*/*;q=0.8"}
+    for path, more, status, said in (
+        ("/", {}, 401, "It expected the token"),
+        ("/?token=old", {}, 401, "copy the whole of it"),
+        ("/", {"Host": "<b>.example"}, 403, "&lt;b&gt;.example"),
+    ):
+        answer = client.get(path, headers=asked | more)
+        assert (answer.status_code, answer.headers["content-type"]) == (status, "text/html; charset=utf-8")
+        assert said in answer.text
+        assert not [one for one in ("<script", TOKEN, "<b>", "style=") if one in answer.text]
+    assert client.get("/api/library", headers={"Authorization": ""}).json()["error"].startswith("expected the token")
+    posted = client.post("/api/library/undo", headers=asked)
+    assert posted.json()["error"].startswith("expected the token")
+
+
 def test_addresses_with_many_fields_are_refused_as_others_are(client):
     fields = "&".join(f"a{k}=1" for k in range(30))
     assert client.get(f"/?{fields}", headers={"Authorization": ""}).status_code == 401

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from studio_samples import asked, drawing, make_library
 
 from kineme import ActionLibrary
+from kineme.cli import main
 from kineme.errors import DataError
 from kineme.library.storage.store import Store
+from kineme.studio.server.studio import Studio
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -176,6 +181,44 @@ def test_undo_refuses_to_take_back_what_the_client_has_not_seen(client, folder):
     assert "kind 1" in _symbols(client)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="names of folders are bytes there alone")
+def test_a_folder_whose_name_is_no_text_is_opened(folder, tmp_path, open_studio):
+    strange = os.fsdecode(os.fsencode(tmp_path) + b"/f\xff")
+    try:
+        os.rename(folder, strange)
+    except OSError:
+        pytest.skip("this file system takes no such names")
+    assert open_studio(strange).get("/api/library").json()["folder"].endswith("f\\udcff")
+    done = CliRunner().invoke(main, ["page", "-l", strange, "-o", str(tmp_path / "page.html")])
+    assert done.exit_code == 0, done.output
+
+
+def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
+    a, b = (_symbols(client)[f"kind {k}"]["id"] for k in (0, 1))
+    changes = [
+        (f"symbols/{a}/rename", {"name": "wave"}, "Renamed kind 0 to wave"),
+        (f"symbols/{a}/describe", {"text": "a hand"}, "wave: description \u201ca hand\u201d instead of none"),
+        (f"symbols/{a}/describe", {"text": "two"}, "wave: description \u201ctwo\u201d instead of \u201ca hand\u201d"),
+        (f"symbols/{a}/split", {"ids": [1], "name": "half"}, "Split 1 movement off wave as half"),
+        ("symbols/merge", {"ids": [a, b], "into": "\u202eboth"}, "Merged wave, kind 1 into \\u202eboth"),
+        ("movements/assign", {"ids": [7, 8], "symbol": "half"}, "Assigned 2 movements to half"),
+        ("movements/assign", {"ids": [7], "symbol": None}, "Took the name off 1 movement"),
+        ("movements/delete", {"ids": [8]}, "Deleted 1 movement"),
+        ("movements", asked(8, label="new"), "Learned 1 movement; new: new"),
+        ("undo", {}, "Took a change back: as at version 9"),
+        ("undo", {"to": 3}, "Restored version 3"),
+    ]
+    for path, body, _ in changes:
+        assert client.post(f"/api/library/{path}", json=body).status_code == 200
+    shown = client.get("/api/library/history").json()["versions"]
+    assert [one["said"] for one in shown[-2::-1]] == [words for _, _, words in changes]
+    assert shown[-1]["said"] == "Learned 12 movements; new: kind 0, kind 1, kind 2, kind 3"
+    assert [one["number"] for one in shown if not one["can_restore"]] == [12, 3]
+    assert _symbols(client)["wave"]["description"] == "a hand"
+    late = client.post("/api/library/undo", json={"version": 11, "to": 2})
+    assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 12)
+
+
 def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):
     writing = Store.writing
 
@@ -199,10 +242,42 @@ def test_every_change_says_its_own_version_whatever_others_change_meanwhile(clie
         ("movements/assign", {"ids": [7], "symbol": None}),
         ("movements/delete", {"ids": [8]}),
         ("undo", {}),
+        ("movements", asked(8, label="new")),
     ]
     versions = [client.post(f"/api/library/{path}", json=body).json()["version"] for path, body in asking]
     versions.append(client.delete(f"/api/library/symbols/{_symbols(client)['half']['id']}").json()["version"])
-    assert versions == [2 + 2 * k for k in range(9)]
+    assert versions == [2 + 2 * k for k in range(10)]
+    again = client.post("/api/library/movements", json=asked(8)).json()
+    assert again["version"] == client.get("/api/library").json()["version"] == versions[-1] + 1
+
+
+def test_a_change_is_of_the_symbol_that_was_asked_for_whatever_others_call_so_meanwhile(client, folder, monkeypatch):
+    key, looked = _symbols(client)["kind 0"]["id"], Studio.symbol
+
+    def swapped(studio, *options):
+        found = looked(studio, *options)
+        with ActionLibrary(folder) as other:
+            for old, new in ((found.name, "for now"), ("kind 1", found.name), ("for now", "kind 1")):
+                other.rename(old, new)
+        return found
+
+    monkeypatch.setattr(Studio, "symbol", swapped)
+    assert client.post(f"/api/library/symbols/{key}/describe", json={"text": "mine"}).status_code == 200
+    shown = {one["id"]: one["description"] for one in client.get("/api/library").json()["symbols"]}
+    assert {one for one, text in shown.items() if text} == {key}
+    monkeypatch.setattr(Studio, "symbol", lambda studio, *options: replace(looked(studio, *options), name="kind 2"))
+    for path, body in (
+        (f"symbols/{key}/rename", {"name": "wave"}),
+        (f"symbols/{key}/split", {"ids": [1], "name": "half"}),
+        ("symbols/merge", {"ids": [key], "into": "whole"}),
+    ):
+        assert client.post(f"/api/library/{path}", json=body).status_code == 200
+    monkeypatch.undo()
+    whole = _symbols(client)["whole"]["id"]
+    assert set(_symbols(client)) == {"kind 0", "kind 2", "kind 3", "half", "whole"}
+    monkeypatch.setattr(Studio, "symbol", lambda studio, *options: replace(looked(studio, *options), name="kind 2"))
+    assert client.delete(f"/api/library/symbols/{whole}").status_code == 200
+    assert set(_symbols(client)) == {"kind 0", "kind 2", "kind 3", "half"}
 
 
 def test_what_is_gone_meanwhile_is_a_conflict_and_what_never_was_is_missing(client, folder):

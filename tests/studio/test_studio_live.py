@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import sqlite3
+import threading
 import time
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from kineme.studio.server.changes import Changes
 from kineme.studio.server.live_session import parsed_samples
 from kineme.studio.server.live_socket import _Client
 from kineme.studio.server.live_sources import MOST, Follower, Sources
+from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.early import DRAWN
 
 
@@ -156,7 +158,53 @@ def test_what_was_named_is_known_to_the_next_drawing(client):
         client.post("/api/library/movements", json=asked(9, label="new"))
         assert _said(socket, "changed") == 2
         socket.send_json({"reset": True})
+        _until_warm(client, 2)
         assert _draw(socket, 9, seed=5)["ranked"][0]["name"] == "new"
+
+
+def _until_warm(client, version):
+    end = time.monotonic() + 30
+    while client.app.state.studio.warm != version:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_is_ready(client, monkeypatch):
+    studio, makes, may_make = client.app.state.studio, Studio.stream, threading.Event()
+
+    def slow(studio):
+        assert may_make.wait(30)
+        return makes(studio)
+
+    with client.websocket_connect(LIVE) as socket:
+        _draw(socket, 2)
+        socket.send_json({"finish": True})
+        _said(socket, "answer")
+        monkeypatch.setattr(Studio, "stream", slow)
+        version = client.post("/api/library/movements", json=asked(9, label="new")).json()["version"]
+        rows = samples(9, 5)
+        for start in range(0, 36, 6):
+            socket.send_json({"samples": rows[start : start + 6]})
+            assert {one["name"] for one in _said(socket, "state")["ranked"]} <= {f"kind {k}" for k in range(4)}
+        may_make.set()
+        _until_warm(client, version)
+        socket.send_json({"samples": rows[36:42]})
+        state = _said(socket, "state")
+        assert state["ranked"][0]["name"] == "new"  # of all samples so far
+        with ActionLibrary(studio.library.folder, read_only=True) as library:
+            ours = library.stream(early=DRAWN)
+            for start in range(0, 42, 6):
+                some = np.array(rows[start : start + 6])
+                known = ours.update(some[:, 0], some[:, 1:])
+        assert state["progress"] == pytest.approx(known.progress)
+        may_make.clear()
+        client.post("/api/library/movements", json=asked(8, label="another"))
+        socket.send_json({"reset": True})
+        socket.send_json({"samples": samples(8, 5)})
+        assert "another" not in {one["name"] for one in _said(socket, "state")["ranked"]}
+        socket.send_json({"finish": True})
+        may_make.set()
+        assert _said(socket, "answer")["ranked"][0]["name"] == "another"
 
 
 def test_eight_names_are_told_of_many(tmp_path, open_studio):

@@ -76,7 +76,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "symbols": list(report.symbols),
             "movements": len(library),
             "people": sorted({one for one in people or () if one is not None}),
-            "version": library.version,
+            "version": report.version,
             "problems": list(map(str, parsed.problems)),
         }
     say(as_json, data, lambda: _text(data))

@@ -78,9 +78,12 @@ def show(symbol: str, folder: Path, as_json: bool) -> None:
 @json_option
 def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
     """Give a symbol another NAME; its id stays."""
+    from kineme.library.storage import changes
+
     with opened(folder, read_only=False) as actions:
-        actions.rename(symbol, name)
-        data = {**brief(actions[name]), "was": symbol, "version": actions.version}
+        key = actions[symbol].id  # a name may be another symbol's when the change is made
+        version = changes.rename(actions.store, key, name)
+        data = {**brief(actions[key]), "was": symbol, "version": version}
     say(as_json, data, lambda: f"{printable(symbol)} is now {printable(name)} ({data['id']})")
 
 
@@ -91,9 +94,12 @@ def rename(symbol: str, name: str, folder: Path, as_json: bool) -> None:
 @json_option
 def annotate(symbol: str, text: str, folder: Path, as_json: bool) -> None:
     """Set the description of a symbol."""
+    from kineme.library.storage import changes
+
     with opened(folder, read_only=False) as actions:
-        actions.annotate(symbol, text)
-        data = {**brief(actions[symbol]), "version": actions.version}
+        key = actions[symbol].id
+        version = changes.annotate(actions.store, key, description=text)
+        data = {**brief(actions[key]), "version": version}
     say(as_json, data, lambda: f"{printable(data['name'])}: {printable(text)}")
 
 
@@ -114,14 +120,19 @@ def delete(symbol: str | None, movements: tuple[int, ...], yes: bool, folder: Pa
 
     Earlier versions still contain them, see kineme library history.
     """
+    from kineme.library.storage import changes
+
     if (symbol is None) == (not movements):
         raise click.UsageError("expected a SYMBOL, or --movement ID, and not both")
     what = printable(symbol) if symbol is not None else counted(len(movements), "movement")
     if not yes:
         confirm(f"Delete {what} from {printable(folder)}?", abort=True, err=True)
     with opened(folder, read_only=False) as actions:
-        actions.delete(symbol if symbol is not None else list(movements))
-        data = {"deleted": symbol if symbol is not None else list(movements), "version": actions.version}
+        store = actions.store
+        version = (
+            changes.delete_movements(store, list(movements)) if symbol is None else changes.delete_symbol(store, symbol)
+        )
+        data = {"deleted": symbol if symbol is not None else list(movements), "version": version}
     say(as_json, data, lambda: f"deleted {what}; version {data['version']}")
 
 
@@ -149,19 +160,23 @@ def history(folder: Path, limit: int, as_json: bool) -> None:
     say(as_json, data, text)
 
 
-@library.command(short_help="Take back the last change.")
+@library.command(short_help="Take back the last change, or restore a version.")
 @library_option
 @click.option("--at", "expected", type=ID, help="Only if this is still the last version, as history lists it.")
+@click.option("--to", type=ID, help="Restore this earlier version, as history lists it; 0 is the empty library.")
 @json_option
-def undo(folder: Path, expected: int | None, as_json: bool) -> None:
+def undo(folder: Path, expected: int | None, to: int | None, as_json: bool) -> None:
     """Take back the last change, whoever made it, as a new version; again, the one before.
 
-    All that one call of kineme learn stored is one change. kineme library history lists the changes.
+    All that one call of kineme learn stored is one change. kineme library history lists the changes. With --to, the
+    library is as it was at that version: versions between stay in the history, and undo takes the restoring back. What
+    was undone is done again by restoring the version that was taken back.
     """
     with opened(folder, read_only=False) as actions:
-        undone = actions.undo(expected)
+        undone = actions.undo(expected, to)
         data = {"undone": undone.action, "to": undone.to, "version": undone.version}
-    say(as_json, data, lambda: f"took back {data['undone']}; as at version {data['to']}; version {data['version']}")
+    done = f"took back {data['undone']}; as at" if to is None else "restored"
+    say(as_json, data, lambda: f"{done} version {data['to']}; version {data['version']}")
 
 
 @library.command(short_help="Check every byte of a library.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import sys
 from typing import Any
 
@@ -47,8 +48,21 @@ class _OneLineErrors(click.Group):
             error.message = printable_lines(error.message)  # type: ignore[misc] # click prints it
             raise
         except (KinemeError, OSError) as error:
-            write(f"kineme: {printable(error)}", err=True)
+            write(f"kineme: {printable(_in_words(error))}", err=True)
             sys.exit(1)
+
+
+def _in_words(error: Exception) -> str:
+    """The message of an error; of one of the system without its number, and with what to do."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    where = "" if error.filename is None else f" {os.fsdecode(error.filename)}"
+    if error.strerror.startswith("expected"):
+        return f"{error.strerror}:{where}" if where else error.strerror
+    return (
+        f"expected to read or write{where or ' a file'}, the system refuses: {error.strerror.lower()}; "
+        "check its name and who may read and write it"
+    )
 
 
 def _say_compiling() -> None:

@@ -104,7 +104,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         TrajectoryError
             Movements that cannot be used, or of other dimensions than those of `fit`.
         DegenerateMovementError
-            Weights or forcing in the original formulation where g = x0.
+            Weights or forcing in the original formulation where ``g = x0``.
         """
         check_is_fitted(self)
         demonstrations = Demonstrations.of(X)

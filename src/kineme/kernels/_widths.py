@@ -28,7 +28,7 @@ def median_of_sums(term: Term, finish: Callable[[Rows], object], X: Rows) -> flo
 
 
 def median_difference(X: Rows) -> float:
-    """Median over pairs of rows and coordinates of the differences |x_i - y_i| that are not zero.
+    """Median over pairs of rows and coordinates of the differences ``|x_i - y_i|`` that are not zero.
 
     Of large X, as many evenly spaced rows are used as give about two million differences.
     """

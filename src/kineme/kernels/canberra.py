@@ -19,8 +19,8 @@ class Canberra(Kernel):
     number but zero changes nothing.
 
     Positive semi-definite. A term is 0 where the signs differ, 1 where both are 0, and else
-    2 min(a, b) / (a + b) with a = |x_i|, b = |y_i|: the product of the covariance of Brownian motion,
-    min(a, b), and of 1 / (a + b) = ∫ exp(-a t) exp(-b t) dt, both positive semi-definite (Schur).
+    ``2 min(a, b) / (a + b)`` with ``a = |x_i|``, ``b = |y_i|``: the product of the covariance of Brownian motion,
+    ``min(a, b)``, and of ``1 / (a + b) = ∫ exp(-a t) exp(-b t) dt``, both positive semi-definite (Schur).
     Positive, negative and zero coordinates are three blocks without a similarity between them, and a
     block-diagonal matrix of such blocks, and the mean over coordinates, stay positive semi-definite.
     """

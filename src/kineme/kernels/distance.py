@@ -23,8 +23,8 @@ class DistanceKernel(Kernel):
     r"""``k(x, y) = h(Σ_j g(d(x_j, y_j)))``, Eq. (5), for functions of your own.
 
     Nothing is claimed about positive semi-definiteness: it depends on the functions. With
-    h(z) = exp(-z) it holds if g(d(x, y)) is conditionally negative definite (Schoenberg), as for
-    |x - y|^p with 0 < p <= 2.
+    ``h(z) = exp(-z)`` it holds if ``g(d(x, y))`` is conditionally negative definite (Schoenberg), as for
+    ``|x - y|^p`` with ``0 < p <= 2``.
 
     Parameters
     ----------

@@ -14,17 +14,19 @@ from kineme.kernels.base import Kernel
 
 @dataclass(frozen=True)
 class Laplacian(Kernel):
-    r"""Laplacian: ``k(x, y) = exp(-Σ_i |x_i - y_i| / σ)``, Eq. (5) with d = |x - y|, g(z) = z / σ, h(z) = exp(-z).
+    r"""Laplacian: ``k(x, y) = exp(-Σ_i |x_i - y_i| / σ)``, Eq. (5).
 
-    Positive semi-definite for every σ: a product over coordinates of exp(-|t| / σ), whose Fourier
-    transform is a Cauchy density (Bochner, Schur). Its power k^t is the Laplacian with σ / t, so it is
+    There ``d = |x - y|``, ``g(z) = z / σ`` and ``h(z) = exp(-z)``.
+
+    Positive semi-definite for every σ: a product over coordinates of ``exp(-|t| / σ)``, whose Fourier
+    transform is a Cauchy density (Bochner, Schur). Its power ``k^t`` is the Laplacian with ``σ / t``, so it is
     infinitely divisible.
 
     Parameters
     ----------
     sigma : float > 0, optional
         In the unit of the features. By default the median L1 distance between different reference
-        rows (1000 evenly spaced ones where there are more). scikit-learn's gamma is 1 / σ.
+        rows (1000 evenly spaced ones where there are more). scikit-learn's gamma is ``1 / σ``.
     """
 
     sigma: float | None = field(default=None, metadata={"width": True})

@@ -21,17 +21,17 @@ class RBF(Kernel):
     r"""Radial basis function: ``k(x, y) = exp(-‖x - y‖² / (2 σ²))``, Eq. (6).
 
     Positive semi-definite for every σ: it is the characteristic function of a Gaussian (Bochner).
-    Its power k^t is the RBF with σ / √t, so it is infinitely divisible.
+    Its power ``k^t`` is the RBF with ``σ / sqrt(t)``, so it is infinitely divisible.
 
-    The paper decomposes it as d = |x_j - y_j|, g(z) = z² / (2 σ), h(z) = exp(-z), Eq. (5); Eq. (6)
-    needs g(z) = z² / (2 σ²), which is what is computed.
+    The paper decomposes it as ``d = |x_j - y_j|``, ``g(z) = z² / (2 σ)``, ``h(z) = exp(-z)``, Eq. (5); Eq. (6)
+    needs ``g(z) = z² / (2 σ²)``, which is what is computed.
 
     Parameters
     ----------
     sigma : float > 0, optional
         In the unit of the features. By default the median Euclidean distance between different
         reference rows (1000 evenly spaced ones where there are more).
-        scikit-learn's gamma is 1 / (2 σ²).
+        scikit-learn's gamma is ``1 / (2 σ²)``.
     """
 
     sigma: float | None = field(default=None, metadata={"width": True})

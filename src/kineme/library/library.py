@@ -302,8 +302,8 @@ class ActionLibrary:
         """All versions, the first one first."""
         return history(self.store)
 
-    def undo(self, expected: int | None = None) -> Undone:
-        """Take back the last change that was not taken back yet, whoever made it, as a new version.
+    def undo(self, expected: int | None = None, to: int | None = None) -> Undone:
+        """Take back the last change that was not taken back yet, whoever made it, or restore a version, as a new one.
 
         All that one call of `learn` stored is one change, unless somebody else changed the library meanwhile. Called
         again, it takes back the change before. Symbols get their ids again; a movement that was deleted gets a
@@ -312,19 +312,24 @@ class ActionLibrary:
         Parameters
         ----------
         expected : int, optional
-            The version to take back, so that no change is that came since it was looked at.
+            The version that the library is at, so that no change is taken back that came since it was looked at.
+        to : int, optional
+            Restore this earlier version instead; 0 is the empty library. Versions between stay in the history, and an
+            undo takes the restoring back: to restore the version that was undone is to do its change again.
 
         Returns
         -------
         Undone
-            ``(version, to, action)``: the new version has the state of version `to`; `action` is what was taken back.
+            ``(version, to, action)``: the new version has the state of version `to`; `action` is what was taken back,
+            "restore" where `to` was given.
 
         Raises
         ------
         SpecificationError
-            No change is left, or the library is at another version than expected.
+            No change is left, there is no such version before the last one or the library is as it was at it, or the
+            library is at another version than expected.
         """
-        return undo.undo(self.store, expected)
+        return undo.undo(self.store, expected, to)
 
     def at(self, version: int) -> ActionLibrary:
         """The library as it was at a version, for reading."""

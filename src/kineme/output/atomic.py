@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+_LONGEST_NAME = 228  # bytes: the hidden name beside it is longer, and file systems take 255
 _IDLE = 3600.0  # seconds since the last write after which the file of a process that no longer runs is a leftover
 
 
@@ -24,10 +25,6 @@ def write_atomically(path: Path, data: bytes) -> Path:
     OSError
         The folder is missing, read-only or full; an existing file at `path` is unchanged.
     """
-    if not path.name or path.is_dir():  # an empty text is the current folder
-        raise IsADirectoryError(f"expected the name of a file to write, got the folder {str(path)!r}; add a name")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, there is none; create it")
     with whole_file(path) as beside:
         beside.write_bytes(data)
     return path
@@ -54,19 +51,29 @@ def whole_file(path: Path, *, replace: bool = True, companions: Sequence[str] = 
     OSError
         The folder is missing, read-only or full; what was at `path` is as it was.
     """
+    if len(os.fsencode(path.name)) > _LONGEST_NAME:
+        raise OSError(
+            f"expected a name of at most {_LONGEST_NAME} bytes to write, got {path.name[:20]}..., which is longer; "
+            "choose a shorter one"
+        )
     if not replace and path.exists():
-        raise FileExistsError(path)
+        raise FileExistsError(f"expected a new file to write, {path} is there; choose another name")
+    if not path.name or path.is_dir():  # an empty text is the current folder
+        raise IsADirectoryError(f"expected the name of a file to write, got the folder {str(path)!r}; add a name")
+    if not path.parent.is_dir():
+        there = "a file of that name is there" if path.parent.exists() else "there is none"
+        raise FileNotFoundError(f"expected a folder {path.parent} to write {path.name} into, {there}; create it")
     remove_leftovers(path)
     beside = name_beside(path)
     try:
-        with _named(path):
+        with _named(path, beside):
             yield beside
-        bring_to_disk(beside)
-        if replace:
-            beside.replace(path)
-        else:
-            _name_new(beside, path)
-            _bring_folder_to_disk(path.parent)
+            bring_to_disk(beside)
+            if replace:
+                beside.replace(path)
+            else:
+                _name_new(beside, path)
+                _bring_folder_to_disk(path.parent)
     finally:
         for end in ("", *companions):
             beside.with_name(beside.name + end).unlink(missing_ok=True)
@@ -80,7 +87,7 @@ def _name_new(beside: Path, path: Path) -> None:
         raise
     except OSError:  # a file system without links
         if path.exists():
-            raise FileExistsError(path) from None
+            raise FileExistsError(f"expected a new file to write, {path} is there; choose another name") from None
         beside.rename(path)
 
 
@@ -142,17 +149,20 @@ def _is_at_work(process: int) -> bool:
 
 
 @contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Context manager: a full disk is an error that says what could not be written."""
+def _named(path: Path, beside: Path) -> Iterator[None]:
+    """Context manager: a full disk, and a folder that takes no file, are errors that say what could not be written."""
     try:
         yield
     except OSError as error:
-        if error.errno != errno.ENOSPC:
+        if error.errno == errno.ENOSPC:
+            said = "expected room to write, got a full disk; free some space and run it again"
+            raise OSError(error.errno, said, str(path)) from error
+        if not str(error.filename).startswith(str(beside)):
             raise
-        raise OSError(
-            error.errno,
-            "expected room to write, got a full disk; free some space and run it again",
-            str(path),
+        refused = error.errno in {errno.EACCES, errno.EPERM, errno.EROFS}
+        raise type(error)(
+            f"expected to write {path}, the system refuses: {(error.strerror or 'no reason given').lower()}; "
+            + (f"allow writing in {path.parent}, or choose another folder" if refused else "choose another folder")
         ) from error
 
 
@@ -171,9 +181,9 @@ def whole_folder(path: Path) -> Iterator[Path]:
     if path.exists() and not empty:
         raise FileExistsError(f"expected a new folder to write, {path} is there")
     beside = name_beside(path)
-    beside.mkdir()
     try:
-        with _named(path):
+        with _named(path, beside):
+            beside.mkdir()
             yield beside
         if empty:
             path.rmdir()

@@ -89,7 +89,7 @@ def find_outliers(
 ) -> Outliers:
     """Find movements that are unlike the others of their label.
 
-    The score of a movement is ``a = d / s sqrt(h / e)``: its mean distance d from the three nearest others of its
+    The score of a movement is ``a = (d / s) sqrt(h / e)``: its mean distance d from the three nearest others of its
     label, ``d = sqrt(-2 log K)`` by the similarity K of `Recognizer`, over the typical one s, the median of its label
     shrunk towards that of all as if by four more movements; e is its distance from the nearest of some 500 movements of
     other labels, h the median of e. Above their median m, scores of movements that are alike fall about exponentially,

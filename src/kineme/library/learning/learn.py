@@ -57,7 +57,7 @@ class LearnReport:
     ids : ndarray of shape (n,)
         Ids of the movements in the given order; for movements stored before, the existing id.
     version : int
-        Version of the library afterwards.
+        Version that this call made, the last one of several; where nothing changed, the one that it found.
     """
 
     added: int
@@ -81,6 +81,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 ) -> LearnReport:
     """Store new movements; see `ActionLibrary.learn`."""
     store.check_writable()
+    found = store.version
     demos = _in_columns_of(store, Demonstrations.of(movements))
     _check_dimensions(store, demos)
     check(demos)
@@ -108,7 +109,7 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
         sum(len(one.ids) - one.added for one in reports),
         tuple(dict.fromkeys(name for one in reports for name in one.symbols)),
         np.concatenate([one.ids for one in reports]),
-        store.version,
+        max((one.version for one in reports if one.version is not None), default=found),
     )
 
 

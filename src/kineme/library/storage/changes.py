@@ -17,14 +17,17 @@ from kineme.library.storage.versions import Change
 from kineme.validation import check_choice, check_number
 
 _STATE = COLUMNS["symbol_state"]
+_NAME = _STATE.index("name")  # the history says names, whatever the symbol was asked for by
 _SAID = ("description", "prototype", "threshold")  # the columns that `annotate` changes
 
 
 def rename(store: Store, old: str, new: str) -> int:
     """Rename a symbol; its id stays."""
     check_name(new)
-    with store.writing("rename", {"old": old, "new": new}) as change:
+    detail = {"old": old, "new": new}
+    with store.writing("rename", detail) as change:
         state = state_of(change.connection, old, NOW)
+        detail["old"] = state[_NAME]
         _check_free(change.connection, new)
         _replace_state(change, state, name=new)
     return change.version
@@ -43,15 +46,20 @@ def annotate(store: Store, who: str, **values: Any) -> int:
         if not isinstance(values["description"], str):
             raise SpecificationError(f"expected a description, got {values['description']!r}")
         check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, in JSON
-    with store.writing("annotate", {"symbol": who, **values}) as change:
-        _replace_state(change, state_of(change.connection, who, NOW), **values)
+    detail = {"symbol": who, **values}
+    with store.writing("annotate", detail) as change:
+        state = state_of(change.connection, who, NOW)
+        detail["symbol"] = state[_NAME]
+        _replace_state(change, state, **values)
     return change.version
 
 
 def delete_symbol(store: Store, who: str) -> int:
     """Delete a symbol; its movements stay, without a symbol."""
-    with store.writing("delete", {"symbol": who}) as change:
+    detail = {"symbol": who}
+    with store.writing("delete", detail) as change:
         state = state_of(change.connection, who, NOW)
+        detail["symbol"] = state[_NAME]
         _leave(change, "symbol = :key", {"key": state[1]})
         change.retire("symbol_state", [state])
     return change.version
@@ -79,9 +87,14 @@ def merge(store: Store, names: Sequence[str], into: str) -> int:
     """
     if isinstance(names, str) or len(set(names)) < 1:
         raise SpecificationError(f"expected a list of symbols to merge, got {names!r}")
-    with store.writing("merge", {"names": list(names), "into": into}) as change:
+    detail: dict[str, Any] = {"names": list(names), "into": into}
+    with store.writing("merge", detail) as change:
         states = {state[1]: state for state in (state_of(change.connection, name, NOW) for name in names)}
         target = _find(change.connection, into)
+        detail |= {
+            "names": [state[_NAME] for state in states.values()],
+            "into": into if target is None else target[_NAME],
+        }
         merged = [state for key, state in states.items() if target is None or key != target[1]]
         if not merged:
             raise SpecificationError(f"expected symbols other than {into!r} to merge into it, got {list(names)}")
@@ -105,8 +118,10 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
     """Split a symbol: some of its members become a new symbol, and the old one becomes its parent."""
     check_name(new)
     wanted = as_ids(store, ids)
-    with store.writing("split", {"symbol": name, "new": new, "movements": len(wanted)}) as change:
+    detail = {"symbol": name, "new": new, "movements": len(wanted)}
+    with store.writing("split", detail) as change:
         state = state_of(change.connection, name, NOW)
+        detail["symbol"] = state[_NAME]
         _check_free(change.connection, new)
         key = make(change, new, _ids_of(change.connection, [state]))
         where = f"symbol = :key AND {among('movement')}"
@@ -126,8 +141,10 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int 
     """
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
-    with store.writing("assign", {"symbol": who, "movements": len(wanted), "how": how}) as change:
+    detail = {"symbol": who, "movements": len(wanted), "how": how}
+    with store.writing("assign", detail) as change:
         state = _find(change.connection, who)
+        detail["symbol"] = who if state is None else state[_NAME]
         key = make(change, check_name(who)) if state is None else state[1]
         left = _leave(change, among("movement"), {"keys": listed(wanted)})
         _forget_prototypes(change, [row for row in left if row[2] != key])

@@ -31,7 +31,7 @@ _DEFINITIONS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY typ
 
 def connect(path: Path, mode: str, wait: float) -> Connection:
     """A connection in ``mode`` "ro", "rw" or "rwc"; transactions are begun explicitly."""
-    address = f"file:{quote(str(path))}?mode={mode}"
+    address = f"file:{quote(os.fsencode(path))}?mode={mode}"
     if mode == "ro" and _cannot_keep_a_log(path):
         address += "&immutable=1"
     connection = open_connection(address, uri=True, timeout=wait, isolation_level=None, check_same_thread=False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kineme.library.storage.column_checks import GOOD
 from kineme.library.storage.rows import Row, parsed
-from kineme.library.storage.schema import UNDO
+from kineme.library.storage.schema import RETURNS
 from kineme.validation import Array
 
 Strange = Iterator[tuple[Any, str]]
@@ -32,8 +32,8 @@ def _version(rows: Sequence[Row]) -> Strange:
             yield key, "a detail that is no JSON object"
         elif action == "reject" and not _are(int, detail.get("movements")):
             yield key, "a rejection without its list of movements"
-        elif action == UNDO and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
-            yield key, "an undo without the earlier version that it returned to"
+        elif action in RETURNS and not (type(detail.get("to")) is int and 0 <= detail["to"] < key):
+            yield key, f"an action {action} without the earlier version that it returned to"
 
 
 def _source(rows: Sequence[Row]) -> Strange:

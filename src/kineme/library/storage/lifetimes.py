@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.library.storage.schema import COUNTED, LARGEST_ID, UNDO
+from kineme.library.storage.schema import COUNTED, LARGEST_ID, RETURNS
 
 Whole = NDArray[np.int64]
 Found = Iterator[tuple[str, int, str]]  # table, key, what is wrong
@@ -23,8 +23,8 @@ def lives(connection: sqlite3.Connection) -> Found:
     member = _columns(connection, "member", "movement")
     symbol = _columns(connection, "member", "symbol")
     yield from _apart("member", member, "the movement shows two symbols at a time")
-    returned = [key for (key,) in connection.execute("SELECT id FROM version WHERE action = ?", (UNDO,))]
-    gaps = "is not there for a while"  # none but those of symbols that were deleted, until that was undone
+    returned = [key for (key,) in connection.execute("SELECT id FROM version WHERE action IN (?, ?)", RETURNS)]
+    gaps = "is not there for a while"  # none but those of symbols that were deleted, until they were there again
     yield from _apart("symbol_state", state, "the symbol has two states at a time", gaps, returned)
     yield from _apart("symbol_state", _named(connection), "two symbols have its name at a time")
     yield from _within("member", member, movement, "its movement")

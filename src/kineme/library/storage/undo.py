@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping
+from numbers import Integral
 from typing import NamedTuple
 
 from kineme.errors import SpecificationError
 from kineme.library.storage.rows import ALIVE, Row, among, has_table, listed, next_key, parsed_column, select
-from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, UNDO
+from kineme.library.storage.schema import BLOBS, COLUMNS, CONTINUES, OPTIONAL_BLOBS, RESTORE, RETURNS, UNDO
 from kineme.library.storage.store import NOW, Store
 from kineme.library.storage.versions import Change
 
@@ -17,31 +18,51 @@ _STATE = {name: k for k, name in enumerate(COLUMNS["symbol_state"])}
 
 
 class Undone(NamedTuple):
-    """What `undo` did: it made `version`, whose state is that of version `to`; `action` is what it took back."""
+    """What `undo` did: it made `version`, whose state is that of version `to`.
+
+    `action` is what it took back; "restore" where it was asked for that version.
+    """
 
     version: int
     to: int
     action: str
 
 
-def undo(store: Store, expected: int | None = None) -> Undone:
-    """Take back the last change that was not taken back yet; see `ActionLibrary.undo`."""
+def undo(store: Store, expected: int | None = None, to: int | None = None) -> Undone:
+    """Take back the last change that was not taken back yet, or restore a version; see `ActionLibrary.undo`."""
     detail: dict[str, int] = {}
-    with store.writing(UNDO, detail) as change:
+    with store.writing(UNDO if to is None else RESTORE, detail) as change:
         last = change.version - 1
         if expected is not None and expected != last:
+            what = "take back" if to is None else "replace"
             raise SpecificationError(
-                f"expected to take back version {expected}, the library is at version {last} by now; "
-                "look at what has changed, and undo again"
+                f"expected to {what} version {expected}, the library is at version {last} by now; "
+                f"look at what has changed, and {'undo' if to is None else 'restore'} again"
             )
-        undone = _effective(change.connection, last)
-        if undone == 0:
-            raise SpecificationError("expected a change to take back, the library has none left; nothing was changed")
-        action = _version(change.connection, undone)[2]
-        to = _begin(change.connection, undone) - 1
-        detail |= {"to": to}
-        _return_to(change, to)
-    return Undone(change.version, to, action)
+        action, back = _last_change(change.connection, last) if to is None else (RESTORE, _earlier(change, to))
+        detail |= {"to": back}
+        _return_to(change, back)
+    return Undone(change.version, back, action)
+
+
+def _last_change(connection: sqlite3.Connection, last: int) -> tuple[str, int]:
+    """The action to take back, and the version before it."""
+    undone = _effective(connection, last)
+    if undone == 0:
+        raise SpecificationError("expected a change to take back, the library has none left; nothing was changed")
+    return _version(connection, undone)[2], _begin(connection, undone) - 1
+
+
+def _earlier(change: Change, to: int) -> int:
+    """The version to restore, checked: an earlier one, with another state."""
+    last = change.version - 1
+    if not (isinstance(to, Integral) and not isinstance(to, bool) and 0 <= to < last):
+        raise SpecificationError(f"expected a version before {last} to restore, got {to!r}; see history()")
+    if _effective(change.connection, int(to), RETURNS) == _effective(change.connection, last, RETURNS):
+        raise SpecificationError(
+            f"expected a version to restore, the library is as at version {to}; nothing was changed"
+        )
+    return int(to)
 
 
 def can_undo(store: Store) -> bool:
@@ -50,12 +71,15 @@ def can_undo(store: Store) -> bool:
         return not store.read_only and _effective(connection, store.moment(connection).version) > 0
 
 
-def _effective(connection: sqlite3.Connection, version: int) -> int:
-    """The version whose change the library is at: that of the state that an undo returned to, else the version."""
+def _effective(connection: sqlite3.Connection, version: int, returns: tuple[str, ...] = (UNDO,)) -> int:
+    """The version whose change the library is at: that of the state that an undo returned to, else the version.
+
+    With `RETURNS`, the first version that had its state, as far as the history says so.
+    """
     while version > 0:
         row = _version(connection, version)
         to = parsed_column("version", row, "detail", dict).get("to")
-        if row[2] != UNDO or not isinstance(to, int) or not 0 <= to < version:
+        if row[2] not in returns or not isinstance(to, int) or not 0 <= to < version:
             return version
         version = to
     return 0
@@ -65,7 +89,7 @@ def _begin(connection: sqlite3.Connection, version: int) -> int:
     """The first of the versions in a row that one call made."""
     while version > 1:
         row = _version(connection, version)
-        if row[2] == UNDO or parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
+        if row[2] in RETURNS or parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
             break
         version -= 1
     return version

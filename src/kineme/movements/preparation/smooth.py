@@ -25,7 +25,7 @@ class Smooth:
     """Replace each movement by its cubic smoothing spline, at its own time stamps.
 
     The spline g minimizes ``sum_j (x_j - g(u_j))^2 + lam * integral g''(u)^2 du`` in normalized time
-    u = (t - t0) / tau. On even samples h apart that is the low-pass filter ``1 / (1 + (nu / cutoff)^4)``, with
+    ``u = (t - t0) / tau``. On even samples h apart that is the low-pass filter ``1 / (1 + (nu / cutoff)^4)``, with
     ``lam = 1 / (h (2 pi cutoff)^4)``: zero phase, flat at low frequency, unbiased at both ends.
 
     Parameters

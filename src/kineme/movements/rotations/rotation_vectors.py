@@ -35,8 +35,8 @@ def as_vectors(p: ArrayLike) -> Array:
 def log(q: ArrayLike) -> Array:
     """Rotation vectors (..., 3) [rad] of unit quaternions (..., 4), of length 0 to pi.
 
-    ``p = 2 atan2(|v|, w) v / |v|`` with the sign of q = (w, v) for which w >= 0; q and -q give the same, except at
-    exactly pi, where the two ends of the axis are the same rotation.
+    ``p = 2 atan2(|v|, w) v / |v|`` with the sign of ``q = (w, v)`` for which ``w >= 0``; q and -q give the same, except
+    at exactly pi, where the two ends of the axis are the same rotation.
     """
     q = as_quaternions(q)
     w, v = np.abs(q[..., :1]), np.where(q[..., :1] < 0, -q[..., 1:], q[..., 1:])

@@ -32,7 +32,7 @@ REGRESSIONS = ("auto", "linear", "gaussian-process")
 class Contextual(BaseEstimator):
     """One primitive for each value of the task's parameters c, learned from demonstrations of some values.
 
-    All that a path depends on linearly, theta = [W, x0, g, tau v0], and ln tau are regressed on c, so that
+    All that a path depends on linearly, ``theta = [W, x0, g, tau v0]``, and ``ln tau`` are regressed on c, so that
     ``f(s, c) = sum_i psi_i(s) w_i(c) / sum_i psi_i(s)`` is one regression over phase and parameters (Stulp et
     al. 2013), and start, goal and duration follow the task as the shape does (Ude et al. 2010).
 

@@ -107,7 +107,7 @@ class Controller:
             A new goal, for this step and all later ones: where it is now.
         goal_velocity : array_like of shape (d,), optional
             Velocity of the goal, per second, which then moves on by itself, until the next goal. It is followed without
-            a lag; without a velocity, what moves at v is trailed by ``D / K tau v``, that is 0.2 tau v.
+            a lag; without a velocity, what moves at v is trailed by ``(D / K) tau v``, that is 0.2 tau v.
         tempo : float, default 1.0
             Speed of the phase during this step. The path does not depend on it; velocities are in proportion to it, so
             change it gradually. 0 is a pause.

@@ -16,7 +16,7 @@ AHEAD = 1e-4  # rad; an obstacle closer to straight ahead has no side, and one i
 class ObstacleAvoidance:
     """Turns the movement away from what lies ahead, as people do when they walk around things.
 
-    With r = o - x from the movement to an obstacle and v the velocity relative to it, both in normalized time, each
+    With ``r = o - x`` from the movement to an obstacle and v the velocity relative to it, both in normalized time, each
     obstacle adds to x''
 
         gamma R v phi exp(-beta phi) exp(-|r| / reach),        phi = angle between r and v,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class DMP(Specification):
     """A Dynamical Movement Primitive, as a frozen specification.
 
-    In normalized time u = t / tau, with one canonical system s(u) shared by all dimensions,
+    In normalized time ``u = t / tau``, with one canonical system s(u) shared by all dimensions,
 
         original      x'' = K (g - x) + (g - x0) f(s) - D x'                            Eq. (1)
         bio-inspired  x'' = s K (f(s)/s + x0 - x) + (1 - s) K (g - x) - D x'            Eq. (4)
@@ -42,7 +42,7 @@ class DMP(Specification):
     n_basis : int, default 40
         Number N of basis functions, at most 2,000.
     stiffness : float, default 100.0
-        Spring constant K, in units of 1 / tau^2.
+        Spring constant K, in units of ``1 / tau^2``.
     damping : float, optional
         Damping D; by default critical, ``2 sqrt(K)``.
     gating : {"none", "phase"}, default "none"
@@ -187,7 +187,7 @@ class Primitives(Learned):
         Raises
         ------
         DegenerateMovementError
-            In the original formulation, where g = x0 in a dimension.
+            In the original formulation, where ``g = x0`` in a dimension.
         """
         return (self.scaled_weights / self._scale("weights")).transpose(0, 2, 1)
 
@@ -199,7 +199,7 @@ class Primitives(Learned):
         Raises
         ------
         DegenerateMovementError
-            In the original formulation, where g = x0 in a dimension.
+            In the original formulation, where ``g = x0`` in a dimension.
         """
         return (self._scaled_forcing(n_samples) / self._scale("forcing")).transpose(0, 2, 1)
 

@@ -98,7 +98,7 @@ class Rollout(BaseRollout):
     def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
         """The least duration of each movement (n,) [s] in which the same path stays within limits, in closed form.
 
-        Of one path, velocities are in proportion to 1 / tau and accelerations to 1 / tau^2, so it is
+        Of one path, velocities are in proportion to ``1 / tau`` and accelerations to ``1 / tau^2``, so it is
         ``tau max(|v_k| / velocity_k, sqrt(|a_k| / acceleration_k))``, the maximum over samples and dimensions k.
         ``rollout(duration=...)`` moves so; initial velocities scale with the rest.
 

@@ -50,8 +50,8 @@ def angular_acceleration(p: ArrayLike, p_rate: ArrayLike, p_acceleration: ArrayL
 def rotation_vector_rate(p: ArrayLike, omega: ArrayLike) -> Array:
     """The inverse of `angular_velocity`: p' (..., 3) [rad/s] from p [rad] and omega in the world frame [rad/s].
 
-    ``p' = omega - [p]x omega / 2 + c [p]x^2 omega`` with ``c = (1 - (t/2) cot(t/2)) / t^2``. It does not exist at
-    t = 2 pi, 4 pi, ..., where the axis of p can change without turning anything.
+    ``p' = omega - [p]_x omega / 2 + c [p]_x^2 omega`` with ``c = (1 - (t/2) cot(t/2)) / t^2``. It does not exist at
+    ``t = 2 pi, 4 pi, ...``, where the axis of p can change without turning anything.
     """
     return _vectors(rate_components(_components(p), _components(omega)))
 

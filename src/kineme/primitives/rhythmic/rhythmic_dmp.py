@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class RhythmicDMP(RhythmicSpecification):
     """A rhythmic Dynamical Movement Primitive, as a frozen specification: a limit cycle that attracts.
 
-    With the phase ``phi = 2 pi t / period`` shared by all dimensions, and in time u = t / period (' = d/du),
+    With the phase ``phi = 2 pi t / period`` shared by all dimensions, and in time ``u = t / period`` (' = d/du),
 
         x'' = K (b - x) - D x' + r f(phi),    f(phi) = sum_i psi_i(phi) w_i / sum_i psi_i(phi),
 
@@ -39,7 +39,7 @@ class RhythmicDMP(RhythmicSpecification):
     n_basis : int, default 25
         Number N of basis functions; they hold about N / 2 harmonics.
     stiffness : float, default 100.0
-        Spring constant K, in units of 1 / period^2.
+        Spring constant K, in units of ``1 / period^2``.
     damping : float, optional
         Damping D; by default critical, ``2 sqrt(K)``.
     fit : {"trajectory", "forcing"}, default "trajectory"
@@ -69,9 +69,9 @@ class RhythmicDMP(RhythmicSpecification):
 
     Notes
     -----
-    Ijspeert et al. write ``tau = period / (2 pi)`` and measure stiffness per tau^2: their alpha_z = 25, beta_z = 25/4
-    is K = 4 pi^2 alpha_z beta_z = 6168.5 here. Instead of locally weighted regression the weights are found jointly,
-    and r is estimated instead of set to 1.
+    Ijspeert et al. write ``tau = period / (2 pi)`` and measure stiffness per ``tau^2``: their ``alpha_z = 25,
+    beta_z = 25/4`` is ``K = 4 pi^2 alpha_z beta_z = 6168.5`` here. Instead of locally weighted regression the weights
+    are found jointly, and r is estimated instead of set to 1.
 
     References
     ----------

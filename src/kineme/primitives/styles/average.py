@@ -40,7 +40,7 @@ _DERIVATIVES = {"position": 0, "velocity": 1, "acceleration": 2}
 class AveragePrimitive:
     """The mean of several primitives and, as a low-rank factor, their covariance; made by `average`.
 
-    With theta = [W, x0, g, tau v0], the d (N + 3) numbers that a path depends on linearly, the covariance is
+    With ``theta = [W, x0, g, tau v0]``, the ``d (N + 3)`` numbers that a path depends on linearly, the covariance is
     ``factor.T @ factor``. It is never formed: n demonstrations span n - 1 of its d (N + 3) directions.
 
     Attributes
@@ -274,7 +274,7 @@ def _primitive_of(other: Any) -> Primitives:
 def average(primitives: Primitives | MovementsLike, weights: ArrayLike | None = None) -> AveragePrimitive:
     """Mean and covariance of a batch of primitives, as if they were several demonstrations of one movement.
 
-    The mean of theta = [W, x0, g, tau v0] is the movement whose path is the mean of the demonstrations' paths at
+    The mean of ``theta = [W, x0, g, tau v0]`` is the movement whose path is the mean of the demonstrations' paths at
     equal phase, in every formulation; see `kineme.primitives.styles.parameters` for why the mean of the *scaled*
     weights W, and not of w, is the right one when g - x0 differs. Durations are averaged geometrically, as tempi are
     ratios.

@@ -34,7 +34,7 @@ def learn_styles(
     """Find the J directions in which the demonstrations differ most.
 
     With X the rows of what the metric compares, minus their mean, ``X = U S V^T`` is cut after J terms. The styles of
-    the demonstrations are the columns of U times sqrt(n); each number of the primitives is regressed on them.
+    the demonstrations are the columns of U times ``sqrt(n)``; each number of the primitives is regressed on them.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def descend(
 ) -> Reached:
     """Steps of damped least squares (Levenberg and Marquardt) towards poses of the tip.
 
-    A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order, as those of
+    A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (0.0001 |q - rest|)^2`` to first order, as those of
     `InverseKinematics` do; a joint at a stop stays there while it is pushed outwards.
 
     Parameters

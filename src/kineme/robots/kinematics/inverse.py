@@ -23,7 +23,7 @@ _WXYZ = [0, 1, 2, 6, 3, 4, 5]  # pinocchio has w last
 class InverseKinematics:
     """The joints of one arm, step by step; the quadratic programs are those of pink, solved by DAQP.
 
-    One step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (1e-4 |q - rest|)^2`` to first order in the change of the
+    One step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (0.0001 |q - rest|)^2`` to first order in the change of the
     joints q, subject to the limits of position, less 0.2 % of their range: between samples a path goes a little beyond.
     p and R are position and orientation of the tip, starred the wanted ones, log the rotation vector of a rotation, c
     the costs of turning. `LiveKinematics` keeps the limits of velocity and acceleration too.

@@ -16,6 +16,12 @@ class NewMovement(Change):
     group: Name | None = Field(None, description="Who showed it.")
 
 
+class Back(Change):
+    """Which version's state is wanted again; by default that before the last change."""
+
+    to: int | None = Field(None, ge=0)
+
+
 class Rename(Change):
     """A new name of a symbol."""
 

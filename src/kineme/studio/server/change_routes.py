@@ -8,9 +8,9 @@ from fastapi import APIRouter, Query
 
 from kineme.errors import SpecificationError
 from kineme.library.storage import changes
-from kineme.studio.server.change_records import Assign, Chosen, Describe, Merge, NewMovement, Rename, Split
+from kineme.studio.server.change_records import Assign, Back, Chosen, Describe, Merge, NewMovement, Rename, Split
 from kineme.studio.server.plain import trajectory
-from kineme.studio.server.records import VERSION, AsOf, Learned, SymbolKey, Version
+from kineme.studio.server.records import VERSION, Learned, SymbolKey, Version
 from kineme.studio.server.refusals import ConflictError
 from kineme.studio.server.studio import Writes
 
@@ -45,30 +45,30 @@ def delete_movements(studio: Writes, asked: Chosen) -> dict[str, Any]:
 @router.post("/symbols/merge", response_model=Version, summary="Merge symbols into one")
 def merge(studio: Writes, asked: Merge) -> dict[str, Any]:
     """`into` names one of them, another one, or a new one."""
-    names = [studio.symbol(key, asked.version).name for key in asked.ids]
-    return {"version": changes.merge(studio.library.store, names, asked.into)}
+    keys = [studio.symbol(key, asked.version).id for key in asked.ids]  # a name may be another symbol's meanwhile
+    return {"version": changes.merge(studio.library.store, keys, asked.into)}
 
 
 @router.post("/symbols/{key}/rename", response_model=Version, summary="Rename a symbol")
 def rename(studio: Writes, key: SymbolKey, asked: Rename) -> dict[str, Any]:
     """Its id stays."""
-    name = studio.symbol(key, asked.version).name
-    return {"version": changes.rename(studio.library.store, name, asked.name)}
+    studio.symbol(key, asked.version)
+    return {"version": changes.rename(studio.library.store, key, asked.name)}
 
 
 @router.post("/symbols/{key}/describe", response_model=Version, summary="Describe a symbol")
 def describe(studio: Writes, key: SymbolKey, asked: Describe) -> dict[str, Any]:
     """In words of your own."""
-    name = studio.symbol(key, asked.version).name
-    return {"version": changes.annotate(studio.library.store, name, description=asked.text)}
+    studio.symbol(key, asked.version)
+    return {"version": changes.annotate(studio.library.store, key, description=asked.text)}
 
 
 @router.post("/symbols/{key}/split", response_model=Version, summary="Make a new symbol of some members")
 def split(studio: Writes, key: SymbolKey, asked: Split) -> dict[str, Any]:
     """The others stay."""
     studio.check_movements(asked.ids, asked.version)
-    name = studio.symbol(key, asked.version).name
-    return {"version": changes.split(studio.library.store, name, asked.ids, asked.name)}
+    studio.symbol(key, asked.version)
+    return {"version": changes.split(studio.library.store, key, asked.ids, asked.name)}
 
 
 @router.delete("/symbols/{key}", response_model=Version, summary="Delete a symbol; its movements stay")
@@ -76,15 +76,15 @@ def delete_symbol(
     studio: Writes, key: SymbolKey, version: Annotated[int | None, Query(description=VERSION)] = None
 ) -> dict[str, Any]:
     """They belong to none then."""
-    return {"version": changes.delete_symbol(studio.library.store, studio.symbol(key, version).name)}
+    return {"version": changes.delete_symbol(studio.library.store, studio.symbol(key, version).id)}
 
 
-@router.post("/undo", response_model=Version, summary="Take back the last change")
-def undo(studio: Writes, asked: AsOf | None = None) -> dict[str, Any]:
-    """As a new version; again, the one before. 409 if another change came since the version that is named."""
-    expected = None if asked is None else asked.version
+@router.post("/undo", response_model=Version, summary="Take back the last change, or restore a version")
+def undo(studio: Writes, asked: Back | None = None) -> dict[str, Any]:
+    """As a new version; again, the change before. 409 if another change came since the version that is named."""
+    expected, to = (None, None) if asked is None else (asked.version, asked.to)
     try:
-        return {"version": studio.library.undo(expected).version}
+        return {"version": studio.library.undo(expected, to).version}
     except SpecificationError as error:
         if expected is not None and studio.library.version != expected:
             raise ConflictError(str(error)) from None

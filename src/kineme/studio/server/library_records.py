@@ -86,6 +86,8 @@ class VersionOut(BaseModel):
     number: int
     time: str
     what: str
+    said: str
+    can_restore: bool
     detail: dict[str, Any]
 
 

@@ -14,8 +14,10 @@ from kineme.files.write_movement import WRITERS
 from kineme.library.recognition.members import described
 from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
+from kineme.output.text import printable
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.sampling import evenly_spaced
+from kineme.studio.server.history import listed_history
 from kineme.studio.server.library_records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.records import MovementKey
@@ -24,7 +26,6 @@ from kineme.studio.server.studio import Reads, Studio
 router = APIRouter(prefix="/api/library", tags=["library"])
 
 _ON_MAP = 600  # movements; their distances take 0.3 s
-_VERSIONS = 200  # of the history
 
 
 @router.get("", response_model=LibraryOut, summary="What the library holds")
@@ -75,15 +76,8 @@ def movement_map(studio: Reads) -> dict[str, Any]:
 
 @router.get("/history", response_model=HistoryOut, summary="What was changed, the last change first")
 def history(studio: Reads) -> dict[str, Any]:
-    """The last 200 versions."""
-    every = studio.library.history()
-    return {
-        "total": len(every),
-        "versions": [
-            {"number": one.id, "time": one.at, "what": one.action, "detail": _short(dict(one.detail))}
-            for one in every[: -_VERSIONS - 1 : -1]
-        ],
-    }
+    """The last 200 versions, each in a sentence, and whether its state is another one than now."""
+    return listed_history(studio)
 
 
 class _Document(NamedTuple):
@@ -105,7 +99,7 @@ def _library(studio: Studio) -> dict[str, Any]:
     drawn = {one["id"]: one for one in _listed(studio, np.array([key for key in typical if key], dtype=np.int64))}
     channels = library.channels
     return {
-        "folder": str(library.folder),
+        "folder": printable(library.folder),
         "version": shown.version,
         "n_movements": len(library),
         "n_dims": library.n_dims,
@@ -166,11 +160,4 @@ def _map(studio: Studio) -> dict[str, Any]:
             {"id": key, "symbol": shown.symbol_of.get(key), "x": x, "y": y}
             for key, (x, y) in zip(ids.tolist(), where.tolist(), strict=True)
         ]
-    }
-
-
-def _short(detail: dict[str, Any]) -> dict[str, Any]:
-    """What a change says of itself; long lists by their length."""
-    return {
-        name: len(value) if isinstance(value, list) and len(value) > 20 else value for name, value in detail.items()
     }

@@ -13,6 +13,7 @@ from kineme.studio.server.studio import Studio
 from kineme.validation import LARGEST, Array
 
 MOST_SAMPLES = 10_000  # in one message
+_MOST_WAITING = 200  # messages that are taken in again when the library has changed: a few seconds
 _EMPTY: dict[str, Any] = {
     "ranked": [],
     "unknown": None,
@@ -26,29 +27,43 @@ _EMPTY: dict[str, Any] = {
 
 
 class LiveSession:
-    """The stream of one client; made anew for the next movement if the library has changed."""
+    """The stream of one client; made anew for the next movement if the library has changed.
+
+    Preparing for a changed library takes a while. Until then movements are followed by what knew the library before;
+    what knows it now takes over as soon as it is there, and gives the answer to the whole movement in any case.
+    """
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
         self._stream: Live | None = None
-        self._version, self._begun = -1, False
+        self._version, self._begun, self._is_old = -1, False, False
+        self._state = _EMPTY
+        self._waiting: list[Array] = []  # samples that the next stream is to take in
 
     def reset(self) -> None:
         """Forget the movement."""
         if self._stream is not None:
             self._stream.reset()
+        self._waiting.clear()
         self._begun = False
 
     def update(self, samples: Array) -> dict[str, Any]:
         """Take in samples (k, 1 + d): the state of the movement."""
         if not self._begun:
             self._begin()
-        if self._stream is None:
-            return _EMPTY
-        return plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+        if self._is_old:
+            self._waiting.append(samples)
+            if self.studio.warm == self.studio.library.version or len(self._waiting) > _MOST_WAITING:
+                self._renew()
+                return self._state
+        if self._stream is not None:
+            self._state = plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+        return self._state
 
     def finish(self) -> dict[str, Any] | None:
         """The answer to the whole movement; None if nothing recognizes it."""
+        if self._is_old and self._begun:
+            self._renew()
         stream, begun = self._stream, self._begun
         self._begun = False
         if stream is None or not begun:
@@ -59,14 +74,24 @@ class LiveSession:
             stream.reset()
 
     def _begin(self) -> None:
-        version = self.studio.library.version
-        if version != self._version:
-            try:
-                self._stream = self.studio.stream()
-            except SpecificationError:  # no symbols to recognize, or one movement
-                self._stream = None
-            self._version = version
+        self._state, version = _EMPTY, self.studio.library.version
+        self._is_old = version != self._version and self._stream is not None and self.studio.warm != version
+        if version != self._version and not self._is_old:
+            self._renew()
         self._begun = True
+
+    def _renew(self) -> None:
+        """Follow the movement by the library as it is now; wait for that if need be."""
+        version = self.studio.library.version
+        try:
+            self._stream = self.studio.stream()
+        except SpecificationError:  # no symbols to recognize, or one movement
+            self._stream = None
+        self._version, self._is_old, self._state = version, False, _EMPTY
+        for samples in self._waiting:
+            if self._stream is not None:
+                self._state = plain_state(self._stream.update(samples[:, 0], samples[:, 1:]))
+        self._waiting.clear()
 
 
 def parsed_samples(given: Any) -> Array:

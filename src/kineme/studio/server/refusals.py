@@ -15,6 +15,7 @@ from starlette.types import Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.storage.sqlite_errors import BusyError
+from kineme.output.text import in_markup
 from kineme.studio.server.work import StoppedError
 
 _LOG = logging.getLogger("kineme.studio")
@@ -33,12 +34,30 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008, "reason": text[:100]})
         return
-    body = json.dumps({"error": text}).encode()
-    headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+    as_page = scope["method"] == "GET" and any(
+        name == b"accept" and b"text/html" in value for name, value in scope["headers"]
+    )
+    kind, body = (b"text/html; charset=utf-8", _page(text)) if as_page else (b"application/json", _plain(text))
+    headers = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
     if status in {408, 413}:  # the rest of the body is not read
         headers.append((b"connection", b"close"))
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})
+
+
+def _plain(text: str) -> bytes:
+    return json.dumps({"error": text}).encode()
+
+
+def _page(text: str) -> bytes:
+    """A refusal for people who have opened an address by hand: nothing but words."""
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        '<meta name="color-scheme" content="light dark"><title>kineme studio: not opened</title>'
+        f"<h1>The studio was not opened</h1><p>It {in_markup(text)}.</p>"
+        "<p>The address stands in the terminal in which <code>kineme studio</code> was started; copy the whole of it. "
+        "The token in it is another one after each start.</p></html>"
+    ).encode()
 
 
 def answer_errors(app: FastAPI) -> None:

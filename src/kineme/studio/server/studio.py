@@ -56,10 +56,12 @@ class Studio:
         self.live = ThreadPoolExecutor(max(2, os.cpu_count() or 1), "kineme-live")
         self.long = ThreadPoolExecutor(_LONG, "kineme-long")
         self.works = Works()
+        self.warm = -1  # the version of the library that recognition is prepared for
         self._warming: list[Thread] = []
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
+        self._searches: dict[str, asyncio.Lock] = {}
 
     def close(self) -> None:
         """Close the library, once no thread reads or writes it, and delete what was sent."""
@@ -120,6 +122,12 @@ class Studio:
                 del several[next(iter(several))]
         return made
 
+    async def searched(self, name: str, make: Callable[[], Made]) -> Made:
+        """As `kept`, of what takes long: those who wait for the one that makes it hold no thread of the requests."""
+        turn = self._searches.setdefault(name, asyncio.Lock())
+        async with turn:
+            return await asyncio.get_running_loop().run_in_executor(self.long, lambda: self.kept(name, make))
+
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
         """The symbol of an id.
 
@@ -153,8 +161,12 @@ class Studio:
         self._warming = [one for one in self._warming if one.is_alive()] + [thread]
 
     def _prepare(self) -> None:
-        with suppress(KinemeError):  # too little to recognize with, as in a new library; or closed meanwhile
-            self.stream()
+        with suppress(KinemeError):  # closed meanwhile
+            version = self.library.version
+            with suppress(KinemeError):  # too little to recognize with, as in a new library
+                self.stream()
+            if self.library.version == version:
+                self.warm = version
 
     def stream(self) -> Live:
         """What recognizes one movement under way, by the library as it is now; see `kineme.ActionLibrary.stream`."""

@@ -1,13 +1,12 @@
 // Library: symbols, those that are proposed, the map, the history.
-import { get } from "../parts/api.js";
 import { merge } from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
-import { byId, counted, fill, make } from "../parts/elements.js";
+import { byId, counted } from "../parts/elements.js";
 import { startFinding } from "../parts/find.js";
 import { library, onLibrary, symbolOf } from "../parts/library_state.js";
-import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
 import { chosen, showCards } from "./cards.js";
+import { showHistory } from "./history.js";
 import { MovementMap } from "./map.js";
 import { showProposals } from "./proposals.js";
 import { SymbolPanel } from "./symbol.js";
@@ -21,14 +20,6 @@ async function mergeChosen() {
   if (!into) return;
   chosen.clear();
   await merge(ids, into);
-}
-
-async function showHistory() {
-  if (!byId("history").open) return;
-  const { version } = library();
-  const answer = await tried(() => get("/api/library/history"));
-  if (!answer || version !== library().version) return;
-  fill(byId("versions"), ...answer.versions.map((/** @type {any} */ one) => make("li", {}, make("span", { class: "numbers soft" }, `${one.number}`), make("span", {}, one.what), make("time", { class: "soft small" }, String(one.time).replace("T", " ").slice(0, 19)))));
 }
 
 export function startLibrary() {

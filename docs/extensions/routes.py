@@ -1,0 +1,89 @@
+"""The page about the routes of the studio, from the description of its interface in OpenAPI."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from extensions.tables import bounds, kind, table
+
+_LINK = "[{0}](#json-{0})"
+_ABOUT = """
+What a program asks of `kineme studio`, by HTTP. How to find the token, and an example:
+[The studio](../../guide/studio.md). A studio that runs describes itself as OpenAPI, for programs that make clients
+from that: `GET /api/openapi.json`.
+"""
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """File name and text of the page, in Markdown."""
+    yield "routes.md", "\n".join(_page(description()))
+
+
+def description() -> dict[str, Any]:
+    """The interface as OpenAPI; no library is opened."""
+    from kineme.studio.server.app import ROUTERS
+    from kineme.studio.server.description import ABOUT, REFUSALS, Described
+
+    app = Described(title="kineme studio", description=ABOUT, responses=REFUSALS)
+    for router in ROUTERS:
+        app.include_router(router)
+    return app.openapi()
+
+
+def _page(described: dict[str, Any]) -> Iterator[str]:
+    routes = [(way.upper(), path, one) for path, ways in described["paths"].items() for way, one in ways.items()]
+    yield f"# Routes of the studio\n{_ABOUT}\n{described['info']['description'].partition(chr(10) * 2)[2]}"
+    yield from table(("route", "what it does"), [(_to(way, path), one["summary"]) for way, path, one in routes])
+    refusals = routes[0][2]["responses"]["4XX"]["description"]
+    yield f"\nEvery refusal is a {_LINK.format('Refusal')} with one of these: {refusals}"
+    for tag in dict.fromkeys(one["tags"][0] for _, _, one in routes):
+        yield f"\n## {tag.capitalize()}"
+        for way, path, one in routes:
+            if one["tags"][0] == tag:
+                yield from _route(way, path, one)
+    yield "\n## What is sent and answered\n\nObjects of JSON, by their names in the description."
+    for name, schema in sorted(described["components"]["schemas"].items()):
+        yield from _schema(name, schema)
+
+
+def _to(way: str, path: str) -> str:
+    return f"[{way} {path}](#{_place(way, path)})"
+
+
+def _place(way: str, path: str) -> str:
+    return "-".join([way.lower(), *path.strip("/").replace("{", "").replace("}", "").split("/")])
+
+
+def _route(way: str, path: str, one: dict[str, Any]) -> Iterator[str]:
+    yield f"\n({_place(way, path)})=\n### {way} {path}\n\n**{one['summary']}.** {one.get('description', '')}\n"
+    asked = [
+        (f"`{name['name']}`", name["in"], _kind(name["schema"]), name.get("description", ""))
+        for name in one.get("parameters", [])
+    ]
+    if asked:
+        yield from table(("parameter", "where", "kind", "what it is"), asked)
+        yield ""
+    if "requestBody" in one:
+        yield f"Takes {_content(one['requestBody'])}."
+    yield f"Answers {_content(one['responses']['200'])}."
+
+
+def _content(body: dict[str, Any]) -> str:
+    return " or ".join(
+        kind(content["schema"], _LINK) if content.get("schema") else "bytes" for content in body["content"].values()
+    )
+
+
+def _kind(schema: dict[str, Any]) -> str:
+    return "; ".join(filter(None, [kind(schema, _LINK), bounds(schema)]))
+
+
+def _schema(name: str, schema: dict[str, Any]) -> Iterator[str]:
+    yield f"\n(json-{name})=\n### {name}\n\n{schema.get('description', '')}\n"
+    needed = schema.get("required", [])
+    rows = [
+        (f"`{key}`{'' if key in needed else ' (optional)'}", _kind(one), one.get("description", ""))
+        for key, one in schema.get("properties", {}).items()
+    ]
+    yield from table(("key", "kind", "what it is"), [tuple(cell.replace("|", r"\|") for cell in row) for row in rows])

@@ -1,0 +1,142 @@
+"""The site as it was built: `make check-docs` opens it, asks its search, and looks for what keeps readers out.
+
+Where no site is named in KINEME_SITE these tests are skipped, so that no old one is judged.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from browsing import Pages, wait_until
+
+SITE = Path(os.environ.get("KINEME_SITE", "nowhere"))
+pytestmark = pytest.mark.skipif(not (SITE / "search.html").is_file(), reason="KINEME_SITE names no built site")
+
+#: One page of each kind; and some that have all colors.
+KINDS = (
+    "index", "start/install", "concepts/movement-primitive", "concepts/glossary", "how-to/file-not-read",
+    "gallery/index", "gallery/primitives/plot_formulations", "guide/recordings", "reference/generated/kineme.DMP",
+    "reference/generated/kineme-learn", "beside-others", "search",
+)  # fmt: skip
+COLORED = (
+    "index",
+    "concepts/movement-primitive",
+    "reference/generated/kineme.kernels.RBF",
+    "reference/generated/kineme-learn",
+)
+WIDTHS = (390, 820, 1440)
+_STICKS_OUT = """() => [...document.querySelectorAll('article :is(h1, h2, h3, p, table, pre, img)')].filter((one) => {
+  const article = one.closest('article').getBoundingClientRect(), box = one.getBoundingClientRect();
+  let around = one;
+  const scrolls = () => /auto|scroll/.test(getComputedStyle(around).overflowX);
+  while (around.tagName !== 'ARTICLE' && !scrolls()) around = around.parentElement;
+  return box.width && box.right > article.right + 2 && around.tagName === 'ARTICLE';
+}).map((one) => one.outerHTML.slice(0, 80))"""
+
+#: What a newcomer types -> the page that answers.
+QUESTIONS = {
+    "how many demonstrations": "how-to/how-many-demonstrations",
+    "how many demonstrations do I need?": "how-to/how-many-demonstrations",
+    "which fit": "how-to/which-fit",
+    "joints that wrap": "how-to/joints-that-wrap",
+    "gripper": "how-to/grippers",
+    "quaternion order": "how-to/poses-in-the-shell",
+    "poses in the shell": "how-to/poses-in-the-shell",
+    "labels from file names": "how-to/labels-from-file-names",
+    "rate of a stream": "how-to/rate-of-a-stream",
+    "trim rests": "how-to/trim-rests",
+    "units millimeters": "how-to/units",
+    "my file is not read": "how-to/file-not-read",
+    "everything is unknown": "how-to/everything-is-unknown",
+    "new goal looks wrong": "how-to/new-goal-looks-wrong",
+    "why is the first call slow": "how-to/the-first-call-is-slow",
+    "via points": "guide/modulation",
+    "avoid an obstacle": "guide/live-control",
+    "read a ROS bag": "guide/recordings",
+    "LeRobot data set": "guide/recordings",
+    "one shot": "concepts/unknown",
+    "undo": "how-to/undo",
+    "planner PDDL": "how-to/planner",
+    "citation": "how-to/cite",
+    "install": "start/install",
+    "what is a movement primitive": "concepts/movement-primitive",
+    "inverse kinematics": "guide/robots",
+    "recognize while it is made": "tutorials/recognize-live",
+    "load_lasa": "reference/generated/kineme.load_lasa",
+    "kineme annotate": "reference/generated/kineme-annotate",
+    "Primitives.rollout": "reference/generated/kineme.Primitives",
+    "Recognizer": "reference/generated/kineme.Recognizer",
+}
+#: Error messages with what stood in them -> how the entry of the page of messages begins.
+MESSAGES = {
+    "expected a column of times and at least one of positions, got x": "expected a column of times and at least one",
+    "expected positions up to 1e+100, got 3e+120; choose another unit": "expected positions up to",
+    "expected labeled demonstrations, got none with a label; pass y to fit": "expected labeled demonstrations",
+    "expected a library in actions, found no library.sqlite there; make one by learning": "expected a library in",
+    "Error: expected a file or folder of recordings, found nothing at wave/": "expected a file or folder of recordings",
+    "topic /tf: each of its messages is a movement of its own, expected it alone": "topic …: each of its messages",
+    "expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'": "expected the package pyarrow",
+    "expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7": "expected a matlab file of version",
+    "walk.trc: expected frame 12 next, got frame 14": "expected frame … next",
+    "expected one place at 0.5, got two via points there: [1. 2.] and [3. 4.]": "expected one place at",
+}
+_ASK = "(asked) => Search._performSearch(asked).slice(-3).map(([page, title]) => [page, title])"
+
+
+@pytest.fixture(scope="module")
+def pages(browser):
+    """Pages that open files and nothing else, and whose console stays empty."""
+    opened = Pages(browser)
+    yield opened
+    opened.close("file:", "data:", "blob:")
+
+
+@pytest.fixture(scope="module")
+def searching(pages):
+    page = pages.new()
+    page.goto((SITE / "search.html").resolve().as_uri())
+    wait_until(page, "Search.hasIndex()")
+    return page
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_the_answer_is_among_the_first_three_that_are_found(searching, question):
+    found = [page for page, _ in searching.evaluate(_ASK, question)]
+    assert QUESTIONS[question] in found
+
+
+@pytest.mark.parametrize("message", MESSAGES)
+def test_an_error_message_is_found_with_what_stood_in_it(searching, message):
+    found = [title for page, title in searching.evaluate(_ASK, message) if page == "reference/generated/messages"]
+    assert any(title.startswith(MESSAGES[message]) for title in found), found
+
+
+def test_what_is_found_is_shown_and_leads_there(searching):
+    searching.goto((SITE / "search.html").resolve().as_uri() + "?q=undo")
+    searching.locator("#search-results li a", has_text="Take a change").click()
+    assert searching.locator("h1").inner_text().startswith("Take a change of the library back")
+
+
+@pytest.mark.parametrize(("scheme", "kinds"), [("light", KINDS), ("dark", COLORED)])
+def test_no_serious_rule_of_accessibility_is_broken(pages, scheme, kinds):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe-playwright-python is not installed")
+    page = pages.new(color_scheme=scheme)
+    options = {"preload": False, "resultTypes": ["violations"]}
+    options |= {} if scheme == "light" else {"runOnly": ["color-contrast"]}  # colors alone differ
+    for kind in kinds:
+        page.goto((SITE / f"{kind}.html").resolve().as_uri())
+        found = axe.Axe().run(page, options=options).response["violations"]
+        serious = [one for one in found if one["impact"] in {"serious", "critical"}]
+        assert [(one["id"], [node["html"][:120] for node in one["nodes"][:3]]) for one in serious] == [], kind
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_sticks_out(pages, width):
+    page = pages.new(width=width)
+    for kind in KINDS:
+        page.goto((SITE / f"{kind}.html").resolve().as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), kind
+        assert page.evaluate(_STICKS_OUT) == [], kind
