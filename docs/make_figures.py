@@ -25,8 +25,12 @@ from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure, render
 from kineme.primitives.styles.figure import draw_morph
 
 _COLORS = 128  # of a picture of a tutorial
-#: Tutorials that draw their own pictures -> what the names of these begin with.
-TUTORIALS = {"action-library": "library", "unlabeled-to-a-planner": "planner"}
+#: Pages that draw their own pictures as they are walked -> what the names of these begin with.
+DRAWING = {
+    "start/first-success": "first",
+    "tutorials/action-library": "library",
+    "tutorials/unlabeled-to-a-planner": "planner",
+}
 _FEWEST = 20  # answers that a point of the reliability diagram stands for
 COLORS = {"original": BLUE, "bio-inspired": ORANGE, "amplitude-scaled": GREEN}
 LINES = {"original": "-", "bio-inspired": "--", "amplitude-scaled": ":"}
@@ -262,9 +266,9 @@ FIGURES = {
 }
 
 
-def tutorial_pictures(folder: Path, tutorial: str, prefix: str) -> None:
-    """PREFIX-NAME.png is NAME.png of a tutorial, drawn as it is walked, in few colors so that it is small."""
-    page = Path(__file__).parent / "tutorials" / f"{tutorial}.md"
+def pictures_of_page(folder: Path, walked: str, prefix: str) -> None:
+    """PREFIX-NAME.png is NAME.png of a page, drawn as it is walked, in few colors so that it is small."""
+    page = Path(__file__).parent / f"{walked}.md"
     with TemporaryDirectory() as place:
         for _ in walk(page, Path(place)):
             pass
@@ -282,8 +286,8 @@ def main(folder: Path) -> None:
     (folder / "kineme.svg").write_text(moving_picture(), encoding="utf-8")
     for name in SCRIPTS:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
-    for tutorial, prefix in TUTORIALS.items():
-        tutorial_pictures(folder, tutorial, prefix)
+    for walked, prefix in DRAWING.items():
+        pictures_of_page(folder, walked, prefix)
 
 
 if __name__ == "__main__":

@@ -65,6 +65,7 @@ def tables() -> dict[str, str]:
         "people": _people(),
         "lasa": _lasa(),
         "open-set": _open_set(),
+        "stream": _stream(),
     }
 
 
@@ -140,6 +141,24 @@ def _lasa() -> str:
     rows += [("one shot, rotation by any angle, `max_angle=pi`", "any-angle", "any angle", "accuracy")]
     rows += [(one, "few-shot", one, "accuracy") for one in ("3 shots", "5 shots")]
     return _table("accuracy", protocols, rows)
+
+
+def _stream() -> str:
+    """What an update and the end of a live stream take, in words."""
+    measured = {row["what"]: row["ours"] for row in json.loads((RESULTS / "stream.json").read_text("utf-8"))["rows"]}
+
+    def of(what: str, end: str, digits: int) -> str:
+        pair = (f"{measured[what.format(n=n) + end]:.{digits}f}" for n in (100, 500))
+        return " and ".join(pair)
+
+    update, rate = "an update, {n} demonstrations in ", "rate that 99 of 100 updates hold, {n} demonstrations in "
+    slowest = max(value for what, value in measured.items() if what.startswith("finish"))
+    return (
+        f"With 100 and with 500 demonstrations, an update takes {of(update, 'the plane, median', 1)} ms in the plane\n"
+        f"and {of(update, 'space, median', 1)} ms in space on an idle core; 99 of 100 updates leave time for\n"
+        f"{of(rate, 'the plane', 0)} a second in the plane, and {of(rate, 'space', 0)} in space. `finish()` takes at\n"
+        f"most {slowest:.1f} ms (`python -m bench --only stream`)."
+    )
 
 
 def _open_set() -> str:

@@ -4,6 +4,15 @@ A message says what was expected, what came and what to do next. Each class is a
 error that NumPy and scikit-learn users would catch.
 """
 
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_HEARD: ContextVar[list[str] | None] = ContextVar("kineme_heard", default=None)
+
 
 class KinemeError(Exception):
     """Base class: ``except kineme.KinemeError`` catches all of them."""
@@ -31,3 +40,23 @@ class DegenerateMovementWarning(UserWarning):
 
 class ExtrapolationWarning(UserWarning):
     """Something is asked for that lies outside what was demonstrated: it is done, and how well is a guess."""
+
+
+def warn(message: str, category: type[Warning], stacklevel: int) -> None:
+    """Warn as `warnings.warn` does; inside `heard_warnings` the message is kept instead."""
+    heard = _HEARD.get()
+    if heard is None:
+        warnings.warn(message, category, stacklevel=stacklevel + 1)
+    else:
+        heard.append(message)
+
+
+@contextmanager
+def heard_warnings() -> Iterator[list[str]]:
+    """Context manager: the messages of `warn` here alone; `warnings.catch_warnings` is for all threads."""
+    heard: list[str] = []
+    token = _HEARD.set(heard)
+    try:
+        yield heard
+    finally:
+        _HEARD.reset(token)

@@ -118,6 +118,26 @@ def test_a_gripper_that_waits_for_a_stand_is_not_timed_without_one(closes, opens
         move(waiting(robot), robot, space="joints", steps={"grip": grip}, timing="fastest")
 
 
+def test_a_gripper_that_closes_while_the_arm_moves_is_said_with_its_speed():
+    """A rest at the beginning is left early when the goal is new; a gripper that closed in it closes in motion."""
+    robot = load("ur5e")
+    for closes, moving in ((25, True), (75, False)):
+        grip = np.where(np.arange(150) >= closes, 1.0, 0.0)
+        made = move(waiting(robot), robot, space="joints", steps={"grip": grip})
+        (check,) = (one for one in made.preflight.checks if one.what == "steps")
+        assert check.passed
+        assert check.unit.endswith("moving") == np.isnan(check.limit) == moving
+        assert (check.worst > 0.2) == moving
+
+
+def test_joints_beyond_a_stop_need_another_goal_and_not_another_place():
+    robot = load("panda")
+    with pytest.raises(
+        InfeasibleError, match=r"position of panda_joint1 .* No speed helps: choose another goal .*joints"
+    ):
+        move(swing(robot, 5.0, distance=3.0), robot)
+
+
 def test_a_pulse_of_a_gripper_that_few_samples_would_lose_is_said_with_a_rate_that_keeps_it():
     robot = load("ur5e")
     grip = np.zeros(150)

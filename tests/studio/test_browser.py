@@ -404,8 +404,22 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     assert float(page.input_value("#spans tbody tr:nth-child(1) td:nth-child(2) input")) < before
     page.click("#learn-spans")
     wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'from a file')")
+    assert not page.is_visible("#learn-file")
+    rows = [
+        (k, *row)
+        for k in (5, 6)
+        for one in letters("Angle")[k : k + 1]
+        for row in zip(one.times, *one.positions.T, strict=True)
+    ]
+    labeled = "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},of a file\n" for k, t, x, y in rows)
+    page.evaluate(DROP, ["labeled.csv", labeled])
+    wait_for_text(page, "#recording-name", "labeled.csv")
+    assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
+    page.click("#learn-file")
+    wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'of a file')")
     with kineme.ActionLibrary(tmp_path / "letters", read_only=True) as library:
         assert len(library["from a file"].members) == 1
+        assert len(library["of a file"].members) == 2
 
 
 def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):

@@ -91,6 +91,30 @@ def test_other_columns_are_read_where_they_are_asked_for(client):
     assert client.post(f"/api/recordings/{key}/spotted", json={"table": "none"}).status_code == 400
 
 
+def test_labels_of_a_file_are_taken(client):
+    rows = ["movement,t,x,y,label"]
+    for i, (k, label) in enumerate(((5, "wave"), (6, "nod"), (5, "wave"), (7, ""))):
+        t, x = drawing(k, seed=60 + i)
+        rows += [f"{i},{a:.6f},{b:.6f},{c:.6f},{label}" for a, (b, c) in zip(t, x, strict=True)]
+    read = _send(client, "\n".join(rows).encode()).json()
+    assert [one["label"] for one in read["tables"]] == ["wave", "nod", "wave", None]
+    learned = client.post(f"/api/recordings/{read['recording']}/learn", json={"channels": ["x", "y"]})
+    assert learned.status_code == 200, learned.text
+    assert len(learned.json()["ids"]) == 4
+    shown = client.get("/api/library").json()
+    members = {one["name"]: one["n_members"] for one in shown["symbols"]}
+    assert (members["wave"], members["nod"], shown["unlabeled"]) == (2, 1, 1)
+    assert client.post(f"/api/recordings/{read['recording']}/learn", json={"spans": []}).status_code == 422
+
+
+def test_of_each_file_the_columns_asked_for_last_are_kept(client):
+    data, _ = _table(0, 1, heads="t,a,b")
+    kept, keys = client.app.state.studio.uploads._read, [_send(client, data).json()["recording"] for _ in range(2)]
+    for columns in (["a"], ["b"], ["b", "a"]):
+        client.app.state.studio.uploads.recordings(keys[0], columns)
+    assert list(kept) == [(keys[0], ()), (keys[1], ()), (keys[0], ("b", "a"))]
+
+
 def test_what_is_read_apart_is_what_is_read_here(tmp_path):
     for name, data in (("a.csv", _table(0, 1)[0]), ("pose.csv", _poses()[0])):
         path = tmp_path / name

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from kineme.movements.channels.channel import Channel
 from kineme.movements.trajectories.channels import of_channels
 from kineme.primitives.discrete.formulations import FORMULATIONS
 from kineme.primitives.styles.learn import learn_styles
+from kineme.studio.server import rollouts
 
 
 @pytest.fixture
@@ -47,6 +51,25 @@ def test_it_passes_via_points_at_their_time(client, symbol):
         assert positions[np.abs(times - share).argmin()] == pytest.approx(point, abs=0.01)
     far = _rollout(client, {"symbol": symbol}, via=[[0.5, [90.0, 90.0]]])
     assert any("via point" in one or "passes" in one for one in far["warnings"])
+
+
+def test_rollouts_do_not_wait_for_each_other_and_each_has_its_own_warnings(client, symbol, monkeypatch):
+    around, entered, may_go = rollouts._around, Event(), Event()
+
+    def slow(learned, options, balls):
+        if options.goal is not None:
+            entered.set()
+            assert may_go.wait(10)
+        return around(learned, options, balls)
+
+    monkeypatch.setattr(rollouts, "_around", slow)
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(_rollout, client, {"symbol": symbol}, goal=[3.0, -1.0])
+        assert entered.wait(10)
+        far = _rollout(client, {"symbol": symbol}, via=[[0.5, [100.0, 100.0]]])
+        may_go.set()
+        assert first.result()["warnings"] == []
+    assert "outside what was demonstrated" in far["warnings"][0]
 
 
 def test_it_goes_around_balls_or_says_that_it_does_not(client, symbol):
@@ -174,6 +197,32 @@ def unlabeled(tmp_path, open_studio):
     with ActionLibrary(folder) as library:
         library.learn([Trajectory(*drawing(k, seed=i)) for k in (11, 12) for i in range(6)])
     return open_studio(folder)
+
+
+def test_those_who_wait_for_proposals_keep_nobody_else_waiting(unlabeled, monkeypatch):
+    studio, may_go, searches = unlabeled.app.state.studio, Event(), []
+    proposes = studio.library.propose
+
+    def slow():
+        searches.append(1)
+        assert may_go.wait(20)
+        return proposes()
+
+    monkeypatch.setattr(studio.library, "propose", slow)
+    with ThreadPoolExecutor(12) as pool, ThreadPoolExecutor(1) as others:
+        waiting = [pool.submit(unlabeled.get, "/api/proposals") for _ in range(12)]
+        while not searches:
+            time.sleep(0.01)
+        time.sleep(0.2)  # until all wait
+        other = others.submit(unlabeled.get, "/api/library/history")
+        try:
+            assert other.result(10).status_code == 200
+        finally:
+            may_go.set()
+        answers = [one.result() for one in waiting]
+    assert len(searches) == 1
+    assert {one.status_code for one in answers} == {200}
+    assert len({one.text for one in answers}) == 1
 
 
 def test_proposals_are_named_or_rejected(unlabeled):

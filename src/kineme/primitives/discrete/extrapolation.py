@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from typing import NamedTuple
 
 import numpy as np
 
-from kineme.errors import ExtrapolationWarning
+from kineme.errors import ExtrapolationWarning, warn
 from kineme.primitives.discrete.rollout import Change, Rollout
 from kineme.primitives.discrete.via_points import SHARES, Span, ViaPoints
 from kineme.validation import Array
@@ -47,7 +46,7 @@ def warn_far(
     far = distances > extents[:, None]
     if far.any():
         i, j = np.unravel_index(int(np.argmax(distances / extents[:, None])), far.shape)
-        warnings.warn(
+        warn(
             f"{far.any(axis=1).sum()} of {len(far)} movements have a via point outside what was demonstrated: the one "
             f"at {span.where.format(asked.times[j] * span.end)} is {distances[i, j]:.3g}{unit} from the path of "
             f"movement {i} at that time, which is {extents[i]:.3g}{unit} large; check its unit and frame, or "
@@ -88,7 +87,7 @@ def warn_changed(
         )
     else:
         return
-    warnings.warn(message, ExtrapolationWarning, stacklevel=4)
+    warn(message, ExtrapolationWarning, stacklevel=4)
 
 
 def extents_of(movement: Rollout, measured: Measured) -> Array:

@@ -9,13 +9,12 @@ and only scale and coupling differ. Encoding, decoding and features are written 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kineme.errors import DegenerateMovementError, DegenerateMovementWarning
+from kineme.errors import DegenerateMovementError, DegenerateMovementWarning, warn
 from kineme.validation import Array, describe
 
 #: Share of its largest extent within which the goal of a movement counts as equal to its start.
@@ -161,7 +160,7 @@ def safe_amplitudes(amplitudes: Array, extents: Array, names: Sequence[str | Non
         )
     near = (relative < _NEAR).any(axis=1)
     if near.any():
-        warnings.warn(
+        warn(
             f"{near.sum()} of {len(near)} movements end within 1 % of their extent from where they start, in some "
             f"dimension (first: {describe(int(np.argmax(near)), names)}); "
             f'their {feature} are large and fragile: prefer "shape-attractor" or the "bio-inspired" formulation',

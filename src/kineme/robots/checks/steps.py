@@ -28,7 +28,7 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
     """Every value of the channel is there, in the same order, and what changed while the arm stood does so still.
 
     Too few samples lose a short pulse; the fastest timing leaves out the time in which an arm stands and waits for its
-    gripper.
+    gripper. What changes in motion as it was generated passes; the fastest of these is said, without a limit.
     """
     name, sent = generated.name, trajectory.steps[generated.name]
     before, now = _changes(generated.values), _changes(sent)
@@ -38,11 +38,13 @@ def steps_kept(robot: Robot, trajectory: JointTrajectory, generated: Steps) -> C
         return Check("steps", name, 0.0, 0, 0, "changes", True)
     speeds = np.abs(generated.velocities).max(axis=1)
     stood = speeds[before] <= _STANDING * speeds.max()
-    shares = np.where(stood, (np.abs(trajectory.velocities[now]) / robot.velocity).max(axis=1), 0.0)
-    worst = int(np.argmax(shares))
-    passed = bool(shares[worst] <= _STANDING)
+    shares = (np.abs(trajectory.velocities[now]) / robot.velocity).max(axis=1)
+    passed = not np.any(stood & (shares > _STANDING))
+    moving = passed and not stood.all()
+    worst = int(np.argmax(np.where(stood, 0.0, shares) if moving else np.where(stood, shares, 0.0)))
+    limit, unit = (math.nan, "of the velocity limit, moving") if moving else (_STANDING, "of the velocity limit")
     at, slower = float(trajectory.times[now[worst]]), 1.0 if passed else math.inf
-    return Check("steps", name, at, float(shares[worst]), _STANDING, "of the velocity limit", passed, slower)
+    return Check("steps", name, at, float(shares[worst]), limit, unit, passed, slower)
 
 
 def _changes(values: Array) -> NDArray[np.intp]:

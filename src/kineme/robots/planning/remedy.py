@@ -11,6 +11,7 @@ from kineme.robots.planning.timed_movement import FASTEST_RATE, Untimed, with_ti
 
 _OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
 _ELSEWHERE = "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
+_OTHER_JOINTS = "No speed helps: choose another goal (--goal) or start (--at) of the joints"
 _TRIED = 20_000  # samples, at most, of the movement slowed down
 _MORE = 10  # times the samples, where they are too few
 
@@ -21,7 +22,7 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
     finer = untimed._replace(rate=min(_MORE * untimed.rate, FASTEST_RATE))
     sampled = any(check.what in _OF_SAMPLING or check.what.endswith(SAMPLING) for check in failed)
     if not sampled and not np.isfinite(made.preflight.slower):
-        return _ELSEWHERE
+        return _elsewhere(made)
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
@@ -31,8 +32,12 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
             slow = "slow it down (timing='slowed', --slow-down)"
             return f"It works in {slower:.3g} s instead of {duration:.3g}{besides}: {slow}"
     if not np.isfinite(made.preflight.slower):
-        return _ELSEWHERE
+        return _elsewhere(made)
     return "No speed helps, or only a very low one: look at the movement for jumps, or choose another posture"
+
+
+def _elsewhere(made: RobotMovement) -> str:
+    return _OTHER_JOINTS if made.path is None else _ELSEWHERE
 
 
 def _tried(untimed: Untimed, timing: str) -> float | None:

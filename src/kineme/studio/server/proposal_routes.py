@@ -21,10 +21,9 @@ router = APIRouter(prefix="/api/proposals", tags=["proposals"])
 
 
 @router.get("", response_model=ProposalsOut, summary="Movements without a name that could be symbols")
-def proposals(studio: Reads) -> dict[str, Any]:
+async def proposals(studio: Reads) -> dict[str, Any]:
     """The largest group first; where there are symbols, their members say how alike movements of one are."""
-    found, left_over = studio.kept("proposals", lambda: _propose(studio))
-    return {"proposals": [_plain(studio, key, one) for key, one in found.items()], "left_over": left_over}
+    return await studio.searched("listed proposals", lambda: _listed(studio))
 
 
 @router.post("/{key}/accept", response_model=Version, summary="Name a proposal")
@@ -38,6 +37,11 @@ def accept(studio: Writes, key: ProposalKey, asked: Named) -> dict[str, Any]:
 def reject(studio: Writes, key: ProposalKey, asked: AsOf | None = None) -> dict[str, Any]:
     """Its movements stay without a name."""
     return {"version": stored.reject(studio.library.store, _proposal(studio, key))}
+
+
+def _listed(studio: Studio) -> dict[str, Any]:
+    found, left_over = studio.kept("proposals", lambda: _propose(studio))
+    return {"proposals": [_plain(studio, key, one) for key, one in found.items()], "left_over": left_over}
 
 
 def _propose(studio: Studio) -> tuple[dict[str, Proposal], int]:

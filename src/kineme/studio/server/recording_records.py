@@ -29,9 +29,9 @@ class Span(Sent):
 
 
 class LearnSpans(ChannelsAsked):
-    """Stretches to be learned."""
+    """Stretches of one table to be learned; without them all tables of the file, by the labels that it gives them."""
 
-    spans: list[Span] = Field(min_length=1, max_length=100_000)
+    spans: list[Span] | None = Field(None, min_length=1, max_length=100_000)
 
 
 class ColumnOut(BaseModel):
@@ -56,6 +56,7 @@ class TableOut(BaseModel):
     duration: float
     rate: float | None
     n_samples: int
+    label: str | None = Field(description="What the file says that it shows.")
 
 
 class UploadOut(BaseModel):

@@ -101,12 +101,16 @@ def _spotted(studio: Studio, key: str, asked: Spotting, work: Work) -> dict[str,
 
 @router.post("/{key}/learn", response_model=Learned, summary="Learn stretches of a recording")
 def learn(studio: Writes, key: RecordingKey, asked: LearnSpans) -> dict[str, Any]:
-    """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one."""
-    one = _one(studio, key, asked)
+    """Each stretch becomes a movement of the symbol that its label names; one without a label, an unnamed one.
+
+    Without stretches each table of the file becomes a movement, of the symbol that the file names, if it does.
+    """
+    if asked.spans is None:
+        pieces = _in_columns(studio, key, asked)
+    else:
+        rows = tuple(map(_row, range(len(asked.spans)), asked.spans))
+        pieces = labeled_pieces(_one(studio, key, asked), LabelTable("of the spans", rows, True))
     columns = _columns_of(studio.uploads.recordings(key), asked.channels) if asked.channels else None
-    pieces = labeled_pieces(
-        one, LabelTable("of the spans", tuple(map(_row, range(len(asked.spans)), asked.spans)), True)
-    )
     report = learn_recordings(studio.library.store, pieces, {"columns": columns})
     return {"ids": report.ids.tolist(), "version": report.version}
 
@@ -115,14 +119,23 @@ def _row(k: int, span: Span) -> LabelRow:
     return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
 
 
-def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = lambda: None) -> Recordings:
-    """One table of a recording, in the columns that are asked for, or those of the library where it has them."""
+def _go_on() -> None:
+    """Whoever asked still waits."""
+
+
+def _in_columns(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = _go_on) -> Recordings:
+    """All tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = studio.uploads.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
     wanted = _columns_of(read, asked.channels) if asked.channels else list(ours)
     if wanted != _columns(read) and (asked.channels or (ours and set(ours) <= set(_columns(read)))):
         read = studio.uploads.recordings(key, wanted, check)
-    table = asked.table
+    return read
+
+
+def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = _go_on) -> Recordings:
+    """One table of a file, in the same columns."""
+    read, table = _in_columns(studio, key, asked, check), asked.table
     names = [_name(read, k) for k in range(len(read))]
     k = 0 if table is None else names.index(table) if table in names else -1
     if k < 0:
@@ -157,7 +170,14 @@ def _table(read: Recordings, k: int) -> dict[str, Any]:
             for one in demos.channels
         ]
     rate = numbers((n - 1) / duration)
-    return {"name": _name(read, k), "channels": channels, "duration": duration, "rate": rate, "n_samples": n}
+    return {
+        "name": _name(read, k),
+        "channels": channels,
+        "duration": duration,
+        "rate": rate,
+        "n_samples": n,
+        "label": read.labels[k],
+    }
 
 
 def _plot(read: Recordings, k: int) -> dict[str, Any]:

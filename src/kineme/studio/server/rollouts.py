@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
-from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, heard_warnings
 from kineme.library.storage import read
 from kineme.library.symbols.grounding import prototype_of
 from kineme.primitives.control.obstacles import ObstacleAvoidance
@@ -23,7 +21,6 @@ from kineme.studio.snapshot.primitive import snapshot_of_primitive
 
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
-_WARNINGS = Lock()  # Python has one list of filters for all threads
 
 
 class Made(NamedTuple):
@@ -68,10 +65,9 @@ def make(studio: Studio, asked: Wanted) -> Made:
         meet_goal=True,  # it ends where the hand put it
         via=tuple((share, np.array(point)) for share, point in sorted(asked.via, key=lambda one: one[0])),
     )
-    with _WARNINGS, warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with heard_warnings() as heard:
         movement, said = _around(learned, options, asked.obstacles)
-    return Made(movement, list(dict.fromkeys([*(str(one.message) for one in caught), *said])))
+    return Made(movement, list(dict.fromkeys([*heard, *said])))
 
 
 def primitive_document(studio: Studio, asked: Operated) -> str:

@@ -61,6 +61,7 @@ class Studio:
         self._kept: dict[str, tuple[int, object]] = {}
         self._turns: dict[str, Lock] = {}
         self._turn = Lock()
+        self._searches: dict[str, asyncio.Lock] = {}
 
     def close(self) -> None:
         """Close the library, once no thread reads or writes it, and delete what was sent."""
@@ -120,6 +121,12 @@ class Studio:
             if len(several) > _KEPT:
                 del several[next(iter(several))]
         return made
+
+    async def searched(self, name: str, make: Callable[[], Made]) -> Made:
+        """As `kept`, of what takes long: those who wait for the one that makes it hold no thread of the requests."""
+        turn = self._searches.setdefault(name, asyncio.Lock())
+        async with turn:
+            return await asyncio.get_running_loop().run_in_executor(self.long, lambda: self.kept(name, make))
 
     def symbol(self, key: str, expected: int | None = None) -> Symbol:
         """The symbol of an id.

@@ -106,7 +106,13 @@ class Uploads:
         return read
 
     def _hold(self, which: tuple[str, tuple[str, ...]], read: Recordings) -> None:
-        """Keep what was read for the next question; what was read long ago is read again if it is too much in all."""
+        """Keep what was read for the next question: of each file as it is, and in the columns asked for last.
+
+        What was read long ago is read again if it is too much in all.
+        """
+        key, columns = which
+        for old in [one for one in self._read if one[0] == key and one[1] and columns]:
+            self._read.pop(old)
         self._read[which] = read
         while len(self._read) > 1 and sum(map(_bytes, self._read.values())) > self.held:
             self._read.pop(next(iter(self._read)))

@@ -62,6 +62,6 @@ export const deleteMovements = (ids) => change(() => post("/api/library/movement
 export const accept = (id, name) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/accept`, { name }), `${name} is a symbol now.`);
 /** @param {string} id */
 export const reject = (id) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/reject`), "Not proposed again.");
-/** @param {string} recording @param {any} body */
+/** @param {string} recording @param {any} body Without `spans` the whole file, by its labels. */
 export const learnSpans = (recording, body) =>
-  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), "Learned from the recording.");
+  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), body.spans ? "Learned from the recording." : "Learned the whole file, by its labels.");

@@ -24,6 +24,7 @@ class Recordings {
     byId("spot").addEventListener("click", () => (this.search ? this.search.abort() : this.spot()));
     byId("add-span").addEventListener("click", () => this.add());
     byId("learn-spans").addEventListener("click", () => this.learn());
+    byId("learn-file").addEventListener("click", () => learnSpans(this.read.recording, { channels: this.chosenChannels() }));
     for (const [id, factor] of /** @type {[string, number][]} */ ([["zoom-in", 0.6], ["zoom-out", 1 / 0.6]])) byId(id).addEventListener("click", () => this.timeline.zoom(factor));
     byId("tables").addEventListener("change", () => this.table());
     byId("channels").addEventListener("change", () => this.columns());
@@ -39,6 +40,9 @@ class Recordings {
     byId("drop").classList.add("small-drop");
     byId("recording-name").textContent = name;
     fill(byId("tables"), ...recording.tables.map((/** @type {any} */ one, /** @type {number} */ k) => make("option", { value: String(k) }, one.name)));
+    const labeled = recording.tables.filter((/** @type {any} */ one) => one.label !== null);
+    byId("learn-file").hidden = recording.tables.length < 2 || !labeled.length;
+    byId("learn-file").title = `${counted(recording.tables.length, "movement")}, ${labeled.length} with a label: ${[...new Set(labeled.map((/** @type {any} */ one) => one.label))].slice(0, 8).join(", ")}`;
     fill(byId("problems"), ...recording.problems.map((/** @type {string} */ one) => make("p", { class: "small" }, one)));
     this.table();
     byId("spot").focus({ preventScroll: true });
@@ -57,7 +61,7 @@ class Recordings {
       return make("label", { class: "check" }, make("input", { type: "checkbox", checked: chosen.has(channel.name), value: channel.name }), key, make("span", {}, channel.name, make("span", { class: "soft small says" }, [channel.kind, channel.unit].filter(Boolean).join(", "))));
     };
     fill(byId("channels"), make("legend", {}, "Channels"), ...table.channels.map(box));
-    this.timeline.spans = [];
+    this.timeline.spans = table.label === null ? [] : [{ begin: 0, end: table.duration, label: table.label, p: null }];
     this.columns();
     this.timeline.show(this.shownPlot());
     this.changed();
@@ -150,6 +154,7 @@ class Recordings {
     byId("channels-note").textContent = wrong;
     byId("spot").textContent = this.search ? "Cancel" : "Find movements";
     byId("spot").disabled = wrong !== "" && !this.search;
+    byId("learn-file").disabled = library().read_only || !names.size || (wrong !== "" && library().symbols.length > 0);
     byId("learn-spans").disabled = library().read_only || !this.timeline.spans.some((one) => one.label !== null);
   }
 
