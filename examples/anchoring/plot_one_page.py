@@ -27,8 +27,8 @@ for most, size in zip(counts, sizes, strict=True):
     print(f"{most:4d} movements: {size:5.0f} kB")
 
 # %%
-# The script and the style are the same in all of them; the rest is numbers. A movement of each symbol is enough to draw with; more make the
-# answer surer.
+# The script and the style are the same in all of them; the rest is numbers. A movement of each symbol is enough to
+# draw with; more make the answer surer.
 held = pages[0].read_text(encoding="utf-8").partition('id="snapshot">')[2].partition("</script>")[0]
 fixed = sizes[0] - len(held.encode()) / 1e3
 figure, axes = plt.subplots(figsize=(6.4, 3), layout="constrained")
