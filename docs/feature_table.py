@@ -11,35 +11,31 @@ Features = dict[str, dict[str, list[str]]]
 
 
 def features() -> tuple[dict[str, str], Features]:
-    """The version of each library that was looked at; feature -> library -> [answer, names that give it]."""
+    """The version of each other library that was looked at; feature -> library -> [answer, names that give it]."""
     rows = tomllib.loads((DOCS / "features.toml").read_text(encoding="utf-8"))
     return rows.pop("looked_at"), rows
 
 
 def table() -> str:
-    """A line for each feature, a column for each library; ours with the names that give it."""
+    """A line for each feature, a column for each library."""
     versions, rows = features()
-    lines = [f"| | {OURS} | {' | '.join(versions)} |", "|---" * (len(versions) + 2) + "|"]
+    libraries = [OURS, *versions]
+    lines = [f"| | {' | '.join(libraries)} |", "|---" * (len(libraries) + 1) + "|"]
     for feature, cells in rows.items():
-        others = " | ".join(cells.get(library, ["no"])[0] for library in versions)
-        lines.append(f"| {feature} | {_ours(*cells[OURS])} | {others} |")
+        answers = " | ".join(cells.get(library, ["no"])[0] for library in libraries)
+        lines.append(f"| {feature} | {answers} |")
     return "\n".join(lines)
 
 
 def sources() -> str:
-    """For each other library, its version and where each answer of the table was found."""
+    """For each library, the names that give what the table says."""
     versions, rows = features()
     lines = []
-    for library, version in versions.items():
+    for library, version in {OURS: "", **versions}.items():
         found = [
             f"{feature}: {', '.join(f'`{name}`' for name in cells[library][1:])}"
             for feature, cells in rows.items()
             if len(cells.get(library, ())) > 1
         ]
-        lines.append(f"- {library} {version}. {'; '.join(found)}.")
+        lines.append(f"- **{f'{library} {version}'.strip()}.** {'; '.join(found)}.")
     return "\n".join(lines)
-
-
-def _ours(answer: str, *names: str) -> str:
-    shown = ", ".join(f"`{name}`" if " " in name else f"`{name.removeprefix('kineme.')}`" for name in names)
-    return shown if answer == "yes" else f"{answer}: {shown}" if names else answer
