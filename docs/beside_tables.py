@@ -1,4 +1,4 @@
-"""Tables and sentences of docs/beside-others.md and docs/migrating, from the results and docs/features.toml."""
+"""Tables of docs/beside-others.md, docs/migrating and a tutorial, from the results and docs/features.toml."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 import feature_table
+import million_tables
 from make_tables import DOCS, METHODS, OURS, PERTURBED, RESULTS, SHOWN
 
 #: Rows of the speed table: file of results, what was measured there, what it is called on the page.
@@ -49,7 +50,7 @@ def tables() -> dict[str, dict[str, str]]:
         "features": feature_table.table(),
         "features found": feature_table.sources(),
     }
-    return {"beside-others.md": beside} | {
+    return {"beside-others.md": beside, "tutorials/a-million-movements.md": million_tables.tables()} | {
         f"migrating/{row['details']['page']}.md": {row["details"]["page"]: _migrated(row)} for row in _rows("migrating")
     }
 

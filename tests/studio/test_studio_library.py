@@ -205,7 +205,8 @@ def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
         ("movements/assign", {"ids": [7], "symbol": None}, "Took the name off 1 movement"),
         ("movements/delete", {"ids": [8]}, "Deleted 1 movement"),
         ("movements", asked(8, label="new"), "Learned 1 movement; new: new"),
-        ("undo", {}, "Took a change back: as at version 9"),
+        ("undo", {}, "Took back version 10: Learned 1 movement; new: new"),
+        ("undo", {}, "Took back version 9: Deleted 1 movement"),
         ("undo", {"to": 3}, "Restored version 3"),
     ]
     for path, body, _ in changes:
@@ -213,10 +214,10 @@ def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
     shown = client.get("/api/library/history").json()["versions"]
     assert [one["said"] for one in shown[-2::-1]] == [words for _, _, words in changes]
     assert shown[-1]["said"] == "Learned 12 movements; new: kind 0, kind 1, kind 2, kind 3"
-    assert [one["number"] for one in shown if not one["can_restore"]] == [12, 3]
+    assert [one["number"] for one in shown if not one["can_restore"]] == [13, 3]
     assert _symbols(client)["wave"]["description"] == "a hand"
-    late = client.post("/api/library/undo", json={"version": 11, "to": 2})
-    assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 12)
+    late = client.post("/api/library/undo", json={"version": 12, "to": 2})
+    assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 13)
 
 
 def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):

@@ -64,7 +64,10 @@ class Guard:
         if not _same_origin(scope, headers):
             return 403, "expected a request of the studio's own page or of a program, got one of another page"
         if not self._knows_token(scope, headers):
-            return 401, "expected the token: open the address that kineme studio printed, with ?token=..."
+            return (
+                401,
+                "expected the token: open the address that kineme studio printed, with ?token= and what follows it",
+            )
         return None
 
     def _is_ours(self, host: str) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from kineme.library.storage.rows import Row, among, listed, select
-from kineme.library.storage.schema import COLUMNS, RETURNS
+from kineme.library.storage.schema import COLUMNS, RETURNS, UNDO
 from kineme.library.storage.versions import Version
 from kineme.output.text import counted, printable, shortened
 from kineme.studio.server.studio import Studio
@@ -29,7 +29,7 @@ def listed_history(studio: Studio) -> dict[str, Any]:
                 "number": one.id,
                 "time": one.at,
                 "what": one.action,
-                "said": said(one, before.get(one.id)),
+                "said": said(one, before.get(one.id), _undone(every, one)),
                 "can_restore": not studio.read_only and _same_as(every, one.id) != now,
                 "detail": _short(dict(one.detail)),
             }
@@ -38,9 +38,11 @@ def listed_history(studio: Studio) -> dict[str, Any]:
     }
 
 
-def said(version: Version, before: Row | None = None) -> str:
-    """A change in one sentence; `before` is the state of the symbol that was annotated."""
+def said(version: Version, before: Row | None = None, undone: Version | None = None) -> str:
+    """A change in one sentence; `before` is how the annotated symbol was, `undone` what was taken back."""
     detail = dict(version.detail)
+    if undone is not None:
+        return f"Took back version {undone.id}: {said(undone)}"
     words = _SAID.get(version.action, lambda _: version.action)
     try:
         return words(detail if before is None else {**detail, "before": before})
@@ -80,7 +82,6 @@ _SAID: dict[str, Any] = {
     "assign": lambda one: f"Assigned {_movements(one['movements'])} to {_name(one['symbol'])}",
     "release": lambda one: f"Took the name off {_movements(one['movements'])}",
     "reject": lambda one: f"Rejected a proposal of {_movements(len(one['movements']))}",
-    "undo": lambda one: f"Took a change back: as at version {one['to']}",
     "restore": lambda one: f"Restored version {one['to']}",
 }
 
@@ -112,11 +113,18 @@ def _annotated_before(studio: Studio, versions: Sequence[Version]) -> dict[int, 
     return {row[_STATE["removed"]]: row for row in rows}
 
 
-def _same_as(every: Sequence[Version], number: int) -> int:
+def _same_as(every: Sequence[Version], number: int, returns: Sequence[str] = RETURNS) -> int:
     """The first version that had the state of this one, as far as the history says so."""
-    while number and (one := every[number - 1]).action in RETURNS:
+    while number and (one := every[number - 1]).action in returns:
         number = one.detail["to"]
     return number
+
+
+def _undone(every: Sequence[Version], one: Version) -> Version | None:
+    """The version that an undo took back: that before it, or the one to whose state that one had returned."""
+    if one.action != UNDO:
+        return None
+    return every[_same_as(every, one.id - 1, (UNDO,)) - 1]
 
 
 def _short(detail: dict[str, Any]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def _page(text: str) -> bytes:
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
         '<meta name="color-scheme" content="light dark"><title>kineme studio: not opened</title>'
-        f"<h1>The studio was not opened</h1><p>It {in_markup(text)}.</p>"
+        f"<h1>The studio was not opened</h1><p>It {in_markup(text.rstrip('.'))}.</p>"
         "<p>The address stands in the terminal in which <code>kineme studio</code> was started; copy the whole of it. "
         "The token in it is another one after each start.</p></html>"
     ).encode()
