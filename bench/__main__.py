@@ -28,6 +28,7 @@ SUBJECTS = (
     "outliers",
     "defaults",
     "library",
+    "million",
     "lerobot",
     "bags",
     "binning",

@@ -14,6 +14,7 @@ import numpy as np
 from concept_figures import SCRIPTS, drawn
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from million_figure import million
 from moving_picture import moving_picture
 from PIL import Image
 from tutorial_figures import gestures, place
@@ -258,6 +259,7 @@ FIGURES = {
     "around-obstacles": around_obstacles,
     "adapting": adapting,
     "reliability": reliability,
+    "million": million,
     "styles": styles,
     "three-issues": three_issues,
     "many-goals": many_goals,

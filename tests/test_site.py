@@ -81,6 +81,12 @@ def test_every_command_has_a_page():
     assert set(dict(commands.pages())) == {"commands.rst", *(f"kineme-{name}.rst" for name in main.commands)}
 
 
+def test_examples_of_a_help_stand_under_their_heading():
+    page = dict(commands.pages())["kineme-learn.rst"]
+    assert "Example:" not in page
+    assert "**As in**\n\n.. code-block:: bash\n\n   kineme learn recordings/ --library actions/\n" in page
+
+
 @pytest.mark.parametrize("line", [line for lines in commands.EXAMPLES.values() for line in lines])
 def test_examples_of_commands_parse(line):
     command, context, words = main, click.Context(main), shlex.split(line.partition(" > ")[0])[1:]
@@ -112,6 +118,16 @@ def test_public_names_are_found_under_what_users_write():
     [
         ('<script src="https://cdn.example/a.js"></script>', "loads"),
         ('<img src="//cdn.example/a.png">', "loads"),
+        ("<img src='https://cdn.example/a.png'>", "loads"),
+        ("<img src=https://cdn.example/a.png>", "loads"),
+        ('<img srcset="page.html 1x, https://cdn.example/a.png 2x">', "loads"),
+        ('<object data="https://cdn.example/a.svg"></object>', "loads"),
+        ('<b style="background: url(&quot;https://cdn.example/a.png&quot;)">x</b>', "loads"),
+        ("<style>\n@import 'https://fonts.example/css';\n</style>", "loads"),
+        ('<img alt="a > b" src="missing.png">', "loads missing.png"),
+        ('<script src="_static/missing.js?v=1"></script>', "loads _static/missing.js"),
+        ("<script>show('<img src=missing.png>')</script>", None),
+        ('<link href="page.html?v=1">', None),
         ('<a href="other.html">', "links to other.html"),
         ('<a href="#nowhere">', "links to #nowhere"),
         ('<a href="#here">', None),

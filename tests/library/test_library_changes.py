@@ -10,6 +10,7 @@ from library_samples import contents, draw_movements
 
 import kineme
 from kineme import ActionLibrary, SpecificationError
+from kineme.library.storage import symbols
 
 N = 12
 NAMES = ["wave", "nod", "a'b; DROP TABLE movement", "../etc/passwd", "é", "é", "\n\t", "$(reboot)", "%s", "名"]
@@ -287,3 +288,9 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(library, change, mes
     with pytest.raises(SpecificationError, match=message):
         change(library)
     assert contents(library) == before
+
+
+def test_the_text_of_a_library_reads_no_members(library, monkeypatch):
+    """Those of a million movements took seconds and half a gigabyte."""
+    monkeypatch.setattr(symbols, "_with_members", None)
+    assert f"{len(library)} movements, 2 dims, 3 symbols, version {library.version}" in repr(library)

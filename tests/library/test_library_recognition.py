@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from library_samples import draw_movements
 
 from kineme import ActionLibrary, Demonstrations, Recognizer
+from kineme.comparison.stored_references import StoredReferences
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
@@ -130,6 +131,26 @@ def test_calibration_finds_the_nearest_of_a_large_class(make, d):
     assert (found >= nearest - 1e-4).all()
     assert found.mean() < 1.012 * nearest.mean()
     assert np.mean(found < nearest + 1e-4) > 0.85
+
+
+def test_calibration_holds_few_bounds_at_once(make, monkeypatch):
+    """Of a million movements, the bounds of a hundred to all were two gigabytes."""
+    library, together = make(_kinds([60] * 4)), []
+    bounds = StoredReferences.bounds
+
+    def noted(self, similarity, asked):
+        together.append(len(asked[0].values))
+        return bounds(self, similarity, asked)
+
+    monkeypatch.setattr(StoredReferences, "bounds", noted)
+    few = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    assert sum(together) == 100
+    assert max(together) <= 8
+    monkeypatch.setattr(sampled_calibration, "_BOUNDED", 100)
+    (library.folder / "calibration.cache").unlink()
+    many = LibraryRecognizer(library.store, exhaustive=0).model().calibration
+    assert together[-1] == 100
+    np.testing.assert_allclose(few.scales, many.scales, rtol=1e-6)
 
 
 def _flip(path, where):

@@ -111,7 +111,7 @@ class ActionLibrary:
     def __repr__(self) -> str:
         dims = "" if self.n_dims is None else f"{self.n_dims} dims, "
         return (
-            f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{len(self.symbols())} symbols, "
+            f"ActionLibrary({str(self.folder)!r}: {len(self)} movements, {dims}{symbols.count(self.store)} symbols, "
             f"version {self.version})"
         )
 

@@ -32,6 +32,7 @@ _SIZES = np.array([1, 2, 3, 4, 6, 8, 12, 16])  # classes of up to 16 are compare
 _NEAREST = 8  # by their bounds, compared exactly: the nearest of all nine times in ten, else one 5 to 8 % farther
 _TOGETHER = 4  # movements in one product
 _OTHERS = 64  # of the largest bounds, among which the nearest movement of another class is
+_BOUNDED = 8  # movements whose bounds to all members are in memory at once
 _MORE = 16  # the same among all, where shapes differ
 _AT_ONCE = 64  # classes whose movements are read together
 
@@ -158,11 +159,9 @@ def _proposed(similarity: AveragedSimilarity, stored: StoredReferences, group_of
 def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Array:
     """Distances of some movements to the nearest of other classes."""
     asked = evenly_spaced(len(stored.members), _CALIBRATED)
-    bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
     shown = np.repeat(np.arange(len(stored.first)), stored.counts)
-    bounds[shown[asked, None] == shown] = -np.inf
-    n_near = max(1, min(_OTHERS, len(stored.members) - 1))
-    near = np.argpartition(-bounds, n_near - 1, axis=1)[:, :n_near]
+    parts = (asked[start : start + _BOUNDED] for start in range(0, len(asked), _BOUNDED))
+    near = np.concatenate([_near_impostors(similarity, stored, shown, some) for some in parts])
     found = np.empty(len(asked))
     for i, members in enumerate(near):
         one = stored.described(similarity, stored.members[asked[i : i + 1]])
@@ -170,3 +169,12 @@ def _impostors(similarity: AveragedSimilarity, stored: StoredReferences) -> Arra
         away = distances(similarity.log_average(one, others))
         found[i] = away[:, shown[members] != shown[asked[i]]].min(initial=np.inf)
     return found
+
+
+def _near_impostors(similarity: AveragedSimilarity, stored: StoredReferences, shown: Rows, asked: Rows) -> Rows:
+    """For each of k movements asked, (k, 64) members with the largest bounds; of its own class only if others lack."""
+    bounds = stored.bounds(similarity, stored.reduced_at(stored.members[asked]))
+    bounds[shown[asked, None] == shown] = -np.inf
+    n_near = max(1, min(_OTHERS, len(stored.members) - 1))
+    np.negative(bounds, out=bounds)
+    return np.argpartition(bounds, n_near - 1, axis=1)[:, :n_near]

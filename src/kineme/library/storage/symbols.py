@@ -84,6 +84,12 @@ def symbols(store: Store) -> tuple[Symbol, ...]:
         return tuple(sorted(_with_members(connection, moment, states), key=lambda symbol: symbol.name))
 
 
+def count(store: Store) -> int:
+    """Number of symbols, whose members are not read."""
+    with store.reading() as connection:
+        return store.moment(connection).symbols
+
+
 def symbol(store: Store, who: str) -> Symbol:
     """The symbol of that name or id."""
     with store.reading() as connection:
