@@ -211,10 +211,10 @@ def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client
     symbols = {one["name"]: one["id"] for one in client.get("/api/library").json()["symbols"]}
     rows = samples(2)
     with client.websocket_connect(LIVE) as socket:
-        for name in symbols:  # the last of them leaves nothing to recognize
+        for name, key in symbols.items():  # the last of them leaves nothing to recognize
             socket.send_json({"samples": rows[:40]})
             _said(socket, "state")
-            client.delete(f"/api/library/symbols/{symbols[name]}")
+            client.delete(f"/api/library/symbols/{key}")
             socket.send_json({"samples": rows[40:]})
             socket.send_json({"finish": True})
             answer = _said(socket, "answer")

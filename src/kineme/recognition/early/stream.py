@@ -109,7 +109,7 @@ class Live:
         return self._recognize(self.movement())
 
     def movement(self) -> Trajectory:
-        """The movement so far, as `finish` recognizes it: what was skipped is missing, more than 4096 samples are averaged.
+        """The movement so far, as `finish` recognizes it: without what was skipped, and averaged beyond 4096 samples.
 
         Raises
         ------
