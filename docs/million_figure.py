@@ -12,7 +12,7 @@ _COLORS = ("tab:gray", "tab:blue", "tab:green", "tab:orange", "tab:red", "tab:pu
 
 def million() -> Figure:
     """Processor time and peak of memory of each part, against the number of movements."""
-    figure = new_figure(9.6, 3.6)
+    figure = new_figure(7.4, 4.0)
     left, right = figure.subplots(1, 2)
     for color, (part, took) in zip(_COLORS, by_part().items(), strict=True):
         counts = sorted(took)
@@ -20,5 +20,5 @@ def million() -> Figure:
             axes.plot(counts, [took[count][what] for count in counts], "o-", color=color, label=part, markersize=4)
     left.set(xscale="log", yscale="log", xlabel="movements", ylabel="processor time [s]")
     right.set(xscale="log", ylim=(0, None), xlabel="movements", ylabel="peak of memory [MB]")
-    right.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

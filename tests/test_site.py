@@ -80,6 +80,12 @@ def test_every_command_has_a_page():
     assert set(dict(commands.pages())) == {"commands.rst", *(f"kineme-{name}.rst" for name in main.commands)}
 
 
+def test_examples_of_a_help_stand_under_their_heading():
+    page = dict(commands.pages())["kineme-learn.rst"]
+    assert "Example:" not in page
+    assert "**As in**\n\n.. code-block:: bash\n\n   kineme learn recordings/ --library actions/\n" in page
+
+
 @pytest.mark.parametrize("line", [line for lines in commands.EXAMPLES.values() for line in lines])
 def test_examples_of_commands_parse(line):
     command, context, words = main, click.Context(main), shlex.split(line.partition(" > ")[0])[1:]

@@ -63,7 +63,7 @@ def _title(text: str, rule: str) -> list[str]:
 def _text(text: str) -> list[str]:
     """The paragraphs of a help text, without its examples, which stand under their own heading."""
     paragraphs = [one.strip(" \n") for one in text.split("\n\n")]
-    paragraphs = [one for one in paragraphs if not one.startswith(("\b", "As in"))]
+    paragraphs = [one for one in paragraphs if not one.startswith(("\b", "As in", "Example: "))]
     return [line for one in paragraphs for line in (_sentence(one), "")]
 
 
@@ -85,7 +85,10 @@ def _examples() -> dict[str, list[str]]:
     """Command -> lines that call it, of its own help and of the pages, in which all of them are tried."""
     found: dict[str, list[str]] = {}
     texts = [page.read_text(encoding="utf-8") for page in written_pages()]
-    texts = [*(f"    {line.strip()}" for text in _helps(main) for line in text.splitlines()), *texts]
+    texts = [
+        *(f"    {line.strip().removeprefix('Example: ')}" for text in _helps(main) for line in text.splitlines()),
+        *texts,
+    ]
     for line in (re.sub(r"\s{2,}", "  ", line.strip()) for text in texts for line in _SHOWN.findall(text)):
         path = _path_of(line)
         if line not in found.setdefault(path, []):

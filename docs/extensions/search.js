@@ -86,7 +86,7 @@ const Ranking = {
     }
     const found = [];
     docnames.forEach((name, page) => {
-      const text = share((word) => pages.get(word)?.has(page)) / total;
+      const text = (name.endsWith("/index") ? 0.6 : 1) * (share((word) => pages.get(word)?.has(page)) / total);
       const line = bestLine.get(page);
       if (text > 0.6 || line?.score > 0.45) found.push([page, line, (text + 2 * (line?.score ?? 0)) * Ranking.chapter(name)[0]]);
     });

@@ -67,6 +67,15 @@ def test_what_was_recorded_comes_back_in_any_order(library, tmp_path):
         assert again.verify() == []
 
 
+def test_what_a_gripper_said_comes_back_exactly(tmp_path):
+    """Single precision would say 0.0799999982, which no program finds equal to the 0.08 that was recorded."""
+    t = np.linspace(0, 1, 20)
+    shown = pd.DataFrame({"t": t, "x": t, "y": t**2, "gripper": np.where(t > 0.6, 0.08, -1.1e-3)})
+    with ActionLibrary(tmp_path / "new", create=True) as made:
+        made.learn(Demonstrations.of(shown), ["a"])
+        np.testing.assert_array_equal(made.movements("a")[0].recorded[:, 2], shown["gripper"])
+
+
 def test_movements_that_differ_in_a_gripper_or_in_where_the_tool_points_are_two(library):
     same = poses()
     assert library.learn(same).added == 0

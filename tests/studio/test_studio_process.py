@@ -217,7 +217,7 @@ def _refused(folder, *options):
     """Exit code of a studio that does not begin, and what it says."""
     done = CliRunner().invoke(main, ["studio", "--no-open", "-l", str(folder), *map(str, options)])
     assert isinstance(done.exception, SystemExit), done.exception
-    return done.exit_code, done.stderr
+    return done.exit_code, done.output
 
 
 @pytest.mark.parametrize(("options", "code", "words"), REFUSED, ids=str)

@@ -76,7 +76,18 @@ def _from_bytes(blobs: Sequence[bytes], positions: Array, offsets: NDArray[np.in
     others = other_columns(channels)
     recorded = np.empty((len(positions), sum(len(one.columns) for one in channels)))
     recorded[:, others] = np.frombuffer(b"".join(blobs), np.float32).reshape(-1, len(others))
+    kinds = [one.kind for one in channels for _ in one.columns]
+    for k in (k for k in others if kinds[k] == "discrete"):
+        recorded[:, k] = _in_fewest_digits(recorded[:, k])
     plain = [k for k in range(recorded.shape[1]) if k not in others]
     learned = [one.kind != "orientation" for one in channels for _ in one.coordinates]
     recorded[:, plain] = positions[:, learned]
     return canonical(recorded, offsets, channels)
+
+
+def _in_fewest_digits(stored: Array) -> Array:
+    """Values of single precision as the shortest decimals that round to them: 0.08, and not 0.0799999982."""
+    starts = np.flatnonzero(np.diff(stored, prepend=np.nan))  # of the stretches in which a value holds
+    values, which = np.unique(stored[starts].astype(np.float32), return_inverse=True)
+    exact = np.array([float(str(value)) for value in values])[which]
+    return np.repeat(exact, np.diff(starts, append=len(stored)))
