@@ -131,7 +131,6 @@ reference: $(DEV)/ready
 
 tables: $(DEV)/ready
 	$(DEV)/bin/python docs/make_tables.py
-	$(DEV)/bin/python docs/concept_tables.py
 
 # After another version: its numbers and sums in vendored.json, which tests compare.
 SCENE = src/kineme/robots/view/vendor

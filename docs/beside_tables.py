@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import re
 from typing import Any
 
 import feature_table
 import million_tables
-from make_tables import DOCS, METHODS, OURS, PERTURBED, RESULTS, SHOWN
+from measured import Asked, content, means, protocols, rows, table
+
+from kineme.experiments.evaluation.methods import METHODS, OURS
 
 #: Rows of the speed table: file of results, what was measured there, what it is called on the page.
 SPEED = (
@@ -26,22 +26,18 @@ SPEED = (
     ("startup", "import kineme", "import, beside the import of NumPy"),
 )
 N_BASIS = (10, 20, 40, 80)
-Asked = list[tuple[str, str, str, str]]
+#: Conditions of the robustness protocol that the pages show.
+PERTURBED = (
+    "as recorded", "shift 2 extents", "scale 2^±1", "rotation ±20°", "rotation ±40°", "warp 0.35", "noise 3 %",
+    "all moderately", "all strongly",
+)  # fmt: skip
 
 
 def tables() -> dict[str, dict[str, str]]:
     """Page -> name of each table or sentence -> its text."""
-    shapes, people = _protocols("lasa"), _protocols("gestures3d")
-    one = [(f"one shot, {name}", "robustness", name, "accuracy") for name in PERTURBED]
-    one += [(f"{n} shots", "few-shot", f"{n} shots", "accuracy") for n in (3, 5)]
-    turned = [("one shot, rotation by any angle", "any-angle", "any angle", "accuracy")]
-    others = [(f"by others, {name}", "user-independent", name, "accuracy") for name in people["user-independent"][OURS]]
-    oneself = [(f"by oneself, {name}", "user-dependent", name, "accuracy") for name in people["user-dependent"][OURS]]
-    measures = {"auroc": "AUROC, known against unknown", "rejected": "unknown rejected at 5 % false rejection"}
-    unknown = [(text, "open-set", "perturbed", measure) for measure, text in measures.items()]
-    asked = {"shapes": (shapes, one + turned), "people": (people, others + oneself), "unknown": (shapes, unknown)}
+    asked = evaluated()
     beside = {name: table(*what) for name, what in asked.items()}
-    beside |= {f"{name} said": who_leads(*what) for name, what in asked.items()}
+    beside |= {f"{name} said": who_leads(*what[1:]) for name, what in asked.items()}
     beside |= {
         "speed": _speed(),
         "repeated": _repeated(),
@@ -51,43 +47,45 @@ def tables() -> dict[str, dict[str, str]]:
         "features found": feature_table.sources(),
     }
     return {"beside-others.md": beside, "tutorials/a-million-movements.md": million_tables.tables()} | {
-        f"migrating/{row['details']['page']}.md": {row["details"]["page"]: _migrated(row)} for row in _rows("migrating")
+        f"migrating/{row['details']['page']}.md": {row["details"]["page"]: _migrated(row)} for row in rows("migrating")
     }
 
 
-def filled(page: str, texts: dict[str, str]) -> str:
-    """The page with every text between its marks; `KeyError` names one that the page has no place for."""
-    for name, text in texts.items():
-        marks = re.compile(rf"(<!-- table: {re.escape(name)} -->\n).*?(<!-- end -->)", re.DOTALL)
-        if not marks.search(page):
-            raise KeyError(name)
-        page = marks.sub(lambda found, text=text: f"{found[1]}{text}\n{found[2]}", page)
-    return page
+def evaluated() -> dict[str, tuple[str, dict[str, Any], Asked]]:
+    """Table of recognition -> the head of its first column, where its values are from, and its rows."""
+    shapes, people = protocols("lasa"), protocols("gestures3d")
+    drawn = [(f"one shot, {name}", "robustness", name, "accuracy") for name in PERTURBED]
+    drawn += [("one shot, rotation by any angle, `max_angle=pi`", "any-angle", "any angle", "accuracy")]
+    drawn += [(f"{n} shots", "few-shot", f"{n} shots", "accuracy") for n in (3, 5)]
+    shown = [
+        (f"{text}, {name}", protocol, name, "accuracy")
+        for protocol, text in (("user-independent", "by others"), ("user-dependent", "by oneself"))
+        for name in people[protocol][OURS]
+    ]
+    measures = {
+        "auroc": "AUROC, known against unknown",
+        "rejected": "unknown rejected at 5 % false rejection",
+        "accuracy": "known accepted and named right",
+    }
+    unknown = [(text, "open-set", "perturbed", measure) for measure, text in measures.items()]
+    return {
+        "shapes": ("accuracy", shapes, drawn),
+        "people": ("accuracy", people, shown),
+        "unknown": ("open set", shapes, unknown),
+    }
 
 
-def table(protocols: dict[str, Any], rows: Asked) -> str:
-    """A line for each of `rows`, (text, protocol, condition, measure); a column for each method, the best in bold."""
-    methods = [name for name in SHOWN if any(name in by_method for by_method in protocols.values())]
-    lines = [f"| | {' | '.join(METHODS[name].title for name in methods)} |", "|---" * (len(methods) + 1) + "|"]
-    for text, *what in rows:
-        values = _values(protocols, what)
-        best = max(values.values())
-        cells = [_cell(values[name], best) if name in values else "-" for name in methods]
-        lines.append(f"| {text} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def who_leads(protocols: dict[str, Any], rows: Asked) -> str:
+def who_leads(found: dict[str, Any], asked: Asked) -> str:
     """In how many of the rows kineme is ahead, to three digits, and who is ahead of it elsewhere."""
     ahead, level, behind = 0, 0, []
-    for text, *what in rows:
-        values = _values(protocols, what)
+    for text, *what in asked:
+        values = means(found, *what)
         ours, best = values.pop(OURS), max(values.values())
         ahead, level = ahead + (ours > best), level + (ours == best)
         if ours < best:
             who = " and ".join(METHODS[name].title for name, value in values.items() if value == best)
             behind.append(f"{who} in *{text}* ({best:.3f} against {ours:.3f})")
-    said = f"To three digits, kineme is ahead of all others in {_of(ahead, len(rows))}"
+    said = f"To three digits, kineme is ahead of all others in {_of(ahead, len(asked))}"
     said += f" and level with the best in {level}." if level else "."
     return f"{said} Ahead of it: {'; '.join(behind)}." if behind else said
 
@@ -96,20 +94,10 @@ def _of(n: int, total: int) -> str:
     return f"all {total} rows" if n == total else f"{n} of these {total} rows"
 
 
-def _values(protocols: dict[str, Any], what: list[str]) -> dict[str, float]:
-    protocol, condition, measure = what
-    found = {name: by.get(condition, {}).get(measure, {}).get("mean") for name, by in protocols[protocol].items()}
-    return {name: round(value, 3) for name, value in found.items() if value is not None and name in SHOWN}
-
-
-def _cell(value: float, best: float) -> str:
-    return f"**{value:.3f}**" if value == best else f"{value:.3f}"
-
-
 def _speed() -> str:
     lines = ["| | kineme | the other | | ours is |", "|---|---|---|---|---|"]
     for name, what, text in SPEED:
-        row = next(row for row in _rows(name) if row["what"] == what and row["peer"] is not None)
+        row = next(row for row in rows(name) if row["what"] == what and row["peer"] is not None)
         ours, peer, faster = _figure(row["ours"]), _figure(row["peer"]), _times(row)
         lines.append(f"| {text} | {ours} {row['unit']} | {peer} {row['unit']} | {row['peer_name']} | {faster} |")
     return "\n".join(lines)
@@ -145,7 +133,7 @@ def _errors(n: int) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
     """Median and largest error of our fit of the path in the original formulation, and of each peer."""
     ours: dict[str, float] = {}
     others: dict[str, dict[str, float]] = {}
-    for row in _rows("reconstruction"):
+    for row in rows("reconstruction"):
         for kind in ("median", "max"):
             if row["what"] == f"N = {n}, original, trajectory, {kind}":
                 ours[kind] = row["ours"]
@@ -158,7 +146,7 @@ def _error(values: dict[str, float]) -> str:
 
 
 def _migrated(row: dict[str, Any]) -> str:
-    versions = json.loads((RESULTS / "migrating.json").read_text(encoding="utf-8"))["versions"]
+    versions = content("migrating")["versions"]
     peer = {"movement_primitives": "movement-primitives", "dollar": "dollarpy"}.get(row["details"]["page"], "pydmps")
     measured = row["what"].partition(": ")[2]
     return f"Measured with {peer} {versions[peer]}: {measured}, {row['ours']:.3g} {row['unit']}."
@@ -166,26 +154,6 @@ def _migrated(row: dict[str, Any]) -> str:
 
 def _conditions() -> str:
     """Machine and versions with which the speed was measured."""
-    content = json.loads((RESULTS / "learn_even.json").read_text(encoding="utf-8"))
-    named = ", ".join(
-        f"{name} {version}" for name, version in content["versions"].items() if version != "not installed"
-    )
-    return f"{content['machine']['cores']} cores, {content['machine']['system']}; {named}."
-
-
-def _protocols(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((RESULTS / f"evaluation-{name}.json").read_text(encoding="utf-8"))["protocols"]
-    return found
-
-
-def _rows(name: str) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))["rows"]
-    return found
-
-
-def fill_pages() -> None:
-    """Write all texts into the pages."""
-    for page, texts in tables().items():
-        path = DOCS / page
-        path.write_text(filled(path.read_text(encoding="utf-8"), texts), encoding="utf-8")
-        print(path)
+    found = content("learn_even")
+    named = ", ".join(f"{name} {version}" for name, version in found["versions"].items() if version != "not installed")
+    return f"{found['machine']['cores']} cores, {found['machine']['system']}; {named}."

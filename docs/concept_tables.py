@@ -1,14 +1,11 @@
-"""Write what was measured into the pages of concepts: ``make tables``."""
+"""The table of speeds of docs/concepts/two-matrices.md."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from measured import DOCS, rows
 
-from make_tables import RESULTS
-
-PAGE = Path(__file__).parent / "concepts" / "two-matrices.md"
-#: What was measured: file of `RESULTS`, its row and peer -> how the page says it.
+PAGE = DOCS / "concepts" / "two-matrices.md"
+#: What was measured: file of results, its row and peer -> how the page says it.
 ROWS = {
     ("learn_even", "learn 10,000 even movements", "movement_primitives imitate"): "learn movements, evenly sampled",
     ("learn_even", "learn 10,000 even movements", "bare matrix product"): "the same, beside the product alone",
@@ -27,20 +24,7 @@ def speed() -> str:
     """Lines of the table of speeds."""
     lines = ["| | kineme | | times as fast as |", "|---|---|---|---|"]
     for (file, what, peer), text in ROWS.items():
-        rows = json.loads((RESULTS / f"{file}.json").read_text(encoding="utf-8"))["rows"]
-        (row,) = (row for row in rows if (row["what"], row["peer_name"]) == (what, peer))
+        (row,) = (row for row in rows(file) if (row["what"], row["peer_name"]) == (what, peer))
         times = f"{row['ratio']:.2g}" if row["ratio"] < 10 else f"{row['ratio']:,.0f}"
         lines.append(f"| {text} | {row['ours']:,.0f} | {_UNITS[row['unit']]} | {times} × {peer} |")
     return "\n".join(lines)
-
-
-def filled(page: str) -> str:
-    """The page with the table between its marks."""
-    begin, end = "<!-- table: speed -->\n", "<!-- end -->"
-    before, _, rest = page.partition(begin)
-    return f"{before}{begin}{speed()}\n{end}{rest.partition(end)[2]}"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    print(PAGE)

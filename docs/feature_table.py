@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import tomllib
 
-from make_tables import DOCS
+from measured import DOCS
 
-OURS = "kineme"
+from kineme.experiments.evaluation.methods import OURS
+
 Features = dict[str, dict[str, list[str]]]
 
 

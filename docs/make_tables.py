@@ -6,24 +6,14 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from pathlib import Path
-from typing import Any
 
-from kineme.experiments.evaluation.methods import METHODS
+import beside_tables
+import concept_tables
+from measured import DOCS, RESULTS, fill, rows, table
 
-DOCS = Path(__file__).parent
-RESULTS = DOCS.parent / "bench" / "results"
-OURS = "kineme"
-#: $P and the paper's second form are left out: $P+ and the first form are ahead of them in nearly every row.
-SHOWN = [name for name in METHODS if name not in {"point-cloud", "paper-bio"}]
-#: Conditions of the robustness protocol that the page shows.
-PERTURBED = (
-    "as recorded", "shift 2 extents", "scale 2^±1", "rotation ±20°", "rotation ±40°", "warp 0.35", "noise 3 %",
-    "all moderately", "all strongly",
-)  # fmt: skip
-
+PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "the defaults": ("", ("defaults",)),
@@ -57,29 +47,21 @@ DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 def tables() -> dict[str, str]:
-    """Name of each table -> its lines."""
+    """Name of each table of the page about recognition -> its lines."""
+    evaluated = beside_tables.evaluated()
     return {
         "defaults": _defaults(),
         "many": _many(),
         "nested": _nested(),
-        "people": _people(),
-        "lasa": _lasa(),
-        "open-set": _open_set(),
+        "people": table(*evaluated["people"]),
+        "lasa": table(*evaluated["shapes"]),
+        "open-set": table(*evaluated["unknown"]),
         "stream": _stream(),
     }
 
 
-def filled(page: str) -> str:
-    """The page with every table between its marks."""
-    for name, table in tables().items():
-        marks = rf"(<!-- table: {name} -->\n).*?(<!-- end -->)"
-        page = re.sub(marks, lambda found, table=table: f"{found[1]}{table}\n{found[2]}", page, flags=re.DOTALL)
-    return page
-
-
 def _measured() -> dict[str, float]:
-    rows = json.loads((RESULTS / "defaults.json").read_text(encoding="utf-8"))["rows"]
-    return {row["what"]: row["ours"] for row in rows}
+    return {row["what"]: row["ours"] for row in rows("defaults")}
 
 
 def _defaults() -> str:
@@ -103,12 +85,11 @@ def _many() -> str:
 
 
 def _nested() -> str:
-    rows = json.loads((RESULTS / "nested.json").read_text(encoding="utf-8"))["rows"]
     lines = [
         "| set left out | weights | width | k, plane / space | band | accuracy | the defaults | best in hindsight |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for row in rows:
+    for row in rows("nested"):
         (chosen, count), *others = row["details"]["chosen"]
         weights, k = ", ".join(map("{:g}".format, chosen["weights"])), " / ".join(map(str, chosen["concentrations"]))
         often = f" ({count} of {count + sum(one[1] for one in others)} people)" if others else ""
@@ -120,32 +101,9 @@ def _nested() -> str:
     return "\n".join(lines)
 
 
-def _evaluated(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((RESULTS / f"evaluation-{name}.json").read_text(encoding="utf-8"))
-    return found
-
-
-def _people() -> str:
-    protocols = _evaluated("gestures3d")["protocols"]
-    rows = [
-        (f"{text}, {condition}", protocol, condition, "accuracy")
-        for protocol, text in (("user-independent", "by others"), ("user-dependent", "by oneself"))
-        for condition in _conditions(protocols[protocol])
-    ]
-    return _table("templates", protocols, rows)
-
-
-def _lasa() -> str:
-    protocols = _evaluated("lasa")["protocols"]
-    rows = [(f"one shot, {one}", "robustness", one, "accuracy") for one in PERTURBED]
-    rows += [("one shot, rotation by any angle, `max_angle=pi`", "any-angle", "any angle", "accuracy")]
-    rows += [(one, "few-shot", one, "accuracy") for one in ("3 shots", "5 shots")]
-    return _table("accuracy", protocols, rows)
-
-
 def _stream() -> str:
     """What an update and the end of a live stream take, in words."""
-    measured = {row["what"]: row["ours"] for row in json.loads((RESULTS / "stream.json").read_text("utf-8"))["rows"]}
+    measured = {row["what"]: row["ours"] for row in rows("stream")}
 
     def of(what: str, end: str, digits: int) -> str:
         pair = (f"{measured[what.format(n=n) + end]:.{digits}f}" for n in (100, 500))
@@ -159,34 +117,6 @@ def _stream() -> str:
         f"{of(rate, 'the plane', 0)} a second in the plane, and {of(rate, 'space', 0)} in space. `finish()` takes at\n"
         f"most {slowest:.1f} ms (`python -m bench --only stream`)."
     )
-
-
-def _open_set() -> str:
-    protocols = _evaluated("lasa")["protocols"]
-    measures = {
-        "auroc": "AUROC, known against unknown",
-        "rejected": "unknown rejected at 5 % false rejection",
-        "accuracy": "known accepted and named right",
-    }
-    rows = [(text, "open-set", "perturbed", measure) for measure, text in measures.items()]
-    return _table("open set", protocols, rows)
-
-
-def _conditions(by_method: dict[str, Any]) -> list[str]:
-    return list(by_method[OURS])
-
-
-def _table(head: str, protocols: dict[str, Any], rows: list[tuple[str, str, str, str]]) -> str:
-    """Rows of (text, protocol, condition, measure), a column for each method; the best of a row in bold."""
-    methods = [name for name in SHOWN if any(name in by_method for by_method in protocols.values())]
-    lines = [f"| {head} | {' | '.join(METHODS[one].title for one in methods)} |", "|---" * (len(methods) + 1) + "|"]
-    for text, protocol, condition, measure in rows:
-        values = [protocols[protocol].get(one, {}).get(condition, {}).get(measure, {}).get("mean") for one in methods]
-        best = max(round(value, 3) for value in values if value is not None)
-        cells = ["-" if value is None else f"{value:.3f}" for value in values]
-        bold = [f"**{cell}**" if cell == f"{best:.3f}" else cell for cell in cells]
-        lines.append(f"| {text} | {' | '.join(bold)} |")
-    return "\n".join(lines)
 
 
 def take_in(name: str, evaluated: Path) -> None:
@@ -210,9 +140,7 @@ def take_in(name: str, evaluated: Path) -> None:
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
         take_in(argument.partition("=")[0], Path(argument.partition("=")[2]))
-    path = DOCS / "guide" / "recognition.md"
-    path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
-    print(path)
-    from beside_tables import fill_pages
-
-    fill_pages()
+    fill(PAGE, tables())
+    fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
+    for page, texts in beside_tables.tables().items():
+        fill(DOCS / page, texts)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from make_tables import RESULTS
+from measured import content, rows
 
 _SVM = ("train on 1,000,000 movements", "accuracy after 1,000,000", "accuracy of the exact kernel, 4,000 movements")
 
@@ -18,7 +17,7 @@ def tables() -> dict[str, str]:
 def by_part() -> dict[str, dict[int, dict[str, Any]]]:
     """Part of the page -> number of movements -> processor seconds and peak of memory [MB]."""
     found: dict[str, dict[int, dict[str, Any]]] = {}
-    for row in _rows("million"):
+    for row in rows("million"):
         if part := row["details"].get("part"):
             took = {"seconds": row["ours"], "megabytes": row["details"]["megabytes"]}
             found.setdefault(part, {})[row["details"]["movements"]] = took
@@ -44,24 +43,24 @@ def _seconds(value: float) -> str:
 
 def _disk() -> str:
     """What the folders of the page hold at the end, with the most movements."""
-    rows = [row for row in _rows("million") if "folder" in row["details"]]
-    most = max(row["details"]["movements"] for row in rows)
-    sizes = [(row["details"]["folder"], row["ours"]) for row in rows if row["details"]["movements"] == most]
+    folders = [row for row in rows("million") if "folder" in row["details"]]
+    most = max(row["details"]["movements"] for row in folders)
+    sizes = [(row["details"]["folder"], row["ours"]) for row in folders if row["details"]["movements"] == most]
     return f"On disk, {most:,} movements: {', '.join(f'{size / 1000:.2g} GB in `{name}/`' for name, size in sizes)}."
 
 
 def _machine() -> str:
-    content = _content("million")
-    machine, versions = content["machine"], content["versions"]
+    found = content("million")
+    machine, versions = found["machine"], found["versions"]
     where = f"{machine['cores']} cores ({machine['cpu']}, {machine['system']})"
     named = f"Python {versions['python']}, NumPy {versions['numpy']} and Numba {versions['numba']}"
     return f"On {where} with {named}. `python -m bench --only million` runs this page and measures it anew."
 
 
 def _two_millions() -> str:
-    rows = {row["what"].strip(): row for row in _rows("library-2000000")}
-    learned, accuracy = rows["2,000,000 movements, 2-D: learn"], rows["accuracy"]
-    first, each = (rows[what]["ours"] for what in ("first answer, caches made", "recognize one, median"))
+    found = {row["what"].strip(): row for row in rows("library-2000000")}
+    learned, accuracy = found["2,000,000 movements, 2-D: learn"], found["accuracy"]
+    first, each = (found[what]["ours"] for what in ("first answer, caches made", "recognize one, median"))
     return (
         f"With {learned['details']['n']:,} movements of 200 samples, {learned['ours']:,.0f} are stored per second, "
         f"the first answer takes {first / 1000:.0f} s, and each further one {each:.0f} ms. The best-ranked symbol is "
@@ -72,19 +71,9 @@ def _two_millions() -> str:
 
 
 def _svm() -> str:
-    rows = {row["what"]: row["ours"] for row in _rows("binning")}
-    seconds, accuracy, exact = (rows[what] for what in _SVM)
+    found = {row["what"]: row["ours"] for row in rows("binning")}
+    seconds, accuracy, exact = (found[what] for what in _SVM)
     return (
         f"A linear SVM on `kineme.RandomBinning` features of a million movements trains in {seconds:.0f} s, with "
         f"accuracy {accuracy:.3f}; a kernel SVM of 4,000 movements has {exact:.3f} (`python -m bench --only binning`)."
     )
-
-
-def _content(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
-    return found
-
-
-def _rows(name: str) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = _content(name)["rows"]
-    return found
