@@ -11,6 +11,7 @@ from pathlib import Path
 
 import beside_tables
 import concept_tables
+import modulation_tables
 from measured import DOCS, RESULTS, fill, rows, table
 
 PAGE = DOCS / "guide" / "recognition.md"
@@ -141,6 +142,7 @@ if __name__ == "__main__":
     for argument in sys.argv[1:]:
         take_in(argument.partition("=")[0], Path(argument.partition("=")[2]))
     fill(PAGE, tables())
+    fill(modulation_tables.PAGE, modulation_tables.tables())
     fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
     for page, texts in beside_tables.tables().items():
         fill(DOCS / page, texts)
