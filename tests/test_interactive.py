@@ -107,6 +107,13 @@ def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser, writt
     ends = [float(page.locator(".grip").nth(0).get_attribute(f"aria-value{end}")) for end in ("min", "max")]
     weights = [float(one.get_attribute("aria-valuenow")) for one in page.locator(".grip").all()]
     assert all(ends[0] <= one <= ends[1] for one in weights)  # no bar leaves its row
+    page.mouse.move(box["x"] + 40, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] - 300, box["y"] - 300, steps=20)
+    page.mouse.up()
+    star = page.locator(".goal").bounding_box()
+    assert box["x"] < star["x"] + star["width"] / 2  # a goal that was left of the plane could not be dragged back
+    assert box["y"] < star["y"] + star["height"] / 2
     page.get_by_role("button", name="as it was shown").click()
     assert len({before, after_goal, after_weight, after_drawing}) == 4
     assert line.get_attribute("d") == before

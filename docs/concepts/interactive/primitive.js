@@ -101,6 +101,7 @@
   const line = (points) => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
   const planePath = (path) => line(path[0].map((x, t) => toPixels([x, path[1][t]])));
   const within = (value, low, high) => Math.min(high, Math.max(low, value));
+  const inPlane = ([x, y]) => [within(x, LEFT + 1, LEFT + WIDE - 1), within(y, TOP - HIGH + 1, TOP - 1)];
 
   function start(root) {
     const data = JSON.parse(root.querySelector("script").textContent);
@@ -146,7 +147,7 @@
     }
 
     function setGoal(x, y) {
-      state.goal = [within(x, LEFT + 1, LEFT + WIDE - 1), within(y, TOP - HIGH + 1, TOP - 1)];
+      state.goal = inPlane([x, y]);
       draw();
     }
 
@@ -177,7 +178,7 @@
 
     let points = [];
     const add = (event) => {
-      points.push([event.timeStamp, ...toMillimeters(at(parts.plane, event))]);
+      points.push([event.timeStamp, ...inPlane(toMillimeters(at(parts.plane, event)))]);
       parts.pen.setAttribute("d", line(points.map(([, x, y]) => toPixels([x, y]))));
     };
     drag(parts.plane, (event) => ((points = []), add(event)), add);
