@@ -154,9 +154,10 @@ def _time(
         return None
     if not named:
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    of_several = f" of {listed([heads[k] for k in of_time])}" if of_time else ""
     raise DataError(
         f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
-        "say which with time=, or the step between samples with units= where there is none, "
+        f"say which{of_several} with time=, or the step between samples with units= where there is none, "
         "in the shell with --time, --units"
     )
 
