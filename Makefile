@@ -150,4 +150,4 @@ lock:
 	uv pip compile pyproject.toml bench/rivals.in --group build --universal --generate-hashes --no-emit-index-url --no-header --quiet -o bench/rivals.txt
 
 clean:
-	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals out
+	rm -rf .venv .venv-dev .venv-dev-* .venv-lowest .venv-package .venv-ros2 .venv-bench .venv-rivals out docs/gallery docs/reference/generated docs/concepts/interactive/primitive.html

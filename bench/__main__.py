@@ -20,6 +20,8 @@ SUBJECTS = (
     "control",
     "arms",
     "modulation",
+    "via_points",
+    "joining",
     "recognize",
     "recognize_files",
     "stream",

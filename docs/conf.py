@@ -30,6 +30,7 @@ exclude_patterns = ["extensions", "templates", "**/README.md"]
 default_role = "literal"  # between single backticks in docstrings
 nitpicky = True
 highlight_language = "text"
+suppress_warnings = ["sphinx_gallery.space_in_filename"]  # in the path of the checkout; the scripts have none
 smartquotes_action = "D"  # dashes, and quotes as they are written
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]

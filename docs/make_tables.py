@@ -9,10 +9,15 @@ import json
 import sys
 from pathlib import Path
 
+import adapting_tables
 import beside_tables
 import concept_tables
+import modulation_tables
+import outlier_tables
 from measured import DOCS, RESULTS, fill, rows, table
 
+#: Pages of the guide besides that one about recognition.
+GUIDES = (adapting_tables, modulation_tables, outlier_tables)
 PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -141,6 +146,8 @@ if __name__ == "__main__":
     for argument in sys.argv[1:]:
         take_in(argument.partition("=")[0], Path(argument.partition("=")[2]))
     fill(PAGE, tables())
+    for module in GUIDES:
+        fill(module.PAGE, module.tables())
     fill(concept_tables.PAGE, {"speed": concept_tables.speed()})
     for page, texts in beside_tables.tables().items():
         fill(DOCS / page, texts)

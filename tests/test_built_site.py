@@ -43,6 +43,8 @@ QUESTIONS = {
     "which fit": "how-to/which-fit",
     "joints that wrap": "how-to/joints-that-wrap",
     "gripper": "how-to/grippers",
+    "phone accelerometer": "how-to/phone",
+    "csv with joints and a gripper": "how-to/grippers",
     "quaternion order": "how-to/poses-in-the-shell",
     "poses in the shell": "how-to/poses-in-the-shell",
     "labels from file names": "how-to/labels-from-file-names",

@@ -91,13 +91,29 @@ def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser, writt
     page.locator(".grip").nth(3).focus()
     page.keyboard.press("PageUp")
     after_weight = line.get_attribute("d")
-    box = page.locator(".drawings svg").first.bounding_box()
-    page.mouse.move(box["x"] + 40, box["y"] + 60)
+    bar, grip = page.locator(".bar").nth(5), page.locator(".grip").nth(5)
+    to = grip.bounding_box()
+    page.mouse.move(to["x"] + 5, to["y"] + 10)
     page.mouse.down()
-    for k in range(12):
-        page.mouse.move(box["x"] + 40 + 20 * k, box["y"] + 60 + 8 * (k % 4))
+    page.mouse.up()
+    assert abs(bar.bounding_box()["y"] - to["y"] - 10) < 2  # the bar ends where the pointer is
+    box = page.locator(".drawings svg").first.bounding_box()
+    page.mouse.move(box["x"] + 40, box["y"] + 200)
+    page.mouse.down()
+    for k in range(40):
+        page.mouse.move(box["x"] + 40 + 6 * k, box["y"] + 60 + 8 * (k % 4))
     page.mouse.up()
     after_drawing = line.get_attribute("d")
+    ends = [float(page.locator(".grip").nth(0).get_attribute(f"aria-value{end}")) for end in ("min", "max")]
+    weights = [float(one.get_attribute("aria-valuenow")) for one in page.locator(".grip").all()]
+    assert all(ends[0] <= one <= ends[1] for one in weights)  # no bar leaves its row
+    page.mouse.move(box["x"] + 40, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] - 300, box["y"] - 300, steps=20)
+    page.mouse.up()
+    star = page.locator(".goal").bounding_box()
+    assert box["x"] < star["x"] + star["width"] / 2  # a goal that was left of the plane could not be dragged back
+    assert box["y"] < star["y"] + star["height"] / 2
     page.get_by_role("button", name="as it was shown").click()
     assert len({before, after_goal, after_weight, after_drawing}) == 4
     assert line.get_attribute("d") == before

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from types import SimpleNamespace
 
 import click
 import pytest
-from extensions import commands, equations, formats, public, readers, routes, typeset, whole
+from extensions import commands, equations, formats, leftovers, public, readers, routes, typeset, whole
 from extensions.docstrings import to_rest
 from walk_through import DOCS
 
@@ -102,6 +103,15 @@ def test_every_equation_of_the_paper_is_somewhere_in_the_code():
     assert "kineme.kernels.TruncatedEuclidean" in equations.places()[7]
 
 
+def test_equations_are_found_wherever_the_checkout_lies(tmp_path, monkeypatch):
+    package = tmp_path / "experiments" / "kineme"
+    (package / "experiments").mkdir(parents=True)
+    (package / "kernel.py").write_text('"""Eq. (5)."""')
+    (package / "experiments" / "table.py").write_text('"""Eq. (6)."""')
+    monkeypatch.setattr(equations, "_ROOT", package)
+    assert equations.places.__wrapped__() == {5: ["kineme.kernel"]}
+
+
 def test_every_format_is_on_its_page():
     text = dict(formats.pages())["formats.md"]
     assert all(f"`{ending}`" in text for ending in formats.FORMATS)
@@ -143,3 +153,33 @@ def test_the_check_of_the_site_finds_what_is_wrong(tmp_path, markup, wrong):
 def test_the_check_of_the_site_reads_style_sheets(tmp_path):
     (tmp_path / "a.css").write_text("@import 'https://fonts.example/css'; p { background: url(a.png) }")
     assert [line.partition("loads ")[2] for line in whole.problems(tmp_path)] == ["https://fonts.example/css"]
+
+
+def _tree(folder, *files):
+    for file in files:
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_text("")
+
+
+def _files(folder):
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_what_the_gallery_made_of_scripts_that_are_gone_is_removed(tmp_path):
+    _tree(tmp_path / "examples", "kernels/plot_one.py")
+    gallery = tmp_path / "docs" / "gallery"
+    kept = {"index.rst", "backreferences/kineme.DMP.examples", "kernels/index.rst", "kernels/plot_one.codeobj.json"}
+    _tree(gallery, *kept, "kernels/plot_two.rst", "kernels/plot_two.py.md5", "old/index.rst", "old/images/a.png")
+    leftovers.remove_scripts(SimpleNamespace(srcdir=tmp_path / "docs"))
+    assert _files(gallery) == kept
+
+
+def test_pages_that_were_deleted_leave_the_site_and_the_others_are_written_again(tmp_path):
+    env = SimpleNamespace(found_docs={"index", "how-to/read"})
+    builder = SimpleNamespace(format="html", get_target_uri=lambda page: f"{page}.html")
+    kept = {"index.html", "how-to/read.html", "search.html", "_static/webpack-macros.html", "objects.inv"}
+    _tree(tmp_path, *kept, "how-to/gone.html")
+    leftovers.remove_pages(SimpleNamespace(outdir=tmp_path, builder=builder, env=env), None)
+    assert _files(tmp_path) == kept
+    assert set(leftovers.outdated(None, env, set(), {"index"}, {"how-to/gone"})) == env.found_docs
+    assert leftovers.outdated(None, env, set(), {"index"}, set()) == []

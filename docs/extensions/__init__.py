@@ -14,6 +14,7 @@ from extensions import (
     equations,
     formats,
     hooks,
+    leftovers,
     links,
     mathjax,
     messages,
@@ -46,14 +47,17 @@ def _write_pages(app: Sphinx) -> None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect what stands in this folder."""
+    app.connect("builder-inited", leftovers.remove_scripts, priority=100)  # before the gallery is made
     app.connect("builder-inited", _write_pages)
     app.connect("autodoc-process-docstring", hooks.read_docstring, priority=100)
     app.connect("autodoc-skip-member", hooks.skip_member)
     app.connect("doctree-read", entries.add_messages)
+    app.connect("env-get-outdated", leftovers.outdated)
     app.connect("env-purge-doc", entries.forget)
     app.connect("env-updated", entries.keep)
     app.connect("html-page-context", readers.mend_page, priority=900)
     app.connect("build-finished", mathjax.copy_mathjax)
+    app.connect("build-finished", leftovers.remove_pages, priority=800)
     app.connect("build-finished", whole.check_site, priority=900)
     app.add_directive("cited-in", equations.CitedIn)
     app.add_post_transform(links.NamesInDocstrings)

@@ -37,12 +37,13 @@ def places() -> dict[int, list[str]]:
     public = {f"{one.home}.{one.name}": one.path for one in NAMES}
     found: dict[int, list[str]] = {}
     for path in sorted(_ROOT.rglob("*.py")):
-        if "experiments" in path.parts:
+        inside = path.relative_to(_ROOT)
+        if inside.parts[0] == "experiments":
             continue
-        module = ".".join(["kineme", *path.relative_to(_ROOT).with_suffix("").parts]).removesuffix(".__init__")
+        module = ".".join(["kineme", *inside.with_suffix("").parts]).removesuffix(".__init__")
         for name, text in _docstrings(ast.parse(path.read_text(encoding="utf-8")), module):
-            inside, _, member = name.rpartition(".")
-            shown = public.get(name) or (f"{public[inside]}.{member}" if inside in public else name)
+            owner, _, member = name.rpartition(".")
+            shown = public.get(name) or (f"{public[owner]}.{member}" if owner in public else name)
             if any(part.startswith("_") for part in name.split(".")):
                 continue
             for number in _cited(text):

@@ -52,6 +52,20 @@ def test_a_stamp_in_a_header_is_the_time_if_no_other_column_is(tmp_path):
     assert a.demonstrations.dimensions == b.demonstrations.dimensions == ("x", "y")
 
 
+def test_a_second_clock_is_left_aside_where_the_time_is_said(tmp_path):
+    """As loggers of phones write it: time in nanoseconds since 1970, and the seconds that elapsed."""
+    rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{k / 100},{k},{k * k},{k % 3}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,seconds_elapsed,x,y,t", *rows]))
+    with pytest.raises(kineme.DataError, match=r"say which of \['time', 'seconds_elapsed', 't'\] with time="):
+        kineme.read_recordings(tmp_path / "a.csv")
+    for time in ("time", "seconds_elapsed"):
+        read = kineme.read_recordings(tmp_path / "a.csv", time=time)
+        assert read.demonstrations.dimensions == ("x", "y", "t")
+        np.testing.assert_allclose(np.diff(read.demonstrations[0].times), 0.01, rtol=1e-4)
+    chosen = kineme.read_recordings(tmp_path / "a.csv", time="time", columns=["x", "seconds_elapsed"])
+    assert chosen.demonstrations.dimensions == ("x", "seconds_elapsed")
+
+
 def test_what_rostopic_echo_p_writes(tmp_path):
     """Times in %time, the first head, in nanoseconds."""
     heads = (

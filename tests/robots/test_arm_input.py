@@ -79,7 +79,7 @@ def test_a_start_outside_the_limits_is_named(panda):
 
 
 def test_another_number_of_joints_or_dimensions_is_said(panda):
-    with pytest.raises(TrajectoryError, match="of the 7 joints of panda, got 6 columns"):
+    with pytest.raises(TrajectoryError, match=r"of the 7 joints of panda, got 6 columns; choose .*=discrete"):
         move(np.zeros((40, 6)) + np.linspace(0, 1, 40)[:, None], panda, space="joints")
     with pytest.raises(TrajectoryError, match="of 2 or 3 dimensions, got 5"):
         move(np.zeros((40, 5)) + np.linspace(0, 1, 40)[:, None], panda)

@@ -15,9 +15,10 @@ import pytest
 from click.testing import CliRunner
 from studio_samples import asked, drawing, make_library
 
-from kineme import ActionLibrary
+from kineme import ActionLibrary, Trajectory
 from kineme.cli import main
 from kineme.errors import DataError
+from kineme.library.learning import learn as learning
 from kineme.library.storage.store import Store
 from kineme.studio.server.studio import Studio
 
@@ -218,6 +219,26 @@ def test_the_history_says_what_was_changed_and_a_version_is_restored(client):
     assert _symbols(client)["wave"]["description"] == "a hand"
     late = client.post("/api/library/undo", json={"version": 12, "to": 2})
     assert (late.status_code, client.get("/api/library").json()["version"]) == (409, 13)
+
+
+def test_the_history_says_all_that_was_taken_back_and_ends_where_a_version_returned_to_none(
+    client, folder, monkeypatch
+):
+    monkeypatch.setattr(learning, "_BATCH_MOVEMENTS", 2)
+    client.app.state.studio.library.learn([Trajectory(*drawing(7 + k)) for k in range(3)], ["a", "b", "c"])
+    client.post("/api/library/undo")
+    assert _said(client)[:2] == [
+        "Took back versions 2 to 3: Learned 3 movements; new: a, b, c",
+        "Learned 1 movement; new: c",
+    ]
+    for action, to in (("restore", 99), ("undo", "x")):  # as only another program writes them
+        with client.app.state.studio.library.store.writing(action, {"to": to}):
+            pass
+    assert _said(client)[:2] == ["undo", "Restored version 99"]
+
+
+def _said(client):
+    return [one["said"] for one in client.get("/api/library/history").json()["versions"]]
 
 
 def test_every_change_says_its_own_version_whatever_others_change_meanwhile(client, folder, monkeypatch):

@@ -207,6 +207,21 @@ def test_after_a_change_what_knew_the_library_before_answers_until_the_new_one_i
         assert _said(socket, "answer")["ranked"][0]["name"] == "another"
 
 
+def test_what_is_deleted_while_a_movement_is_under_way_is_no_answer_to_it(client):
+    symbols = {one["name"]: one["id"] for one in client.get("/api/library").json()["symbols"]}
+    rows = samples(2)
+    with client.websocket_connect(LIVE) as socket:
+        for name, key in symbols.items():  # the last of them leaves nothing to recognize
+            socket.send_json({"samples": rows[:40]})
+            _said(socket, "state")
+            client.delete(f"/api/library/symbols/{key}")
+            socket.send_json({"samples": rows[40:]})
+            socket.send_json({"finish": True})
+            answer = _said(socket, "answer")
+            assert answer is None or name not in {one["name"] for one in answer["ranked"]}
+        assert answer is None
+
+
 def test_eight_names_are_told_of_many(tmp_path, open_studio):
     with open_studio(make_library(tmp_path / "many", symbols=10, members=1)).websocket_connect(LIVE) as socket:
         assert len(_draw(socket, 2, step=30)["ranked"]) == 8

@@ -101,13 +101,15 @@
   const line = (points) => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
   const planePath = (path) => line(path[0].map((x, t) => toPixels([x, path[1][t]])));
   const within = (value, low, high) => Math.min(high, Math.max(low, value));
+  const inPlane = ([x, y]) => [within(x, LEFT + 1, LEFT + WIDE - 1), within(y, TOP - HIGH + 1, TOP - 1)];
 
   function start(root) {
     const data = JSON.parse(root.querySelector("script").textContent);
     const n = data.Phi.length;
     const state = { name: "bio-inspired", one: encode(data, "bio-inspired", data.shown), shown: data.shown, t: 0 };
     state.goal = [...state.one.goal];
-    const most = 1.6 * Math.max(...state.one.weights.flat().map(Math.abs));
+    const usual = 1.6 * Math.max(...state.one.weights.flat().map(Math.abs));
+    let most = usual; // the weight at the upper end of a row
     const drawings = root.querySelector(".drawings");
     const parts = { ...makePlane(drawings), ...makeWeights(drawings, data) };
     const slider = root.querySelector("input");
@@ -145,7 +147,7 @@
     }
 
     function setGoal(x, y) {
-      state.goal = [within(x, LEFT + 1, LEFT + WIDE - 1), within(y, TOP - HIGH + 1, TOP - 1)];
+      state.goal = inPlane([x, y]);
       draw();
     }
 
@@ -176,7 +178,7 @@
 
     let points = [];
     const add = (event) => {
-      points.push([event.timeStamp, ...toMillimeters(at(parts.plane, event))]);
+      points.push([event.timeStamp, ...inPlane(toMillimeters(at(parts.plane, event)))]);
       parts.pen.setAttribute("d", line(points.map(([, x, y]) => toPixels([x, y]))));
     };
     drag(parts.plane, (event) => ((points = []), add(event)), add);
@@ -185,9 +187,14 @@
       if (points.length > 8) learn(resampled(points, n));
     });
 
+    function fit() {
+      state.one = encode(data, state.name, state.shown);
+      most = Math.max(usual, ...state.one.weights.flat().map(Math.abs));
+    }
+
     function learn(path) {
       state.shown = path;
-      state.one = encode(data, state.name, path);
+      fit();
       state.goal = [...state.one.goal];
       draw();
     }
@@ -203,7 +210,7 @@
     for (const [name, act] of Object.entries(actions)) root.querySelector(`[data-act="${name}"]`).addEventListener("click", act);
     root.querySelector("select").addEventListener("change", (event) => {
       state.name = event.target.value;
-      state.one = { ...encode(data, state.name, state.shown) };
+      fit();
       draw();
     });
     slider.max = n - 1;
@@ -215,9 +222,8 @@
 
   /** Where a pointer is, in the drawing's own pixels. */
   function at(svg, event) {
-    const box = svg.getBoundingClientRect();
-    const [, , width, height] = svg.getAttribute("viewBox").split(" ").map(Number);
-    return [((event.clientX - box.left) * width) / box.width, ((event.clientY - box.top) * height) / box.height];
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    return [point.x, point.y];
   }
 
   function makePlane(parent) {

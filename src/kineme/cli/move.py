@@ -134,7 +134,10 @@ def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
     learned = read_source(options)
     space = "joints" if options["joints"] else space_of(learned.primitive.channels, learned.example, robot)
     if options["goal"] and not (options["at"] or options["as_recorded"] or space == "joints"):
-        raise click.UsageError("expected --at with --goal: where the movement starts; or --as-recorded")
+        raise click.UsageError(
+            "expected --at with --goal: where the movement starts; or --as-recorded; or --joints, where the columns "
+            "are joints of the arm"
+        )
     generated = generate_at(
         learned,
         options["at"],

@@ -17,9 +17,9 @@ _SAMPLES = 1000
 def warm_up(n_dims: Sequence[int] = (2, 3)) -> None:
     """Compile now what recognizing movements needs, instead of in the first call.
 
-    It takes some twenty seconds on a free core. Compiled functions are kept on disk, so that once a machine is enough,
-    as when an image is built, and once after an update; later processes read them in about a second. If the environment
-    variable ``KINEME_COMPILED`` is "never", nothing is compiled.
+    It takes some twenty seconds on a free core, up to a minute on a busy one. Compiled functions are kept on disk, so
+    that once a machine is enough, as when an image is built, and once after an update; later processes read them in a
+    few seconds. If the environment variable ``KINEME_COMPILED`` is "never", nothing is compiled.
 
     Parameters
     ----------

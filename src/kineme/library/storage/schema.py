@@ -11,10 +11,8 @@ SCHEMA_VERSION = 2
 READABLE = 1  # the earliest version that is read as it is, since later ones added tables only
 MAX_TEXT, MAX_DOCUMENT = 1 << 24, 1 << 26  # largest number of bytes of a name, and of a description or JSON
 LARGEST_ID = (1 << 62) - 1  # of versions and rows; adding one does not overflow in SQLite and NumPy
-UNDO, RESTORE = RETURNS = (
-    "undo",
-    "restore",
-)  # actions of versions with the state of an earlier one, "to" in their detail
+UNDO, RESTORE = "undo", "restore"
+RETURNS = (UNDO, RESTORE)  # actions of versions with the state of an earlier one, "to" in their detail
 CONTINUES = "continues"  # in the detail of a version: the one before it, which was learned in the same call
 PAGE_SIZE = 32768  # a row of features fills at most a seventh of it, so that little of a page is unused
 

@@ -80,7 +80,8 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     else:
         free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
         plain = set(map(_plain, heads))
-        positions = tuple(k for k in free if not (named and _says_nothing_new(heads[k], plain)))
+        clocks = {k for k in free if _is_stamp(heads[k])} if time is not None and is_time(heads[time]) else set()
+        positions = tuple(k for k in free if not (named and (k in clocks or _says_nothing_new(heads[k], plain))))
     if not positions:
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
@@ -153,9 +154,10 @@ def _time(
         return None
     if not named:
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    of_several = f" of {listed([heads[k] for k in of_time])}" if of_time else ""
     raise DataError(
         f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
-        "say which with time=, or the step between samples with units= where there is none, "
+        f"say which{of_several} with time=, or the step between samples with units= where there is none, "
         "in the shell with --time, --units"
     )
 
@@ -191,6 +193,11 @@ def is_time(head: str) -> bool:
     if len(words) <= 1 and words != ("s",) and set(words) & set(PER_SECOND):
         return True
     return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
+
+
+def _is_stamp(head: str) -> bool:
+    """Whether a head can name nothing but times: ``time`` beside ``seconds_elapsed``, but neither ``t`` nor ``s``."""
+    return is_time(head) and bool(set(words_of(head)) & (TIME_WORDS - {"t"}))
 
 
 def is_header_stamp(head: str) -> bool:

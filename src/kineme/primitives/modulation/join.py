@@ -4,9 +4,9 @@ The paths are laid out over time and learned again as one primitive whose basis 
 of the densest part. They overlap across the transitions, so position, velocity and acceleration are continuous
 everywhere, as in T. Kulvicius, K. Ning, M. Tamosiunaite, F. Worgotter, "Joining Movement Sequences: Modified Dynamic
 Movement Primitives for Robotics Applications Exemplified on Handwriting", IEEE Transactions on Robotics 28(1), 2012,
-which lets the kernels of two movements overlap. Ours are fitted anew: the path stays within 0.4 % of its extent of
-three demonstrations of LASA in a row, and its largest acceleration is not larger than theirs. Giving the parts a common
-velocity and acceleration at each transition, by an exact solve, bends them by 6 % (median) to 22 %.
+which lets the kernels of two movements overlap. Ours are fitted anew, so the path stays near its parts; giving these a
+common velocity and acceleration at each transition, by an exact solve, bends them more. docs/guide/modulation.md holds
+both as `python -m bench --only joining` measures them.
 """
 
 from __future__ import annotations

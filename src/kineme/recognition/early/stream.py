@@ -106,11 +106,21 @@ class Live:
         TrajectoryError
             Fewer than four samples could be used.
         """
+        return self._recognize(self.movement())
+
+    def movement(self) -> Trajectory:
+        """The movement so far, as `finish` recognizes it: without what was skipped, and averaged beyond 4096 samples.
+
+        Raises
+        ------
+        TrajectoryError
+            Fewer than four samples could be used.
+        """
         kept = self._path.kept()
         whole = Demonstrations([Trajectory(kept[:, 0].copy(), kept[:, 1:].copy())])
         if self.channels is not None and is_plain(self.channels):  # converted already, and averaged since
             whole = Demonstrations.of_movements(replace(whole.movements, channels=self.channels))
-        return self._recognize(whole[0])
+        return whole[0]
 
     def _take_in(self, t: ArrayLike, x: ArrayLike) -> LiveStatus:
         times, positions, status, skipped = self._samples.take(t, x)

@@ -45,7 +45,8 @@ def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Re
     roles = roles_of(one.channels, columns.shape[1], space)
     if space == "joints" and len(roles.positions) != robot.n_joints:
         raise TrajectoryError(
-            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns"
+            f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
+            "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
         )
     turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
     known = sorted({*roles.discrete, *_given(steps)} & set(robot.joints))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from kineme.library.storage.rows import Row, among, listed, select
@@ -38,16 +39,30 @@ def listed_history(studio: Studio) -> dict[str, Any]:
     }
 
 
-def said(version: Version, before: Row | None = None, undone: Version | None = None) -> str:
+def said(version: Version, before: Row | None = None, undone: Sequence[Version] = ()) -> str:
     """A change in one sentence; `before` is how the annotated symbol was, `undone` what was taken back."""
+    if undone:
+        first, last = undone[0].id, undone[-1].id
+        which = f"version {last}" if first == last else f"versions {first} to {last}"
+        return f"Took back {which}: {said(_in_one(undone))}"
     detail = dict(version.detail)
-    if undone is not None:
-        return f"Took back version {undone.id}: {said(undone)}"
     words = _SAID.get(version.action, lambda _: version.action)
     try:
         return words(detail if before is None else {**detail, "before": before})
     except (KeyError, TypeError):  # what another version of kineme wrote
         return version.action
+
+
+def _in_one(versions: Sequence[Version]) -> Version:
+    """The one change that they are; of several, all that one call learned."""
+    details = [dict(one.detail) for one in versions]
+    if len(versions) == 1 or not all("added" in one and "symbols" in one for one in details):
+        return versions[-1]
+    whole = {
+        "added": sum(one["added"] for one in details),
+        "symbols": [name for one in details for name in one["symbols"]],
+    }
+    return replace(versions[-1], detail=whole)
 
 
 def _learned(detail: dict[str, Any]) -> str:
@@ -115,16 +130,22 @@ def _annotated_before(studio: Studio, versions: Sequence[Version]) -> dict[int, 
 
 def _same_as(every: Sequence[Version], number: int, returns: Sequence[str] = RETURNS) -> int:
     """The first version that had the state of this one, as far as the history says so."""
-    while number and (one := every[number - 1]).action in returns:
+    while number and (one := every[number - 1]).action in returns and _returned(one):
         number = one.detail["to"]
     return number
 
 
-def _undone(every: Sequence[Version], one: Version) -> Version | None:
-    """The version that an undo took back: that before it, or the one to whose state that one had returned."""
-    if one.action != UNDO:
-        return None
-    return every[_same_as(every, one.id - 1, (UNDO,)) - 1]
+def _returned(one: Version) -> bool:
+    """Whether it says the earlier version that it returned to, as all do but those of a damaged library."""
+    to = one.detail.get("to")
+    return isinstance(to, int) and 0 <= to < one.id
+
+
+def _undone(every: Sequence[Version], one: Version) -> Sequence[Version]:
+    """The versions that an undo took back: those up to the one before it, or to the one whose state that one had."""
+    if one.action != UNDO or not _returned(one):
+        return ()
+    return every[one.detail["to"] : _same_as(every, one.id - 1, (UNDO,))]
 
 
 def _short(detail: dict[str, Any]) -> dict[str, Any]:

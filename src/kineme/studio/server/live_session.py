@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import SpecificationError, TrajectoryError
+from kineme.recognition.answer import Answer
 from kineme.recognition.early.stream import Live
 from kineme.studio.server.plain import plain_answer, plain_state
 from kineme.studio.server.studio import Studio
@@ -30,7 +31,8 @@ class LiveSession:
     """The stream of one client; made anew for the next movement if the library has changed.
 
     Preparing for a changed library takes a while. Until then movements are followed by what knew the library before;
-    what knows it now takes over as soon as it is there, and gives the answer to the whole movement in any case.
+    what knows it now takes over as soon as it is there. A movement that is under way when the library changes is
+    followed on as it began. The answer to the whole movement is that of the library as it is then, in any case.
     """
 
     def __init__(self, studio: Studio) -> None:
@@ -69,9 +71,16 @@ class LiveSession:
         if stream is None or not begun:
             return None
         try:
-            return plain_answer(stream.finish())
+            return plain_answer(self._answer(stream))
+        except SpecificationError:  # no symbols any more
+            return None
         finally:
             stream.reset()
+
+    def _answer(self, stream: Live) -> Answer:
+        if self._version == self.studio.library.version:
+            return stream.finish()
+        return self.studio.library.recognize(stream.movement())  # it has changed since the movement began
 
     def _begin(self) -> None:
         self._state, version = _EMPTY, self.studio.library.version
