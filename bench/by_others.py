@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -32,7 +34,7 @@ def measure(quick: bool) -> list[Row]:
     return rows
 
 
-def _accuracy(one: Recorded, shots: int, draws: int, **options: object) -> float:
+def _accuracy(one: Recorded, shots: int, draws: int, **options: Any) -> float:
     right = []
     for _, train, test in splits(one, shots, draws):
         recognizer = kineme.Recognizer(**options).fit(one.demos[train], one.labels[train])

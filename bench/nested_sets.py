@@ -1,6 +1,6 @@
 """The sets of the nested validation: movements of people in space and in the plane, and of six sensors.
 
-LASA comes with a dependency. gestures3d.npz and letters2d.npz are no part of the project, see `bench.by_person`.
+LASA comes with a dependency. gestures3d.npz and letters2d.npz are no part of the project, see `bench.people`.
 BasicMotions (walking, resting, running, badminton; accelerations and rates of a watch on the wrist of four people) lies
 inside the wheel of aeon, which is read without being imported; nothing is chosen on it, since its curves are no paths.
 What is not there is left out.
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 import kineme
 from bench.by_person import FOLDER
+from bench.people import recorded
 from kineme.experiments.evaluation.conditions import TOGETHER
 
 SHOTS = (1, 3)
@@ -69,16 +70,15 @@ def movement_sets(quick: bool) -> list[Movements]:
     """Those that are there."""
     lasa = kineme.load_lasa()
     found = [_perturbed("LASA, all strongly", lasa, 1 if quick else COPIES)]
-    if (FOLDER / "letters2d.npz").is_file():
-        letters, labels, _ = _archive("letters2d.npz")
-        unlabeled = kineme.Demonstrations.from_arrays([one.positions for one in letters], labels)
+    letters, gestures = recorded("letters2d.npz"), recorded("gestures3d.npz")
+    if letters is not None:
+        unlabeled = kineme.Demonstrations.from_arrays([one.positions for one in letters.demos], letters.labels)
         found.append(_perturbed("letters, all strongly", unlabeled, 1 if quick else COPIES))
-    if (FOLDER / "gestures3d.npz").is_file():
-        gestures, labels, people = _archive("gestures3d.npz")
-        digits = np.char.isdigit(labels)
+    if gestures is not None:
+        digits = np.char.isdigit(gestures.labels)
         for name, chosen in (("digits by others", digits), ("solids by others", ~digits)):
-            some = np.flatnonzero(chosen)
-            found.append(Movements(name, (gestures[some],), labels[some], people[some]))
+            some = gestures.take(chosen)
+            found.append(Movements(name, (some.demos,), some.labels, some.people))
     spec = find_spec("aeon")
     folder = Path(str(spec.origin)).parent / "datasets" / "data" / "BasicMotions" if spec else FOLDER
     parts = [folder / f"BasicMotions_{part}.ts" for part in ("TRAIN", "TEST")]
@@ -92,14 +92,6 @@ def movement_sets(quick: bool) -> list[Movements]:
 def _perturbed(name: str, demos: kineme.Demonstrations, copies: int) -> Movements:
     made = tuple(TOGETHER[2].apply(demos, [SEED, copy]) for copy in range(copies))
     return Movements(name, made, np.asarray(demos.labels).astype(str))
-
-
-def _archive(name: str) -> tuple[kineme.Demonstrations, NDArray[Any], NDArray[Any]]:
-    with np.load(FOLDER / name) as z:
-        ends, labels, people = z["offsets"][1:-1], z["labels"].astype(str), z["people"].astype(str)
-        arrays = [one.astype(float) for one in np.split(z["positions"], ends)]
-        times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
-    return kineme.Demonstrations.from_arrays(arrays, labels, times), labels, people
 
 
 def _series(path: Path) -> Iterator[tuple[NDArray[Any], str]]:

@@ -14,10 +14,11 @@ import beside_tables
 import concept_tables
 import modulation_tables
 import outlier_tables
+import people_tables
 from measured import DOCS, RESULTS, fill, rows, table
 
 #: Pages of the guide besides that one about recognition.
-GUIDES = (adapting_tables, modulation_tables, outlier_tables)
+GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables)
 PAGE = DOCS / "guide" / "recognition.md"
 #: Default -> why, and the other values that were measured.
 DEFAULTS: dict[str, tuple[str, tuple[str, ...]]] = {
