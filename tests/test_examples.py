@@ -74,6 +74,23 @@ def test_commands_and_options_of_pages_exist(page):
         command.parse_args(context, rest)
 
 
+_FENCED = re.compile(r"^(`{3,})([^`\n]*)\n.*?^\1$", re.MULTILINE | re.DOTALL)
+_INLINE = re.compile(r"`kineme ([^`]+)`")
+
+
+@pytest.mark.parametrize("page", [*PAGES, TUTORIAL], ids=page_name)
+def test_commands_and_options_in_sentences_exist(page):
+    """Between backticks, where arguments may be missing; and no block of bash holds one, which nobody would try."""
+    text = page.read_text(encoding="utf-8")
+    assert not [block[0] for block in _FENCED.finditer(text) if block[2] == "bash" and "\nkineme " in block[0]]
+    for line in _INLINE.findall(_FENCED.sub("", text)):
+        command, words = main, shlex.split(line.partition(" | ")[0])
+        while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+            command, words = command.commands[words[0]], words[1:]
+        known = {name for one in command.params for name in one.opts + one.secondary_opts} | {"--help", "--version"}
+        assert {word for word in words if word.startswith("--")} <= known, line
+
+
 @pytest.mark.parametrize("name", MODULES)
 def test_examples_in_docstrings(name):
     failed, _ = doctest.testmod(importlib.import_module(name))
