@@ -97,11 +97,12 @@ def _beginnings() -> str:
 
 def _halves() -> str:
     found = _by_details("early", "name", "shots", "where")
+    known = [found["digits", shots, "halves"] for shots in ("3", "all")]
+    unknown = [found["digits", shots, "50 %"] for shots in ("3", "all")]
     return (
-        "If it were known, the whole recognizer, trained on halves, would name "
-        f"{found['digits', '3', 'halves']:.2f} of the halves of digits with three\ndemonstrations and "
-        f"{found['digits', 'all', 'halves']:.2f} with all 40, instead of {found['digits', '3', '50 %']:.2f} and "
-        f"{found['digits', 'all', '50 %']:.2f}."
+        "How much of a movement is done is not known. If it were, the whole recognizer, trained on halves, would name\n"
+        f"{known[0]:.2f} of the halves of digits with three demonstrations and {known[1]:.2f} with all 40, instead of "
+        f"{unknown[0]:.2f} and {unknown[1]:.2f}."
     )
 
 
@@ -120,7 +121,7 @@ def _sure() -> str:
     share = {name: f"{100 * found[name, 'others at the end']:.0f} %" for name in DECIDED}
     return (
         f"At their last sample, {share['digits by others']} of the solids, {share['LASA']} of the shapes and "
-        f"{share['letters']} of the letters still have a\nclass at 0.9"
+        f"{share['letters']} of the letters still have a\nclass at 0.9: where such movements occur, ask `finish()` before you act."
     )
 
 

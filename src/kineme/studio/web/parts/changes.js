@@ -6,15 +6,17 @@ import { say, tried } from "./toasts.js";
 let own = 0; // the version of the last change of this page
 let turn = Promise.resolve(); // of undoing, one after the other
 
-/** @param {() => Promise<any>} ask @param {string} done What to say then. @returns {Promise<any>} */
-async function change(ask, done) {
+const KNOWN = "Nothing is new: all of it is in the library, and a movement keeps the name that it has there.";
+
+/** @param {() => Promise<any>} ask @param {string} done What to say then. @param {string} same What, where nothing changed. @returns {Promise<any>} */
+async function change(ask, done, same = done) {
   return tried(async () => {
     const before = library().version;
     const answer = await ask();
     own = answer.version;
     await refresh();
     const changed = answer.version > before; // not where it was stored already
-    say(done, changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {});
+    say(changed ? done : same, changed && library().can_undo ? { act: () => undo(answer.version), action: "Undo" } : {});
     return answer;
   });
 }
@@ -42,7 +44,7 @@ const of = (/** @type {string} */ id) => `/api/library/symbols/${encodeURICompon
 
 /** @param {{times: number[], positions: number[][]}} drawn @param {string|null} label */
 export const learn = (drawn, label) =>
-  change(() => post("/api/library/movements", { ...drawn, label, group: null }), label === null ? "Saved without a name." : `Learned as ${label}.`);
+  change(() => post("/api/library/movements", { ...drawn, label, group: null }), label === null ? "Saved without a name." : `Learned as ${label}.`, KNOWN);
 /** @param {string} id @param {string} name */
 export const rename = (id, name) => change(() => post(`${of(id)}/rename`, { name }), `Renamed to ${name}.`);
 /** @param {string} id @param {string} text */
@@ -64,4 +66,4 @@ export const accept = (id, name) => change(() => post(`/api/proposals/${encodeUR
 export const reject = (id) => change(() => post(`/api/proposals/${encodeURIComponent(id)}/reject`), "Not proposed again.");
 /** @param {string} recording @param {any} body Without `spans` the whole file, by its labels. */
 export const learnSpans = (recording, body) =>
-  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), body.spans ? "Learned from the recording." : "Learned the whole file, by its labels.");
+  change(() => post(`/api/recordings/${encodeURIComponent(recording)}/learn`, body), body.spans ? "Learned from the recording." : "Learned the whole file, by its labels.", KNOWN);
