@@ -121,7 +121,8 @@ def _sure() -> str:
     share = {name: f"{100 * found[name, 'others at the end']:.0f} %" for name in DECIDED}
     return (
         f"At their last sample, {share['digits by others']} of the solids, {share['LASA']} of the shapes and "
-        f"{share['letters']} of the letters still have a\nclass at 0.9: where such movements occur, ask `finish()` before you act."
+        f"{share['letters']} of the letters still have a class\nat 0.9: where such movements occur, ask `finish()` "
+        "before you act."
     )
 
 

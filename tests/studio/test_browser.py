@@ -364,6 +364,17 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
     assert not page.is_visible("#keys")
 
 
+def _labeled(name):
+    """A table of two movements of one label."""
+    rows = [
+        (k, *row)
+        for k in (5, 6)
+        for one in letters("Angle")[k : k + 1]
+        for row in zip(one.times, *one.positions.T, strict=True)
+    ]
+    return "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},{name}\n" for k, t, x, y in rows)
+
+
 def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, tmp_path):
     rows, at, end = [], 0.0, np.zeros(2)
     for shape in ("GShape", "Sine"):
@@ -405,14 +416,7 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     page.click("#learn-spans")
     wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'from a file')")
     assert not page.is_visible("#learn-file")
-    rows = [
-        (k, *row)
-        for k in (5, 6)
-        for one in letters("Angle")[k : k + 1]
-        for row in zip(one.times, *one.positions.T, strict=True)
-    ]
-    labeled = "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},of a file\n" for k, t, x, y in rows)
-    page.evaluate(DROP, ["labeled.csv", labeled])
+    page.evaluate(DROP, ["labeled.csv", _labeled("of a file")])
     wait_for_text(page, "#recording-name", "labeled.csv")
     assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
     page.click("#learn-file")
