@@ -75,9 +75,9 @@ def test_test_files_have_names_of_their_own():
 
 
 _BRITISH = re.compile(
-    r"\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi|reali|speciali|visuali"
+    r"\b\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi|reali|speciali|visuali"
     r"|synchroni|parametri|discreti|randomi|regulari|orthogonali)s(?:e[drs]?|ing|ations?)\b|\banalys(?:e[ds]?|ing)\b"
-    r"|\w*(?:neighbour|colour|behaviour|favour|artefact|catalogue|licence)|\bcentre[ds]?\b|\bmetres?\b|\bgrey|\blearnt\b"
+    r"|\b\w*(?:neighbour|colour|behaviour|favour|artefact|catalogue|licence)|\bcentre[ds]?\b|\bmetres?\b|\bgrey|\blearnt\b"
     r"|label(?:led|ling)|modell(?:ed|ing)|travell(?:ed|ing)|judgement|whilst",
     re.IGNORECASE,
 )

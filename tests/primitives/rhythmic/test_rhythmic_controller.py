@@ -118,8 +118,8 @@ def test_a_rhythm_never_settles_and_can_be_paused(learned):
     assert state.phase == before.phase
 
 
-def test_after_a_million_periods_the_phase_is_as_exact_as_in_the_first(learned, agree):
-    one = learned[0]
+def test_after_a_million_periods_the_phase_is_as_exact_as_in_the_first(make_rhythm, agree):
+    one = RhythmicDMP(n_basis=5).learn([make_rhythm(3)])[0]  # the fewer, the fewer parts of a period a step takes
     dt = float(one.periods[0]) * (400.0 + 0.25)
     controller = one.controller(dt)
     for _ in range(2500):
