@@ -1,8 +1,6 @@
 """What the paper's robot executes: where its joints bring the tip, and what is said of it."""
 
 import sys
-from pathlib import Path
-from statistics import fmean
 
 import numpy as np
 import pytest
@@ -107,18 +105,3 @@ def test_what_is_said_of_the_arm_follows_from_its_draws():
     assert "the plane is ahead of the arm in weights, original (0.800 against 0.700)" in behind
     assert f"On the arm, {CLOSEST}, TrE is ahead of RBF" in read_svm(draws((0.5, 0.6)))
     assert f"On the arm, {CLOSEST}, RBF is ahead of TrE" in read_svm(draws((0.6, 0.5)))
-
-
-def test_the_page_says_what_is_reached_on_the_arm(joints, default_draws):
-    page = Path(__file__).parents[3] / "docs" / "guide" / "the-paper.md"
-    said = " ".join(page.read_text(encoding="utf-8").split())
-    arm = run_arm(12, 0, 50)
-
-    def against(draws):
-        return " against ".join(
-            f"{fmean(one['nearest'][k] for one in draws):.3f}" for k in ("original-sa", "original-w")
-        )
-
-    on_arm, in_plane = ((against(where["paper"]), against(where["lasa-26"])) for where in (arm, default_draws))
-    assert f"is {on_arm[0]} on the nine letters, {on_arm[1]} on the 26 shapes." in said
-    assert f"In the plane it is {in_plane[0]} and {in_plane[1]}." in said

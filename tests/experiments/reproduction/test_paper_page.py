@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kineme.experiments.reproduction import paper
+from kineme.experiments.reproduction.arm import run_arm
 from kineme.experiments.reproduction.representations import READINGS, REPRESENTATIONS
 from kineme.experiments.reproduction.tables import make_tables
 from kineme.output.table import mean_and_range
@@ -137,3 +138,18 @@ def test_the_reading_closest_in_distances_is(default_draws):
             if (row.formulation, row.quantity) == cell
         }
         assert min(off, key=off.get) == key
+
+
+def test_the_page_says_what_is_reached_on_the_arm(default_draws):
+    for extra in ("pinocchio", "pink"):
+        pytest.importorskip(extra, reason="the extra robot is not installed")
+    arm = run_arm(12, 0, 50)
+
+    def against(draws):
+        return " against ".join(
+            f"{fmean(one['nearest'][k] for one in draws):.3f}" for k in ("original-sa", "original-w")
+        )
+
+    on_arm, in_plane = ((against(where["paper"]), against(where["lasa-26"])) for where in (arm, default_draws))
+    assert f"is {on_arm[0]} on the nine letters, {on_arm[1]} on the 26 shapes." in PAGE
+    assert f"In the plane it is {in_plane[0]} and {in_plane[1]}." in PAGE
