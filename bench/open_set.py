@@ -21,6 +21,7 @@ from sklearn.metrics import roc_auc_score
 
 import kineme
 from bench.by_person import FOLDER
+from bench.people import recorded
 from bench.rows import Row
 from kineme.comparison.describe import feature_rows, prepare
 from kineme.comparison.described import Described
@@ -107,11 +108,9 @@ def perturbed_lasa(how: dict[str, Perturbation]) -> Iterator[Recordings]:
 def people() -> Iterator[Recordings]:
     """Recordings in the folder that the environment names."""
     for path in sorted(FOLDER.glob("*.npz")):
-        with np.load(path) as z:
-            cuts = z["offsets"][1:-1]
-            paths, times = np.split(z["positions"].astype(float), cuts), np.split(z["times"].astype(float), cuts)
-            demos = kineme.Demonstrations.from_arrays(paths, z["labels"].astype(str), [t - t[0] for t in times])
-            yield Recordings.of(path.stem, demos, z["people"].astype(str))
+        found = recorded(path.name)
+        assert found is not None
+        yield Recordings.of(path.stem, found.demos, found.people)
 
 
 def splits(one: Recordings, n_shown: int, others: bool, draws: int, known_share: float = 0.5) -> Iterator[Split]:

@@ -15,7 +15,7 @@ import concept_tables
 import modulation_tables
 import outlier_tables
 import people_tables
-from measured import DOCS, RESULTS, fill, rows, table
+from measured import DOCS, RESULTS, figures, fill, rows, table
 
 #: Pages of the guide besides that one about recognition.
 GUIDES = (adapting_tables, modulation_tables, outlier_tables, people_tables)
@@ -66,12 +66,8 @@ def tables() -> dict[str, str]:
     }
 
 
-def _measured() -> dict[str, float]:
-    return {row["what"]: row["ours"] for row in rows("defaults")}
-
-
 def _defaults() -> str:
-    measured = _measured()
+    measured = figures("defaults")
     lines = ["| default | why | value | LASA, moderately / strongly | gestures by others |", "|---|---|---|---|---|"]
     for default, (why, names) in DEFAULTS.items():
         for k, name in enumerate(names):
@@ -84,7 +80,7 @@ def _defaults() -> str:
 
 
 def _many() -> str:
-    measured = _measured()
+    measured = figures("defaults")
     names = [name.removeprefix("many shown: ") for name in measured if name.startswith("many shown")]
     lines = ["| twelve demonstrations of each shape, bent copies of four recordings | accuracy |", "|---|---|"]
     return "\n".join([*lines, *(f"| {name} | {measured[f'many shown: {name}']:.3f} |" for name in names)])
@@ -109,7 +105,7 @@ def _nested() -> str:
 
 def _stream() -> str:
     """What an update and the end of a live stream take, in words."""
-    measured = {row["what"]: row["ours"] for row in rows("stream")}
+    measured = figures("stream")
 
     def of(what: str, end: str, digits: int) -> str:
         pair = (f"{measured[what.format(n=n) + end]:.{digits}f}" for n in (100, 500))

@@ -29,6 +29,11 @@ def rows(name: str) -> list[dict[str, Any]]:
     return found
 
 
+def figures(name: str) -> dict[str, float]:
+    """What a subject of the benchmark measured -> our figure."""
+    return {row["what"]: row["ours"] for row in rows(name)}
+
+
 def protocols(name: str) -> dict[str, Any]:
     """What an evaluation measured: protocol -> method -> condition -> measure -> statistics."""
     found: dict[str, Any] = content(f"evaluation-{name}")["protocols"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from measured import content, rows
+from measured import content, figures, rows
 
 _SVM = ("train on 1,000,000 movements", "accuracy after 1,000,000", "accuracy of the exact kernel, 4,000 movements")
 
@@ -71,7 +71,7 @@ def _two_millions() -> str:
 
 
 def _svm() -> str:
-    found = {row["what"]: row["ours"] for row in rows("binning")}
+    found = figures("binning")
     seconds, accuracy, exact = (found[what] for what in _SVM)
     return (
         f"A linear SVM on `kineme.RandomBinning` features of a million movements trains in {seconds:.0f} s, with "

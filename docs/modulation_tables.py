@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from measured import DOCS, rows
+from measured import DOCS, figures, rows
 
 PAGE = DOCS / "guide" / "modulation.md"
 #: What is likely, in the rows of the results -> how the page says it.
@@ -26,12 +26,8 @@ def tables() -> dict[str, str]:
     }
 
 
-def _measured(name: str) -> dict[str, float]:
-    return {row["what"]: row["ours"] for row in rows(name)}
-
-
 def _noisy_stretch() -> str:
-    found = _measured("via_points")
+    found = figures("via_points")
     closely, ours = (
         found[f"led away by a noisy stretch, {how}"] for how in ("met as closely as possible", "as rollout does")
     )
@@ -54,19 +50,19 @@ def _through_points() -> str:
 
 
 def _priors() -> str:
-    found = _measured("via_points")
+    found = figures("via_points")
     lines = [
         '| change that is likely | 1 point | 3 points | 5 points | 3 points, `gating="phase"` |',
         "|---|---|---|---|---|",
     ]
     for prior, text in PRIORS.items():
-        figures = (f"{found[f'{prior}, {column}']:.1f}" for column in COLUMNS)
-        lines.append(f"| {text} | {' | '.join(figures)} |")
+        values = (f"{found[f'{prior}, {column}']:.1f}" for column in COLUMNS)
+        lines.append(f"| {text} | {' | '.join(values)} |")
     return "\n".join(lines)
 
 
 def _joined() -> str:
-    found = _measured("joining")
+    found = figures("joining")
 
     def of(what: str) -> str:
         return f"{found[f'{what}, median']:.1f} % (median) to {found[f'{what}, largest']:.0f} % of their extent"
@@ -80,7 +76,7 @@ def _joined() -> str:
 
 
 def _coupled() -> str:
-    largest = _measured("joining")["coupled, largest"]
+    largest = figures("joining")["coupled, largest"]
     return (
         f"The difference is kept to at most {largest:.1g} % of the extent, for 30 pairs of shapes of LASA\n"
         "(`python -m bench --only joining`)."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from measured import DOCS, rows
+from measured import DOCS, figures, rows
 
 PAGE = DOCS / "guide" / "recognition.md"
 SHARES = ("25 %", "50 %", "75 %", "90 %", "100 %", "predict")
@@ -32,10 +32,6 @@ def tables() -> dict[str, str]:
     }
 
 
-def _measured(name: str) -> dict[str, float]:
-    return {row["what"]: row["ours"] for row in rows(name)}
-
-
 def _by_details(name: str, *keys: str) -> dict[tuple[str, ...], float]:
     """Values of some details -> what was measured."""
     found = (row for row in rows(name) if all(key in row["details"] for key in keys))
@@ -43,7 +39,7 @@ def _by_details(name: str, *keys: str) -> dict[tuple[str, ...], float]:
 
 
 def _vertical() -> str:
-    found = _measured("by_others")
+    found = figures("by_others")
 
     def pair(turned: str, shots: int) -> str:
         given, without = (
@@ -60,7 +56,7 @@ def _vertical() -> str:
 
 
 def _classifiers() -> str:
-    found = _measured("by_others")
+    found = figures("by_others")
     shots = sorted({int(what.split(", ")[1].split()[0]) for what in found if what.startswith("svm")})
     ahead = [found[f"nearest-each, {n} by others"] - found[f"nearest, {n} by others"] for n in shots]
     svm = [found[f"svm, {n} by others"] - found[f"nearest-each, {n} by others"] for n in shots]
@@ -76,7 +72,7 @@ def _between(values: list[float]) -> str:
 
 
 def _earliness() -> str:
-    found = _measured("early")
+    found = figures("early")
     after = ", ".join(f"{found[f'LASA, {share} %']:.3f} after {share} %" for share in (20, 40, 50, 70))
     return (
         "On LASA, three demonstrations of each of 26 shapes, ten splits, with position, size and direction within 30°\n"
