@@ -229,6 +229,19 @@ def _contrast(one, other):
     return (light + 0.05) / (dark + 0.05)
 
 
+ON_COLORS = """
+const { readableOn } = await import(`${process.argv[1]}/parts/lines.js`);
+console.log(JSON.stringify(process.argv.slice(2).map((one) => readableOn(one))));"""
+
+
+@needs_node
+def test_names_of_spans_stand_out_from_their_colors(modules):
+    tokens = (WEB / "tokens.css").read_text()
+    colors = dict(re.findall(r"--(blue|orange|green|purple|sky|amber): (#[0-9a-f]{6});", tokens))
+    for paint, text in zip(colors.values(), _in_node(ON_COLORS, modules, *colors.values()), strict=True):
+        assert _contrast(paint, text[0] + 2 * text[1:]) >= 4.5, (paint, text)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_stands_out_from_what_it_is_on(scheme):
     """The contrast that WCAG 2.2 asks for: 4.5 of text, 3 of lines and borders that mean something."""

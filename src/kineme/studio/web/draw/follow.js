@@ -55,7 +55,7 @@ export class Follow {
     this.draw.clear();
     this.draw.kind = "program";
     this.draw.picture.frame = new Frame(usualSide() ?? 0.5);
-    byId("draw-empty").hidden = true;
+    this.draw.filled(true);
   }
 
   /** @param {import("./sources.js").Source} source @param {number} known How many of its samples are painted. */

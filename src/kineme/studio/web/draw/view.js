@@ -68,7 +68,7 @@ class Draw {
   invite() {
     const { symbols, read_only: readOnly } = library();
     const takes = takesDrawings();
-    byId("draw-empty").hidden = this.picture.ink.length > 0;
+    this.filled(this.picture.ink.length > 0);
     byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
       ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or drop a recording in Recordings."
@@ -79,6 +79,12 @@ class Draw {
     if (!takes) byId("live-source").open = true;
   }
 
+  /** @param {boolean} on Whether there is a movement: the invitation goes, and what its colors mean is said. */
+  filled(on) {
+    byId("draw-empty").hidden = on;
+    byId("draw-legend").hidden = !on || !library().symbols.length;
+  }
+
   /** @param {string} kind */
   begins(kind) {
     if (!takesDrawings() || this.picture.turns) return false;
@@ -87,7 +93,7 @@ class Draw {
     this.kind = kind;
     this.sending.reset();
     this.height = canvasHeight();
-    byId("draw-empty").hidden = true;
+    this.filled(true);
     this.panel.words("Drawing", "…", "", "open");
     return true;
   }

@@ -22,6 +22,7 @@ const writes = (target) => target.closest?.("input:not([type=range],[type=checkb
 function list() {
   fill(byId("keys-list"), ...KEYS.flatMap(([keys, text]) => [make("dt", {}, ...keys.split(" ").map((key) => make("kbd", {}, key))), make("dd", {}, text)]));
   byId("keys").showModal();
+  byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
 /** Whether a key takes back, other than in a field in which one writes. @param {KeyboardEvent} event */
