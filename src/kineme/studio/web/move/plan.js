@@ -30,7 +30,7 @@ export function extent(path) {
 }
 
 /** A coordinate as far as it matters in a movement of a size. @param {number} value @param {number} size @returns {string} */
-export const rounded = (value, size) => String(Number(value.toFixed(Math.min(Math.max(Math.ceil(3 - Math.log10(size)), 0), 12))));
+export const rounded = (value, size) => String(Number(value.toFixed(Math.min(Math.max(Math.ceil(2.2 - Math.log10(size)), 0), 12))));
 
 /** What moves: the prototype, or a style of its symbol. @param {Plan} plan */
 export const what = (plan) => (plan.style ? { style: { symbol: plan.symbol, values: plan.style } } : { symbol: plan.symbol });

@@ -79,6 +79,7 @@ class Move {
     this.plan = null;
     this.steps = new Steps();
     this.handles.set([]);
+    this.camera.face([symbol.path]);
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
