@@ -446,10 +446,10 @@ def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
     studio.end(signal.SIGKILL)
     wait_until(page, "!document.getElementById('away-note').hidden")
     draw(page, letters("GShape")[SHOWN])
+    wait_for_text(page, "#verdict-kind", "No answer yet")
     with running(folder, "--port", studio.address.rpartition(":")[2]):
         wait_until(page, "document.getElementById('away-note').hidden")
-        draw(page, letters("GShape")[SHOWN])
-        wait_until(page, ANSWERED)
+        wait_until(page, ANSWERED)  # to what was drawn meanwhile
         assert page.inner_text(".rank:first-child .rank-name") == "GShape"
         page.close()
 

@@ -2,7 +2,6 @@
 import { post } from "../parts/api.js";
 import { byId } from "../parts/elements.js";
 import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_state.js";
-import { tried } from "../parts/toasts.js";
 import { followTurns } from "../parts/turning.js";
 import { currentView, show } from "../parts/views.js";
 import { chooseToMove } from "../move/chosen.js";
@@ -149,8 +148,11 @@ class Draw {
   /** Without a websocket the whole movement is asked for at once. */
   async askOnce() {
     const asked = this.whole;
-    const answer = await tried(() => post("/api/recognize", asked));
-    if (answer && asked === this.whole) this.answered(answer);
+    const answer = await post("/api/recognize", asked).catch((/** @type {any} */ error) => ({ error }));
+    if (asked !== this.whole) return;
+    if (!answer.error) this.answered(answer);
+    else if (!answer.error.status) this.panel.words("No answer yet", "…", "It is asked for again when the server is there.", "open");
+    else this.refused(answer.error.message);
   }
 
   /** @param {any} state Of the server, while drawing. */
@@ -182,11 +184,16 @@ class Draw {
     if (this.drawing) this.sending.heard();
     if (this.waits) {
       this.sending.answered();
-      this.waits = false;
-      this.panel.words("No answer", "?", text, "unknown");
-      this.focusName();
+      this.refused(text);
     }
     return about;
+  }
+
+  /** @param {string} text Why there is no answer. */
+  refused(text) {
+    this.waits = false;
+    this.panel.words("No answer", "?", text, "unknown");
+    this.focusName();
   }
 
   /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched, as while programs move. */
@@ -233,6 +240,6 @@ class Draw {
 /** @param {(message: any) => boolean} send @returns {any} What hears the server. */
 export function startDraw(send) {
   const draw = new Draw(send);
-  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed());
+  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed(), draw.waits && draw.askOnce());
   return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
 }
