@@ -36,6 +36,6 @@ export async function showStyles(symbol, changed, current) {
     for (const { slider } of sliders) slider.disabled = !box.checked;
     changed(box.checked ? [...values] : null, styles.formulation);
   });
-  fill(byId("style-rows"), make("label", { class: "check" }, box, make("span", {}, "Between its recordings", make("span", { class: "soft small says" }, `from their average in the ways they differ; ${styles.formulation}`))), ...sliders.map((/** @type {any} */ one) => one.row));
+  fill(byId("style-rows"), make("label", { class: "check" }, box, make("span", {}, "Between its recordings", make("span", { class: "soft small says" }, `from their average in the ways they differ; moves as ${styles.formulation}`))), ...sliders.map((/** @type {any} */ one) => one.row));
   byId("styles").hidden = false;
 }

@@ -197,7 +197,7 @@ class Move {
     this.redraw();
     if (!on) return;
     await this.rollouts.get(name).prepare(this.plan);
-    this.rollouts.get(name).follow(this.plan);
+    if (this.names().includes(name)) this.rollouts.get(name).follow(this.plan);
   }
 
   /** From a quarter of the demonstrated duration to four times it. */
