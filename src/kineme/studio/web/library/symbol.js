@@ -85,7 +85,7 @@ export class SymbolPanel {
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
-    const hint = `Choose movements to ${symbol ? "split them off, give them another name" : "name them"} or delete them.`;
+    const hint = `Choose some to ${symbol ? "split, rename" : "name"} or delete.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
       for (const one of acts) one.disabled = library().read_only || !members.ids().length;
