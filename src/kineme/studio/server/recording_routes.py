@@ -56,13 +56,11 @@ async def send(
     work = Work()
     async with studio.uploads.readers:
         read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
-    plots = [_plot(read, k) for k in range(len(read))]
     return {
         "recording": key,
         "tables": [_table(read, k) for k in range(len(read))],
         "problems": [str(one) for one in read.problems],
-        "plot": plots[0],
-        "plots": plots,
+        "plots": [_plot(read, k) for k in range(len(read))],
     }
 
 
