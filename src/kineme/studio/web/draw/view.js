@@ -56,7 +56,7 @@ class Draw {
     followKeys(byId("draw-canvas"), hear);
     followTurns(byId("draw-canvas"), () => this.picture.turns, (dx, dy) => this.picture.turn(dx, dy));
     byId("draw-clear").addEventListener("click", () => this.clear());
-    byId("draw-replay").addEventListener("click", () => this.picture.replay(() => {}));
+    byId("draw-replay").addEventListener("click", () => this.picture.replay());
     byId("draw-move").addEventListener("click", () => this.move());
     document.addEventListener("keydown", (event) => event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear());
     byId("draw-how").addEventListener("click", () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()));

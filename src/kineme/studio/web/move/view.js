@@ -19,8 +19,6 @@ import { Rollouts } from "./rollouts.js";
 import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
 
-const FORMATS = ["csv", "json", "npz", "parquet"];
-
 class Move {
   constructor() {
     this.steps = new Steps();
@@ -60,8 +58,8 @@ class Move {
     if (currentView() !== "move") return;
     const { symbols, version } = library();
     const id = toMove(symbols);
-    const formats = library().formats?.map((/** @type {string} */ one) => one.replace(/^\./, "")) ?? FORMATS;
-    if (!byId("export-format").children.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
+    const formats = library().formats.map((/** @type {string} */ one) => one.replace(/^\./, ""));
+    if (byId("export-format").children.length !== formats.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
     byId("move-empty").hidden = id !== null;
     for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = id === null;
     for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
@@ -84,7 +82,7 @@ class Move {
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
-    for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
+    for (const one of this.rollouts.values()) one.reset();
     byId("duration").value = "0";
     this.picture.paths = [];
     this.picture.fit();
@@ -95,6 +93,7 @@ class Move {
   }
 
   async prepare() {
+    if (!this.plan) return;
     await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
@@ -189,7 +188,7 @@ class Move {
     this.redraw();
     if (!on) return;
     await this.rollouts.get(name).prepare(this.plan);
-    this.rollouts.get(name).follow(this.plan);
+    if (this.plan) this.rollouts.get(name).follow(this.plan);
   }
 
   /** From a quarter of the demonstrated duration to four times it. */

@@ -46,7 +46,6 @@ async function move(event) {
   event.preventDefault();
   const symbol = byId("robot-what").value;
   if (!symbol) return;
-  chooseToMove(symbol);
   byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
@@ -82,7 +81,7 @@ async function shown() {
 
 export function startRobot() {
   byId("robot-form").addEventListener("submit", move);
-  byId("robot-what").addEventListener("change", offer);
+  byId("robot-what").addEventListener("change", () => (chooseToMove(byId("robot-what").value), offer()));
   onShow("robot", shown);
   onLibrary(shown);
 }
