@@ -327,8 +327,8 @@ WRONG = {
         ("0.5 * (ends", "0.501 * (ends", worst_answers),
     ],
     "rotation.js": [("rule.prior[3]) * norms", "rule.prior[3]) * norms * 1.01", worst_answers)],
-    "early.js": [
-        ("LAST = 0.02", "LAST = 0.021", worst_states),
+    "hypotheses.js": [("LAST = 0.02", "LAST = 0.021", worst_states)],
+    "evidence.js": [
         ("ROTATION = 10", "ROTATION = 10.1", worst_states),
         ("SPEED_SPREAD = 0.5", "SPEED_SPREAD = 0.501", worst_states),
         ("PROGRESS = 0.25", "PROGRESS = 0.251", worst_states),
