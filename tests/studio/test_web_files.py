@@ -12,6 +12,7 @@ import pytest
 
 WEB = Path(__file__).parents[2] / "src" / "kineme" / "studio" / "web"
 RUNTIME = WEB.parent / "javascript"
+PAGE = WEB.parent / "page"
 SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
@@ -270,6 +271,17 @@ def test_every_id_is_one_elements_and_is_used():
     wanted = {name for path in SCRIPTS for name in re.findall(r'byId\("([\w-]+)"\)', path.read_text())}
     known = {*ids, *re.findall(r'\sid="([^"]+)"', (WEB / "arm.html").read_text())}
     assert wanted - known <= {"data"}  # made by robot/arm.js
+
+
+def test_what_a_module_exports_is_imported():
+    every = {path: path.read_text() for path in (*SCRIPTS, *sorted(RUNTIME.glob("*.js")), *sorted(PAGE.glob("*.js")))}
+    exported = {
+        (path.name, name)
+        for path, text in every.items()
+        for name in re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.MULTILINE)
+        if not any(re.search(rf"\b{name}\b", other) for there, other in every.items() if there != path)
+    }
+    assert not exported
 
 
 def test_only_the_tokens_know_colors():

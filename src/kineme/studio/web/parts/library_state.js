@@ -49,7 +49,8 @@ export const symbolOf = (id) => known.symbols.find((/** @type {any} */ one) => o
 /** @param {string} name @returns {any} */
 export const symbolNamed = (name) => known.symbols.find((/** @type {any} */ one) => one.name === name);
 
-const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
+/** Tokens of colors that are told apart, of symbols and of columns. */
+export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
 
 /** The color and the mark of a symbol, by its position in the list. @param {string|null} id */
 export function lookOf(id) {

@@ -2,12 +2,12 @@
 import { get, post } from "../parts/api.js";
 import { learnSpans } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
-import { library, onLibrary } from "../parts/library_state.js";
+import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { startDropping } from "./dropping.js";
 import { columnCount, fitting, mismatch } from "./fitting.js";
 import { markRow, showSpans } from "./spans.js";
-import { COLORS, Timeline } from "./timeline.js";
+import { Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
 const ASKED = 400; // how often it is asked how much is searched [ms]
