@@ -236,6 +236,16 @@ def test_what_a_module_imports_is_there(path):
             assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{name} is imported and not used"
 
 
+@pytest.mark.parametrize("path", SCRIPTS, ids=_name)
+def test_a_view_knows_no_other_view(path):
+    """What views share lies in `parts`, which knows none of them."""
+    own = path.parent
+    if own == WEB:  # the start knows all
+        return
+    others = {_imported(path, source).parent for source in re.findall(r' from "([^"]+)";', path.read_text())}
+    assert others <= {own, WEB / "parts", RUNTIME}
+
+
 def _reached(path, known):
     """All modules that one imports, and those that they import."""
     for source in re.findall(r' from "([^"]+)";', path.read_text()):

@@ -5,7 +5,7 @@ import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_stat
 import { tried } from "../parts/toasts.js";
 import { followTurns } from "../parts/turning.js";
 import { currentView, show } from "../parts/views.js";
-import { chooseToMove } from "../move/chosen.js";
+import { chooseToMove } from "../parts/chosen.js";
 import { AnswerPanel } from "./answer_panel.js";
 import { Follow } from "./follow.js";
 import { followKeys } from "./keyboard_pen.js";

@@ -8,7 +8,7 @@ import { lengths, Plot } from "../parts/plots.js";
 import { isUndo } from "../parts/shortcuts.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, dragGoal, toMove } from "./chosen.js";
+import { chooseToMove, dragGoal, toMove } from "../parts/chosen.js";
 import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";

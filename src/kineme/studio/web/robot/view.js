@@ -4,7 +4,7 @@ import { byId, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, draggedGoal, toMove } from "../move/chosen.js";
+import { chooseToMove, draggedGoal, toMove } from "../parts/chosen.js";
 
 /** @type {any} What the server answered about arms. */
 let arms = null;
