@@ -23,7 +23,8 @@ def library_of(folder, space=False):
     demos = kineme.load_lasa(SHAPES)
     demos = demos[np.arange(len(demos)) % 7 < 4]
     names = [HOSTILE if label == "Line" else label for label in demos.labels]
-    library = kineme.ActionLibrary(folder, create=True)
+    short = kineme.DMP(n_basis=20, n_points=50) if space else None  # paths of few samples
+    library = kineme.ActionLibrary(folder, create=True, dmp=short)
     library.learn(lifted(demos) if space else demos, names)
     return library
 

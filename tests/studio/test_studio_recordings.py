@@ -57,8 +57,8 @@ def test_a_recording_is_read_searched_corrected_and_learned(client):
     table = read["tables"][0]
     assert [one["name"] for one in table["channels"]] == ["x", "y"]
     assert table["rate"] == pytest.approx(40, rel=0.1)
-    assert [one["name"] for one in read["plot"]["columns"]] == ["x", "y"]
-    assert len(read["plot"]["times"]) == len(read["plot"]["columns"][0]["values"]) <= 1000
+    assert [one["name"] for one in read["plots"][0]["columns"]] == ["x", "y"]
+    assert len(read["plots"][0]["times"]) == len(read["plots"][0]["columns"][0]["values"]) <= 1000
     found = client.post(f"/api/recordings/{read['recording']}/spotted", json={}).json()
     known = [one for one in found["spans"] if one["label"]]
     assert {one["label"] for one in known} <= {"kind 0", "kind 1", "kind 2"}

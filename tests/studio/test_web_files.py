@@ -13,6 +13,7 @@ import pytest
 
 WEB = Path(__file__).parents[2] / "src" / "kineme" / "studio" / "web"
 RUNTIME = WEB.parent / "javascript"
+PAGE = WEB.parent / "page"
 SCRIPTS = sorted(WEB.rglob("*.js"))
 PAGES = sorted(WEB.glob("*.html"))
 STYLES = sorted(WEB.glob("*.css"))
@@ -77,6 +78,7 @@ def modules(tmp_path):
     """The modules where node knows them as such."""
     folder = shutil.copytree(WEB, tmp_path / "web")
     (folder / "package.json").write_text('{"type": "module"}')
+    shutil.copytree(RUNTIME, folder / "runtime")
     return folder
 
 
@@ -120,15 +122,16 @@ def test_movements_in_space_are_seen_from_the_front_where_they_are_flat(modules)
 
 
 REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
-let [version, asked, fails] = [1, 0, false];
+let [version, asked, fails, tag] = [1, 0, false, null];
 const told = [];
 onLibrary((known) => told.push(known.version));
-globalThis.fetch = async () => {
+globalThis.fetch = async (path, { headers }) => {
   const [now, refused] = [version, fails];
   asked += 1;
+  if (tag && headers?.["If-None-Match"] === tag) return new Response(null, { status: 304 });
   await new Promise((done) => setTimeout(done, 5));
   if (refused) return new Response('{"error": "busy"}', { status: 503 });
-  return new Response(`{"version": ${now}, "symbols": []}`);
+  return new Response(`{"version": ${now}, "symbols": []}`, { headers: tag ? { ETag: tag } : {} });
 };
 const first = refresh();
 await Promise.resolve();
@@ -139,15 +142,80 @@ const failing = refresh().catch((error) => error.message);
 await Promise.resolve();
 [fails, version] = [false, 3];
 const after = (await refresh()).version;
+tag = "for reading only"; // the studio was started anew: another answer about the same version
+await refresh();
+await refresh();
 console.log(JSON.stringify({ seen, asked, told, refused: await failing, after, now: library().version }));"""
+
+
+FOLLOWED = """const { Rollouts } = await import(`${process.argv[1]}/move/rollouts.js`);
+const { primitiveOf } = await import(`${process.argv[1]}/move/primitives.js`);
+const asked = [];
+globalThis.fetch = (path, { body }) => {
+  const { what } = JSON.parse(body);
+  return new Promise((answer) => asked.push({ path, what: what.symbol, answer }));
+};
+const said = async (one, body, status = 200) => {
+  one.answer(new Response(JSON.stringify(body), { status }));
+  await new Promise((done) => setTimeout(done, 5));
+};
+const plan = (symbol) => ({ symbol, start: [0], goal: [1], usual: 1, share: 1, style: null, via: [], obstacles: [] });
+const seen = [];
+const rollouts = new Rollouts("original", () => seen.push(rollouts.path?.of ?? rollouts.problem));
+rollouts.follow(plan("old"));
+rollouts.reset();
+rollouts.follow(plan("new"));
+await said(asked[0], { of: "old" });
+await said(asked[1], { of: "new" });
+rollouts.follow(plan("newer"));
+rollouts.reset();
+await said(asked[2], { error: "of newer" }, 400);
+const primitives = ["first", "second", "third"].map(() => null);
+for (const k of [0, 1, 2]) {
+  const primitive = primitiveOf({ symbol: "one" }, "original", 1);
+  if (asked[3 + k]) await said(asked[3 + k], k ? null : { error: "away" }, k ? 200 : 503);
+  primitives[k] = await primitive;
+}
+console.log(JSON.stringify({ asked: asked.map((one) => `${one.path} ${one.what}`), seen, primitives }));"""
+
+
+@needs_node
+def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_asked_again(modules):
+    moves, primitives = "/api/rollout", "/api/primitive"
+    assert _in_node(FOLLOWED, modules) == {
+        "asked": [f"{moves} old", f"{moves} new", f"{moves} newer", f"{primitives} one", f"{primitives} one"],
+        "seen": ["new"],
+        "primitives": [None, None, None],
+    }
+
+
+REPLAYED = """const frames = [];
+globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
+globalThis.ResizeObserver = class { observe() {} };
+globalThis.requestAnimationFrame = (step) => frames.push(step);
+const { Picture } = await import(`${process.argv[1]}/draw/picture.js`);
+const picture = new Picture({ getContext: () => null });
+picture.ink = [[0, 0, 0], [1, 1, 1]];
+picture.replay();
+picture.replay();
+const now = performance.now();
+for (const step of frames.splice(0)) step(now + 400);
+const [left, shown] = [frames.length, picture.replayed];
+frames[0](now + 2000);
+console.log(JSON.stringify([left, shown > 0.3 && shown < 0.5, picture.replayed, frames.length]));"""
+
+
+@needs_node
+def test_a_replay_that_begins_anew_is_the_only_one(modules):
+    assert _in_node(REPLAYED, modules) == [1, True, None, 1]
 
 
 @needs_node
 def test_what_is_asked_after_a_change_is_answered_with_that_change(modules):
     assert _in_node(REFRESHES, modules) == {
         "seen": [1, 2, 2],
-        "asked": 4,
-        "told": [1, 2, 3],
+        "asked": 6,
+        "told": [1, 2, 3, 3],
         "refused": "busy",
         "after": 3,
         "now": 3,
@@ -183,6 +251,16 @@ def test_what_a_module_imports_is_there(path):
                 name,
             )
             assert len(re.findall(rf"\b{name}\b", text)) > 1, f"{name} is imported and not used"
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=_name)
+def test_a_view_knows_no_other_view(path):
+    """What views share lies in `parts`, which knows none of them."""
+    own = path.parent
+    if own == WEB:  # the start knows all
+        return
+    others = {_imported(path, source).parent for source in re.findall(r' from "([^"]+)";', path.read_text())}
+    assert others <= {own, WEB / "parts", RUNTIME}
 
 
 def _reached(path, known):
@@ -222,10 +300,30 @@ def test_every_id_is_one_elements_and_is_used():
     assert wanted - known <= {"data"}  # made by robot/arm.js
 
 
+def test_what_a_module_exports_is_imported():
+    every = {path: path.read_text() for path in (*SCRIPTS, *sorted(RUNTIME.glob("*.js")), *sorted(PAGE.glob("*.js")))}
+    exported = {
+        (path.name, name)
+        for path, text in every.items()
+        for name in re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.MULTILINE)
+        if not any(re.search(rf"\b{name}\b", other) for there, other in every.items() if there != path)
+    }
+    assert not exported
+
+
 def test_only_the_tokens_know_colors():
     others = [path for path in STYLES if path.name != "tokens.css"]
     found = {_name(path): re.findall(r"#[0-9a-fA-F]{3,8}\b(?!\s*[{,:.>\[])", path.read_text()) for path in others}
     assert not {name: colors for name, colors in found.items() if colors}
+
+
+def test_the_dark_scheme_is_other_tokens_and_nothing_else():
+    """So the views lie as they do in the light one."""
+    assert [path.name for path in STYLES if "prefers-color-scheme" in path.read_text()] == ["tokens.css"]
+    dark = (WEB / "tokens.css").read_text().partition("(prefers-color-scheme: dark)")[2].partition("@media")[0]
+    names = re.findall(r"^ +([\w-]+):", dark, re.MULTILINE)
+    assert names
+    assert all(name.startswith("--") for name in names)
 
 
 def test_colors_of_the_figures_are_those_of_the_page():

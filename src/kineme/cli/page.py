@@ -9,7 +9,7 @@ import click
 from kineme.cli.library import opened
 from kineme.cli.options import force_option, json_option, library_option, whole
 from kineme.cli.output import check_new, say
-from kineme.output.text import counted, printable
+from kineme.output.text import printable
 
 
 @click.command(short_help="A library as one HTML page: draw, recognize, drag.")
@@ -25,20 +25,15 @@ def page(folder: Path, output: Path, title: str | None, most: int | None, as_jso
     The file holds the movements of the library: whoever has it can read them. Of large libraries some movements of each
     symbol are taken, evenly spaced, and the page answers as a library of these does.
     """
-    from kineme.studio.page.write_page import write_page
+    from kineme.studio.page.write_page import summary_of, write_page
 
     check_new(output, force)
     with opened(folder) as library:
         made = write_page(output, library, title, most, replace=force)
     header, size = made.header, output.stat().st_size
-    held, known = header["n_movements"], header["n_all"]
-    data = {"file": str(output), "bytes": size, "symbols": len(header["classes"]), "movements": held, "of": known}
-
-    def text() -> str:
-        of_all = "" if held == known else f" of {known:,}"
-        return (
-            f"{printable(output)}: {counted(len(header['classes']), 'symbol')}, {held:,}{of_all} movements, "
-            f"{size / 1e6:.2f} MB; open it in a browser, it needs no server and no network"
-        )
-
-    say(as_json, data, text)
+    counts = {"symbols": len(header["classes"]), "movements": header["n_movements"], "of": header["n_all"]}
+    text = (
+        f"{printable(output)}: {summary_of(made)}, {size / 1e6:.2f} MB; "
+        "open it in a browser, it needs no server and no network"
+    )
+    say(as_json, {"file": str(output), "bytes": size, **counts}, lambda: text)

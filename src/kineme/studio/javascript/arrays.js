@@ -9,6 +9,7 @@
 const KINDS = { float64: Float64Array, float32: Float32Array, int32: Int32Array };
 const FORMAT = "kineme-snapshot";
 const VERSION = 1;
+const SMALLEST = 2.2250738585072014e-308; // number whose logarithm is taken
 
 /**
  * The arrays of a snapshot; they share one block of memory.
@@ -81,6 +82,9 @@ export function argmax(values) {
 export function descending(values) {
   return Array.from(values, (_, k) => k).sort((i, j) => (values[j] === values[i] ? i - j : values[j] - values[i]));
 }
+
+/** Logarithm of a number that is not negative; finite for 0. @param {number} value */
+export const finiteLog = (value) => Math.log(Math.max(value, SMALLEST));
 
 /** log(sum(exp(values))), without overflow. @param {ArrayLike<number>} values */
 export function logSumExp(values) {

@@ -173,7 +173,7 @@ function counted(known, kind, c, errorRate) {
  * @param {Float64Array} nearest log similarity to the nearest movement of each class
  * @param {number} errorRate
  */
-export function pValues(known, nearest, errorRate) {
+function pValues(known, nearest, errorRate) {
   const scores = nearest.map((log, c) => distance(log) / known.arrays.scales[c]);
   const found = Array.from(scores, (_, c) => counted(known, "scores", c, errorRate));
   const each = scores.map((score, c) => (found[c].scores ? shareAbove(found[c].scores, score) : broadLaw(score)));

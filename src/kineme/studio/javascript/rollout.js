@@ -117,7 +117,7 @@ function withAcceleration({ n_basis: N, K, D }, state, values) {
  * @param {number} n
  * @returns {Float64Array[]} states at each time, x, x' and x''
  */
-export function decoder(how, formulation, n) {
+function decoder(how, formulation, n) {
   const { n_basis: N } = how;
   const steps = Math.max(1, Math.ceil((2 * (N - 1)) / (n - 1)));
   let state = new Float64Array(2 * (N + 2));

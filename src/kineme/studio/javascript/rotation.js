@@ -84,7 +84,7 @@ const A = new Float64Array(9);
  * @param {Float64Array} G (3, 3)
  * @param {Float64Array|null} R
  */
-export function largestTrace(G, R) {
+function largestTrace(G, R) {
   let size = 0;
   for (let k = 0; k < 9; k++) size += G[k] * G[k];
   size = Math.sqrt(size);

@@ -1,7 +1,8 @@
 // The runtime: a snapshot of a library in, answers and movements out. Needs nothing but JavaScript.
 
 import { unpack } from "./arrays.js";
-import { follow, hypotheses } from "./early.js";
+import { follow } from "./early.js";
+import { hypotheses } from "./hypotheses.js";
 import { movement } from "./preparation.js";
 import { knownClasses, recognize } from "./recognition.js";
 import { encode, FORMULATIONS, inFormulation, primitiveOf, rollout } from "./rollout.js";

@@ -1,24 +1,18 @@
 // The page: draw, see live what it is, drag start and goal.
 
 import { open } from "../javascript/runtime.js";
+import { element, make } from "./elements.js";
+import { createKnown } from "./known.js";
 import { createMoving, placed } from "./movements.js";
 import { boxOf, createStage } from "./stage.js";
 
 const ROWS = 5; // bars
-const MANY = 12; // known movements that can be looked through
 const STEP = 0.03; // of the stage, by an arrow key
 const BEGUN = 0.1; // share of the path from which a name or unknown is said: every beginning is unlike the whole
 const ERROR_RATE = 0.05;
 const DRAWN = "Your drawing";
 
-const element = (id) => document.getElementById(id);
 const percent = (share) => `${Math.round(100 * Math.min(Math.max(share, 0), 1))} %`;
-
-function make(tag, properties = {}, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-}
 
 const runtime = open(element("snapshot").textContent);
 const d = runtime.header.comparison.n_dims;
@@ -26,6 +20,7 @@ const prototypes = runtime.classes.map((name) => runtime.rollout(runtime.primiti
 const box = viewed();
 const stage = createStage(element("stage"), runtime.header.view, box);
 const state = { stroke: null, live: null, answer: null, moving: null, held: null, pointer: null, played: null, note: "" };
+const known = createKnown(runtime, prototypes, choose);
 let [follow, frame] = [null, 0];
 
 /** What is in view: a typical movement fills it. */
@@ -113,16 +108,10 @@ function bars(ranked) {
 
 function clear() {
   Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "", pointer: null, held: null });
-  select(null);
+  known.select(null);
   bars([]);
   showAnswer();
   later();
-}
-
-function select(name) {
-  for (const button of element("symbols").querySelectorAll("button")) {
-    button.setAttribute("aria-pressed", String(button.dataset.index === String(runtime.classes.indexOf(name))));
-  }
 }
 
 /** Put a known movement, or a drawn one, on the stage. */
@@ -139,7 +128,7 @@ function show(name, what, place) {
 function choose(name) {
   clear();
   show(name, name, placed(runtime, runtime.primitive(name), box));
-  select(name);
+  known.select(name);
   showAnswer();
   later();
   // In a narrow window what was chosen is above the list of what can be chosen.
@@ -156,7 +145,7 @@ function finish() {
     const place = { start: positions[0], goal: positions.at(-1) };
     if (runtime.header.movements.encodes) show(DRAWN, runtime.encode(times, positions), place);
     else if (state.answer.label !== null) show(state.answer.label, state.answer.label, place);
-    select(state.answer.label);
+    known.select(state.answer.label);
   } catch {
     state.note = "That was too short: draw a longer movement.";
     bars([]);
@@ -177,7 +166,7 @@ function down(event) {
   state.played = null;
   state.held = state.moving?.held(stage, placeOf(event)) ?? null;
   if (state.held) return;
-  select(null);
+  known.select(null);
   Object.assign(state, { stroke: { times: [], positions: [] }, answer: null, live: null, drawn: null, moving: null, note: "" });
   follow = runtime.follow();
   take(event);
@@ -262,33 +251,8 @@ function save() {
   setTimeout(() => URL.revokeObjectURL(url), 1000);
 }
 
-/** Small pictures of the known movements, as buttons. */
-function list() {
-  runtime.classes.forEach((name, c) => {
-    const picture = make("canvas", { className: "picture" });
-    picture.setAttribute("aria-hidden", "true");
-    const button = make("button", { type: "button", title: name }, picture, make("span", { textContent: name }));
-    button.dataset.index = c;
-    button.addEventListener("click", () => choose(name));
-    element("symbols").append(make("li", {}, button));
-  });
-  element("find").hidden = runtime.classes.length <= MANY;
-  element("find").addEventListener("input", () => {
-    const words = element("find").value.toLowerCase().split(/\s+/);
-    for (const item of element("symbols").children) item.hidden = !words.every((word) => item.textContent.toLowerCase().includes(word));
-  });
-}
-
-function pictures() {
-  const [turn, tilt] = ["turn", "tilt"].map((id) => Number(element(id).value));
-  element("symbols").querySelectorAll("canvas").forEach((canvas, c) => {
-    const small = createStage(canvas, runtime.header.view, boxOf(prototypes[c]));
-    small.turned(turn, tilt);
-    small.cleared();
-    small.line(prototypes[c], "--ink", { wide: 2 });
-    small.dot(prototypes[c].at(-1), "--goal", { radius: 3.5, edge: 1 });
-  });
-}
+/** By how much the view is turned and tilted [degrees]. */
+const turned = () => ["turn", "tilt"].map((id) => Number(element(id).value));
 
 function start() {
   for (let i = 0; i < ROWS; i++) {
@@ -310,17 +274,16 @@ function start() {
     later();
   });
   for (const id of ["turn", "tilt"]) element(id).addEventListener("input", () => {
-    stage.turned(Number(element("turn").value), Number(element("tilt").value));
-    pictures();
+    stage.turned(...turned());
+    known.paint(turned());
     later();
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { pictures(); later(); });
-  new ResizeObserver(() => { pictures(); later(); }).observe(canvas);
-  list();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { known.paint(turned()); later(); });
+  new ResizeObserver(() => { known.paint(turned()); later(); }).observe(canvas);
   clear();
-  pictures();
+  known.paint(turned());
   // What is drawn first should not wait for what is made once.
-  window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], [0, 1, 2, 3].map((k) => prototypes[0][k * 20])));
+  window.requestIdleCallback?.(() => runtime.follow()([0, 1, 2, 3], prototypes[0].slice(0, 4)));
 }
 
 start();

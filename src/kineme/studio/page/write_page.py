@@ -54,7 +54,7 @@ def page_of(snapshot: Snapshot, title: str) -> str:
         "style": style,
         "script": script,
         "title": in_markup(title),
-        "summary": in_markup(_summary(snapshot)),
+        "summary": in_markup(summary_of(snapshot)),
         "footer": in_markup("Recognized and generated in this page by kineme; nothing leaves it."),
         "snapshot": snapshot.to_json(),
     }
@@ -95,7 +95,8 @@ def view_of(snapshot: Snapshot) -> list[float]:
     return np.concatenate((np.cross(up, near), up, near)).tolist()
 
 
-def _summary(snapshot: Snapshot) -> str:
+def summary_of(snapshot: Snapshot) -> str:
+    """How many symbols and movements a page holds, as in "4 symbols, 24 of 28 movements"."""
     held, known = snapshot.header["n_movements"], snapshot.header.get("n_all", snapshot.header["n_movements"])
     of_all = "" if held == known else f" of {known:,}"
     symbols = counted(len(snapshot.header["classes"]), "symbol")

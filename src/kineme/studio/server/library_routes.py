@@ -26,6 +26,7 @@ from kineme.studio.server.studio import Reads, Studio
 router = APIRouter(prefix="/api/library", tags=["library"])
 
 _ON_MAP = 600  # movements; their distances take 0.3 s
+_MOST_ON_MAP = 2000  # where there are more symbols than that
 
 
 @router.get("", response_model=LibraryOut, summary="What the library holds")
@@ -70,7 +71,7 @@ def movement(studio: Reads, key: MovementKey) -> dict[str, Any]:
 
 @router.get("/map", response_model=MapOut, summary="Movements in the plane, alike ones near each other")
 def movement_map(studio: Reads) -> dict[str, Any]:
-    """Classical scaling of their distances, of at most 600 movements, equally many of each symbol."""
+    """Classical scaling of their distances, of 600 movements, equally many of each symbol, or of one of each."""
     return studio.kept("map", lambda: _map(studio))
 
 
@@ -151,7 +152,7 @@ def _map(studio: Studio) -> dict[str, Any]:
     if not groups:
         return {"points": []}
     share = max(1, _ON_MAP // len(groups))
-    ids = np.concatenate([one[evenly_spaced(len(one), share)] for one in groups])[:2000]
+    ids = np.concatenate([one[evenly_spaced(len(one), share)] for one in groups])[:_MOST_ON_MAP]
     like = studio.library.specification.comparison
     space = conceptual_space(tuple(ids.tolist()), described(studio.library.store, ids), like)
     where = classical_scaling(space.distances)[0]

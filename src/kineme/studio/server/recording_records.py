@@ -65,8 +65,7 @@ class UploadOut(BaseModel):
     recording: str
     tables: list[TableOut]
     problems: list[str]
-    plot: PlotOut
-    plots: list[PlotOut]
+    plots: list[PlotOut] = Field(description="One of each table.")
 
 
 class SpannedOut(BaseModel):

@@ -31,6 +31,7 @@ from kineme.studio.server.recording_records import (
 )
 from kineme.studio.server.records import Learned, RecordingKey
 from kineme.studio.server.studio import Reads, Studio, Writes
+from kineme.studio.server.uploads import go_on
 from kineme.studio.server.work import Work, while_wanted
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
@@ -56,13 +57,11 @@ async def send(
     work = Work()
     async with studio.uploads.readers:
         read = await while_wanted(request, studio.long, work, lambda: studio.uploads.recordings(key, check=work.check))
-    plots = [_plot(read, k) for k in range(len(read))]
     return {
         "recording": key,
         "tables": [_table(read, k) for k in range(len(read))],
         "problems": [str(one) for one in read.problems],
-        "plot": plots[0],
-        "plots": plots,
+        "plots": [_plot(read, k) for k in range(len(read))],
     }
 
 
@@ -119,11 +118,7 @@ def _row(k: int, span: Span) -> LabelRow:
     return LabelRow(span.begin, span.end, span.label, "", "", k + 1)
 
 
-def _go_on() -> None:
-    """Whoever asked still waits."""
-
-
-def _in_columns(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = _go_on) -> Recordings:
+def _in_columns(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = go_on) -> Recordings:
     """All tables of a file, in the columns that are asked for, or those of the library where it has them."""
     read = studio.uploads.recordings(key, check=check)
     ours = () if studio.library.channels is None else recorded_names(studio.library.channels)
@@ -133,7 +128,7 @@ def _in_columns(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[
     return read
 
 
-def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = _go_on) -> Recordings:
+def _one(studio: Studio, key: str, asked: ChannelsAsked, check: Callable[[], object] = go_on) -> Recordings:
     """One table of a file, in the same columns."""
     read, table = _in_columns(studio, key, asked, check), asked.table
     names = [_name(read, k) for k in range(len(read))]

@@ -32,7 +32,7 @@ _KEPT = 8  # files
 _LONGEST = 200  # bytes of a name
 
 
-def _go_on() -> None:
+def go_on() -> None:
     """Whoever asked still waits."""
 
 
@@ -80,7 +80,7 @@ class Uploads:
                 self._forget(old)
         return key
 
-    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = _go_on) -> Recordings:
+    def recordings(self, key: str, columns: Sequence[str] = (), check: Callable[[], object] = go_on) -> Recordings:
         """What a file holds, in these columns or in those that are found.
 
         `check` is called again and again, and raises where nobody waits any more.

@@ -14,7 +14,7 @@ export function startNaming(page) {
     byId("naming-learn").disabled = true;
     const done = await learn(drawn, name === null ? null : name.trim());
     byId("naming-learn").disabled = !page.drawn();
-    if (done) page.learned(name === null ? null : name.trim());
+    if (done && page.drawn() === drawn) page.learned(name === null ? null : name.trim()); // not where another is drawn by now
   };
 
   byId("naming").addEventListener("submit", (/** @type {Event} */ event) => {

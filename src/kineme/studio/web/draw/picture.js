@@ -12,6 +12,7 @@ export class Picture {
     this.rest = [];
     this.pen = null;
     this.replayed = null;
+    this.run = {}; // of the replay that is under way
     /** @type {import("./frame.js").Frame|null} Of a movement that was not drawn here. */
     this.frame = null;
     this.board = new Board(canvas, () => this.paint());
@@ -56,17 +57,16 @@ export class Picture {
     mark(this.board.context, done[done.length - 1], "dot", FINGER, color("--predicted"));
   }
 
-  /** Show the drawing again, as fast as it was. @param {() => void} ended */
-  replay(ended) {
+  /** Show the drawing again, as fast as it was. */
+  replay() {
+    const run = (this.run = {});
     const began = performance.now();
     const duration = this.ink[this.ink.length - 1][0];
     const step = (/** @type {number} */ now) => {
-      if (this.replayed === null) return;
+      if (this.replayed === null || this.run !== run) return;
       this.replayed = (now - began) / 1000;
-      if (this.replayed > duration) {
-        this.replayed = null;
-        ended();
-      } else requestAnimationFrame(step);
+      if (this.replayed > duration) this.replayed = null;
+      else requestAnimationFrame(step);
       this.board.now();
     };
     this.replayed = 0;

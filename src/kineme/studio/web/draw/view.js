@@ -4,7 +4,7 @@ import { byId } from "../parts/elements.js";
 import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_state.js";
 import { followTurns } from "../parts/turning.js";
 import { currentView, show } from "../parts/views.js";
-import { chooseToMove } from "../move/chosen.js";
+import { chooseToMove } from "../parts/chosen.js";
 import { AnswerPanel } from "./answer_panel.js";
 import { Follow } from "./follow.js";
 import { followKeys } from "./keyboard_pen.js";
@@ -55,7 +55,7 @@ class Draw {
     followKeys(byId("draw-canvas"), hear);
     followTurns(byId("draw-canvas"), () => this.picture.turns, (dx, dy) => this.picture.turn(dx, dy));
     byId("draw-clear").addEventListener("click", () => this.clear());
-    byId("draw-replay").addEventListener("click", () => this.picture.replay(() => {}));
+    byId("draw-replay").addEventListener("click", () => this.picture.replay());
     byId("draw-move").addEventListener("click", () => this.move());
     document.addEventListener("keydown", (event) => event.key === "Escape" && currentView() === "draw" && !document.querySelector("dialog[open]") && this.clear());
     byId("draw-how").addEventListener("click", () => (byId("live-source").scrollIntoView({ block: "start" }), byId("live-source").firstElementChild.focus()));

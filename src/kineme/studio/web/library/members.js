@@ -29,11 +29,16 @@ export class Members {
     this.more = make("button", { class: "button quiet", type: "button", hidden: true, on: { click: () => this.load() } }, "Show more");
     this.element = make("div", { class: "members-part" }, this.grid, this.more);
     this.shown = 0;
+    this.loading = false;
     this.load();
   }
 
+  /** The next ones; once, however often it is asked for. */
   async load() {
+    if (this.loading) return;
+    this.loading = true;
     const answer = await tried(() => get(`/api/library/movements?${this.query}&offset=${this.shown}&limit=${PAGE}`));
+    this.loading = false;
     if (!answer) return;
     if (this.shown === 0) fill(this.grid);
     this.grid.append(...answer.movements.map((/** @type {any} */ one) => memberButton(one, this.chosen, this.changed)));

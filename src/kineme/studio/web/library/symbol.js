@@ -5,7 +5,7 @@ import { byId, counted, fill, make } from "../parts/elements.js";
 import { library, symbolOf } from "../parts/library_state.js";
 import { thumbnail } from "../parts/thumbnails.js";
 import { show } from "../parts/views.js";
-import { chooseToMove } from "../move/chosen.js";
+import { chooseToMove } from "../parts/chosen.js";
 import { Members } from "./members.js";
 
 const UNLABELED = "";

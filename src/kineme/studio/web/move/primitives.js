@@ -7,12 +7,18 @@ const SAMPLES = 201; // as many as the server answers with
 /** @type {Map<string, Promise<any>>} */
 const known = new Map();
 
+/** @param {any} what @param {string} formulation @returns {Promise<any>} */
+async function ask(what, formulation) {
+  const document = await post("/api/primitive", { what, formulation });
+  return document && openPrimitive(document);
+}
+
 /** @param {any} what @param {string} formulation @param {number} version Of the library. @returns {Promise<any>} Null where only the server knows. */
 export function primitiveOf(what, formulation, version) {
   const key = JSON.stringify([what, formulation, version]);
   if (!known.has(key)) {
     if (known.size > 60) known.clear();
-    known.set(key, post("/api/primitive", { what, formulation }).then((document) => document && openPrimitive(document)).catch(() => null));
+    known.set(key, ask(what, formulation).catch(() => (known.delete(key), null))); // next time it is asked again
   }
   return /** @type {Promise<any>} */ (known.get(key));
 }

@@ -6,8 +6,17 @@ import { moved, primitiveOf } from "./primitives.js";
 
 const SETTLED = 120; // how long nothing must change before the server is asked for what the page already drew [ms]
 
+/** @param {any} question @returns {Promise<{path: any, problem: string}>} */
+async function answerTo(question) {
+  try {
+    return { path: await post("/api/rollout", question), problem: "" };
+  } catch (error) {
+    return { path: null, problem: error.message };
+  }
+}
+
 export class Rollouts {
-  /** @param {(path: any) => void} changed */
+  /** @param {string} formulation @param {() => void} changed */
   constructor(formulation, changed) {
     this.formulation = formulation;
     this.changed = changed;
@@ -18,6 +27,14 @@ export class Rollouts {
     this.primitive = null;
     this.timer = 0;
     this.preparing = "";
+    this.movement = 0; // answers about the movements before are not wanted
+  }
+
+  /** Another movement begins. */
+  reset() {
+    clearTimeout(this.timer);
+    this.movement += 1;
+    Object.assign(this, { path: null, problem: "", wanted: null, primitive: null, preparing: "" });
   }
 
   /** @param {any} plan */
@@ -35,7 +52,7 @@ export class Rollouts {
     const path = moved(this.primitive, this.wanted);
     if (!path) return this.ask();
     this.path = path;
-    this.changed(path);
+    this.changed();
     this.timer = setTimeout(() => this.ask(), SETTLED);
   }
 
@@ -43,16 +60,13 @@ export class Rollouts {
     if (this.asking) return;
     this.asking = true;
     while (this.wanted) {
-      const asked = this.wanted;
+      const [asked, movement] = [this.wanted, this.movement];
       this.wanted = null;
-      try {
-        const path = await post("/api/rollout", asked);
-        this.problem = "";
-        if (!this.wanted || !this.primitive || asked.obstacles) this.path = path;
-      } catch (error) {
-        this.problem = error.message;
-      }
-      this.changed(this.path);
+      const { path, problem } = await answerTo(asked);
+      if (movement !== this.movement) continue;
+      this.problem = problem;
+      if (path && (!this.wanted || !this.primitive || asked.obstacles)) this.path = path;
+      this.changed();
     }
     this.asking = false;
   }

@@ -8,7 +8,7 @@ import { lengths, Plot } from "../parts/plots.js";
 import { isUndo } from "../parts/shortcuts.js";
 import { say, tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, dragGoal, toMove } from "./chosen.js";
+import { chooseToMove, dragGoal, toMove } from "../parts/chosen.js";
 import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";
@@ -18,8 +18,6 @@ import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
 import { Steps } from "./steps.js";
 import { showStyles } from "./styles.js";
-
-const FORMATS = ["csv", "json", "npz", "parquet"];
 
 class Move {
   constructor() {
@@ -60,8 +58,8 @@ class Move {
     if (currentView() !== "move") return;
     const { symbols, version } = library();
     const id = toMove(symbols);
-    const formats = library().formats?.map((/** @type {string} */ one) => one.replace(/^\./, "")) ?? FORMATS;
-    if (!byId("export-format").children.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
+    const formats = library().formats.map((/** @type {string} */ one) => one.replace(/^\./, ""));
+    if (byId("export-format").children.length !== formats.length) fill(byId("export-format"), ...formats.map((/** @type {string} */ one) => make("option", { value: one }, one.toUpperCase())));
     byId("move-empty").hidden = id !== null;
     for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = id === null;
     for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
@@ -85,7 +83,7 @@ class Move {
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
     if (!rollout || toMove(library().symbols) !== symbol.id) return;
     this.plan = this.picture.plan = asShown(symbol, rollout);
-    for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
+    for (const one of this.rollouts.values()) one.reset();
     byId("duration").value = "0";
     byId("formulations").disabled = false;
     this.picture.paths = [];
@@ -102,6 +100,7 @@ class Move {
   }
 
   async prepare() {
+    if (!this.plan) return;
     await Promise.all(this.names().map((name) => this.rollouts.get(name).prepare(this.plan)));
   }
 
@@ -197,7 +196,7 @@ class Move {
     this.redraw();
     if (!on) return;
     await this.rollouts.get(name).prepare(this.plan);
-    if (this.names().includes(name)) this.rollouts.get(name).follow(this.plan);
+    if (this.plan && this.names().includes(name)) this.rollouts.get(name).follow(this.plan);
   }
 
   /** From a quarter of the demonstrated duration to four times it. */

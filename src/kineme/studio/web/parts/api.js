@@ -1,7 +1,7 @@
 // Questions to the server, in JSON; what goes wrong is an Error with the server's sentence.
 
 /** What the server answered with a status of 4xx or 5xx. */
-export class Refused extends Error {
+class Refused extends Error {
   /** @param {string} text @param {number} status */
   constructor(text, status) {
     super(text);

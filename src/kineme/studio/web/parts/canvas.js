@@ -60,6 +60,3 @@ window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () 
   colors.clear();
   for (const board of boards) board.draw();
 });
-
-/** Whether the person wants no movement that was not asked for. */
-export const calm = () => window.matchMedia("(prefers-reduced-motion: reduce)").matches;

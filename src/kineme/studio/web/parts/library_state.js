@@ -1,7 +1,7 @@
 // What the page knows of the library; views are told when it changes, whoever changed it.
 import { newer } from "./api.js";
 
-const EMPTY = { folder: "", version: 0, n_movements: 0, n_dims: null, channels: null, read_only: false, can_undo: false, symbols: [], unlabeled: 0 };
+const EMPTY = { folder: "", version: 0, n_movements: 0, n_dims: null, channels: null, read_only: false, can_undo: false, symbols: [], unlabeled: 0, formats: [] };
 
 /** @type {any} */
 let known = EMPTY;
@@ -35,11 +35,11 @@ export function refresh() {
 }
 
 async function load() {
-  const before = loaded ? known.version : -1;
   const answer = await newer("/api/library", tag);
-  if (answer) ({ body: known, tag } = answer);
+  if (!answer) return known;
+  ({ body: known, tag } = answer);
   loaded = true;
-  if (known.version !== before) for (const act of told) act(known);
+  for (const act of told) act(known);
   return known;
 }
 
@@ -49,7 +49,8 @@ export const symbolOf = (id) => known.symbols.find((/** @type {any} */ one) => o
 /** @param {string} name @returns {any} */
 export const symbolNamed = (name) => known.symbols.find((/** @type {any} */ one) => one.name === name);
 
-const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
+/** Tokens of colors that are told apart, of symbols and of columns. */
+export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
 
 /** The color and the mark of a symbol, by its position in the list. @param {string|null} id */
 export function lookOf(id) {

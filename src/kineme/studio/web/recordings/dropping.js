@@ -3,16 +3,17 @@ import { request } from "../parts/api.js";
 import { byId, counted } from "../parts/elements.js";
 import { currentView, show } from "../parts/views.js";
 
-/** @param {File} file @returns {Promise<any>} */
-async function send(file) {
+/** @param {File} file @param {AbortSignal} signal @returns {Promise<any>} What the server read; undefined where it did not. */
+async function send(file, signal) {
   byId("drop-state").textContent = `Reading ${file.name} …`;
   byId("drop-state").classList.remove("went-wrong");
   const headers = { "X-File-Name": encodeURIComponent(file.name), "Content-Type": "application/octet-stream" };
   try {
-    const response = await request("/api/recordings", { method: "POST", body: file, headers });
+    const response = await request("/api/recordings", { method: "POST", body: file, headers, signal });
     byId("drop-state").textContent = "";
     return await response.json();
   } catch (error) {
+    if (signal.aborted) return undefined;
     byId("drop-state").textContent = error.status === undefined ? `${file.name} cannot be sent: expected a file, not a folder. The command kineme learn reads folders.` : error.message;
     byId("drop-state").classList.add("went-wrong");
     return undefined;
@@ -21,10 +22,13 @@ async function send(file) {
 
 /** @param {(recording: any, name: string) => void} read */
 export function startDropping(read) {
+  let sending = new AbortController();
   const take = async (/** @type {FileList|undefined} */ files) => {
     const file = files?.[0];
     if (!file) return;
-    const recording = await send(file);
+    sending.abort(); // only the last file is wanted
+    sending = new AbortController();
+    const recording = await send(file, sending.signal);
     if (recording) read(recording, file.name);
     if (recording && files.length > 1) byId("drop-state").textContent = `One file at a time: ${file.name} is shown, ${counted(files.length - 1, "other")} not read.`;
   };

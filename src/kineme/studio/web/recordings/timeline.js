@@ -2,12 +2,11 @@
 import { Board, color } from "../parts/canvas.js";
 import { byId, make } from "../parts/elements.js";
 import { line, readableOn } from "../parts/lines.js";
-import { lookOf, symbolNamed } from "../parts/library_state.js";
+import { COLORS, lookOf, symbolNamed } from "../parts/library_state.js";
 
 const BAND = 40; // height of the spans [px]
 const SIDE = 12;
 const AXIS = 22;
-export const COLORS = ["--blue", "--orange", "--green", "--purple", "--sky", "--amber"];
 
 /** @typedef {{begin: number, end: number, label: string|null, p: number|null}} Span */
 

@@ -2,12 +2,12 @@
 import { get, post } from "../parts/api.js";
 import { learnSpans } from "../parts/changes.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
-import { library, onLibrary } from "../parts/library_state.js";
+import { COLORS, library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { startDropping } from "./dropping.js";
 import { columnCount, fitting, mismatch } from "./fitting.js";
 import { markRow, showSpans } from "./spans.js";
-import { COLORS, Timeline } from "./timeline.js";
+import { Timeline } from "./timeline.js";
 
 const SHORT = 10; // a recording of one movement [s]
 const ASKED = 400; // how often it is asked how much is searched [ms]
@@ -33,8 +33,6 @@ class Recordings {
 
   /** @param {any} recording @param {string} name */
   open(recording, name) {
-    this.search?.abort();
-    this.over("");
     this.read = recording;
     byId("recording").hidden = false;
     byId("drop").classList.add("small-drop");
@@ -48,8 +46,10 @@ class Recordings {
     byId("spot").focus({ preventScroll: true });
   }
 
-  /** Another table of the file. */
+  /** Another table, of this file or of a new one: what is still searched for is about the one before. */
   table() {
+    this.search?.abort();
+    this.over("");
     const k = Number(byId("tables").value);
     const table = this.read.tables[k];
     const rate = table.rate ? `, ${Math.round(table.rate)} samples a second` : "";
@@ -65,7 +65,6 @@ class Recordings {
     this.columns();
     this.timeline.show(this.shownPlot());
     this.changed();
-    byId("spans-state").textContent = "";
   }
 
   chosenChannels() {
@@ -75,7 +74,7 @@ class Recordings {
   /** The plot with the columns of the chosen channels. */
   shownPlot() {
     const k = Number(byId("tables").value);
-    const plot = this.read.plots?.[k] ?? (k === 0 ? this.read.plot : { times: [0, this.read.tables[k].duration], columns: [] });
+    const plot = this.read.plots[k];
     const names = new Set(this.chosenChannels());
     const wanted = new Set(this.read.tables[k].channels.filter((/** @type {any} */ one) => names.has(one.name)).flatMap((/** @type {any} */ one) => one.columns ?? [one.name]));
     const columns = plot.columns.map((/** @type {any} */ one, /** @type {number} */ at) => ({ ...one, color: COLORS[at % COLORS.length] })).filter((/** @type {any} */ one) => wanted.has(one.name) || names.has(one.name));

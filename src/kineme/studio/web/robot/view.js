@@ -4,7 +4,7 @@ import { byId, fill, make } from "../parts/elements.js";
 import { library, onLibrary } from "../parts/library_state.js";
 import { tried } from "../parts/toasts.js";
 import { currentView, onShow } from "../parts/views.js";
-import { chooseToMove, draggedGoal, toMove } from "../move/chosen.js";
+import { chooseToMove, draggedGoal, toMove } from "../parts/chosen.js";
 
 /** @type {any} What the server answered about arms. */
 let arms = null;
@@ -48,7 +48,6 @@ async function move(event) {
   event.preventDefault();
   const symbol = byId("robot-what").value;
   if (!symbol) return;
-  chooseToMove(symbol);
   byId("robot-go").disabled = true;
   byId("robot-verdict").dataset.state = "";
   byId("robot-verdict").textContent = "Planning and checking …";
@@ -84,7 +83,7 @@ async function shown() {
 
 export function startRobot() {
   byId("robot-form").addEventListener("submit", move);
-  byId("robot-what").addEventListener("change", offer);
+  byId("robot-what").addEventListener("change", () => (chooseToMove(byId("robot-what").value), offer()));
   onShow("robot", shown);
   onLibrary(shown);
 }

@@ -1,4 +1,4 @@
-// Which symbol moves; other views set it.
+// Which symbol moves, and where its goal was dragged to: what views tell each other.
 
 /** @type {string|null} */
 let chosen = null;

@@ -1,0 +1,89 @@
+// The beginnings of stored movements, which a movement under way may be; the one under way is described as they are.
+
+import { finiteLog, interpolate, linspace, product } from "./arrays.js";
+import { fillShapes, N_POINTS, roomForShapes } from "./description.js";
+import { arcLengthPhase } from "./preparation.js";
+
+const LAST = 0.02; // share of a beginning's time in which the speed at its end is measured
+const LEAST_SPEED = 0.01; // of the mean speed
+
+/**
+ * @typedef {Object} Prefixes G beginnings of each of n movements, S samples along their arc lengths
+ * @property {Float32Array} rows centered, of norm 1
+ * @property {Float64Array} squares of their norms
+ * @property {Float64Array} timing time of each sample as a share of the beginning's, over the root of S
+ * @property {Float64Array} sizes
+ * @property {Float64Array} lengths
+ * @property {Float64Array} elapsed as a share of the movement's time
+ * @property {Float64Array} endSpeeds logarithms
+ * @property {import("./description.js").Shapes} shapes
+ */
+
+/** The beginnings of paths (n, d, N_POINTS) until each share of their arc length. @returns {Prefixes} */
+export function beginnings(paths, d, progress, how) {
+  const [S, G, n] = [how.n_segments + 1, progress.length, paths.length / (d * N_POINTS)];
+  const room = (size) => new Float64Array(n * G * size);
+  const [squares, sizes, lengths, elapsed, endSpeeds] = [1, 1, 1, 1, 1].map(room);
+  const found = { rows: new Float32Array(n * G * d * S), timing: room(S), shapes: roomForShapes(n * G, d, how) };
+  Object.assign(found, { squares, sizes, lengths, elapsed, endSpeeds });
+  const even = linspace(0, 1, N_POINTS);
+  for (let i = 0; i < n; i++) {
+    const path = paths.subarray(i * d * N_POINTS, (i + 1) * d * N_POINTS);
+    const phase = arcLengthPhase(path, d);
+    for (let g = 0; g < G; g++) {
+      const at = i * G + g;
+      const targets = linspace(0, progress[g], S);
+      const times = interpolate(targets, phase, even);
+      const own = new Float64Array(d * S);
+      for (let k = 0; k < d; k++) own.set(interpolate(targets, phase, path.subarray(k * N_POINTS, (k + 1) * N_POINTS)), k * S);
+      describeBeginning(found, at, own, times, d, S);
+      const before = interpolate([(1 - LAST) * times[S - 1]], even, phase)[0];
+      endSpeeds[at] = Math.log(Math.max((1 - before / progress[g]) / LAST, LEAST_SPEED));
+    }
+  }
+  return found;
+}
+
+/** Write beginning number `at` with its samples (d, S) and their times. */
+function describeBeginning(found, at, own, times, d, S) {
+  for (let t = 1; t < S; t++) {
+    let square = 0;
+    for (let k = 0; k < d; k++) square += (own[k * S + t] - own[k * S + t - 1]) ** 2;
+    found.lengths[at] += Math.sqrt(square);
+  }
+  let total = 0;
+  for (let k = 0; k < d; k++) {
+    const row = own.subarray(k * S, (k + 1) * S);
+    const mean = row.reduce((sum, x) => sum + x, 0) / S;
+    for (let t = 0; t < S; t++) total += (row[t] -= mean) ** 2;
+  }
+  found.sizes[at] = Math.sqrt(total / S);
+  const per = 1 / ((found.sizes[at] || 1) * Math.sqrt(S));
+  for (let t = 0; t < d * S; t++) own[t] *= per;
+  found.rows.set(own, at * d * S);
+  const single = found.rows.subarray(at * d * S, (at + 1) * d * S);
+  found.squares[at] = product(single, 0, single, 0, d * S);
+  found.elapsed[at] = times[S - 1];
+  for (let t = 0; t < S; t++) found.timing[at * S + t] = times[t] / ((times[S - 1] || 1) * Math.sqrt(S));
+  fillShapes(own, d, found.shapes, at, Math.sqrt(S));
+}
+
+/**
+ * Every stored movement at every progress; made once.
+ * @param {import("./recognition.js").Known} known
+ */
+export function hypotheses(known) {
+  const { header, arrays } = known;
+  const { early, comparison, n_movements: m } = header;
+  const G = early.n_progress;
+  const progress = Float64Array.from({ length: G }, (_, g) => (g + 1) / G);
+  const prefixes = beginnings(arrays.paths, comparison.n_dims, progress, early.shapes);
+  const S = early.shapes.n_segments + 1;
+  const each = (value) => Float64Array.from({ length: m * G }, (_, h) => value(h));
+  return {
+    known, progress, prefixes, S,
+    logLengths: each((h) => finiteLog(prefixes.lengths[h])),
+    logDurations: each((h) => finiteLog(arrays.durations[Math.floor(h / G)] * prefixes.elapsed[h])),
+    timingSquares: each((h) => product(prefixes.timing, h * S, prefixes.timing, h * S, S)),
+  };
+}
