@@ -434,14 +434,17 @@ def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
     folder = make_letters(tmp_path / "letters", shown=2)
     studio = Running(folder)
     page = opened(studio, tolerated=("net::ERR_", "WebSocket connection"))
+    draw(page, letters("GShape")[SHOWN], share=0.9)
+    wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'GShape'")
     studio.end(signal.SIGKILL)
     wait_until(page, "!document.getElementById('away-note').hidden")
-    draw(page, letters("GShape")[SHOWN])
+    page.mouse.up()
     with running(folder, "--port", studio.address.rpartition(":")[2]):
-        wait_until(page, "document.getElementById('away-note').hidden")
-        draw(page, letters("GShape")[SHOWN])
-        wait_until(page, ANSWERED)
+        wait_until(page, ANSWERED)  # what was drawn is sent anew, from its beginning
         assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+        draw(page, letters("CShape")[SHOWN])
+        wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'CShape'")
+        wait_until(page, ANSWERED)
         page.close()
 
 

@@ -102,6 +102,46 @@ def test_the_canvas_is_as_high_as_the_movements_of_the_library_in_powers_of_ten(
     assert heights == [1, 1, 1, 100, 0.01, 100, 100, 1, 10]
 
 
+SENDS = """const { Sending } = await import(`${process.argv[1]}/draw/sending.js`);
+let [here, sent] = [true, []];
+const sending = new Sending((message) => here && sent.push("samples" in message ? message.samples : Object.keys(message)[0]) > 0);
+const samples = (from, to) => Array.from({ length: to - from }, (_, k) => [from + k]);
+const said = () => sent.splice(0).map((one) => (typeof one === "string" ? one : [one[0][0], one.at(-1)[0]]));
+const told = {};
+sending.reset();
+sending.push(samples(0, 10));
+sending.push(samples(10, 20)); // waits for the answer to the first
+told.one = said();
+here = false; // while it is drawn
+sending.push(samples(20, 30));
+here = true;
+sending.renewed();
+sending.push(samples(30, 7000));
+sending.heard();
+sending.finish();
+sending.heard();
+told.again = said();
+sending.renewed(); // after its end, before the answer
+sending.heard();
+sending.heard();
+told.asked = said();
+told.wanted = sending.answered();
+sending.renewed();
+told.answered = said();
+console.log(JSON.stringify(told));"""
+
+
+@needs_node
+def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modules):
+    assert _in_node(SENDS, modules) == {
+        "one": ["reset", [0, 9]],
+        "again": [[0, 29], [30, 5029], [5030, 6999]],
+        "asked": [[0, 4999], [5000, 6999], "finish"],
+        "wanted": True,
+        "answered": [],
+    }
+
+
 REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
 let [version, asked, fails] = [1, 0, false];
 const told = [];
