@@ -306,6 +306,23 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     assert page.evaluate("document.activeElement.id") != "naming-name"
 
 
+def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened, served_letters):
+    page = opened(served_letters, has_touch=True)
+    x, y = center(page, "#draw-canvas")
+    client = page.context.new_cdp_session(page)
+    client.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x + 200, "y": y + 100}]})
+    pen = {"pointerType": "pen", "button": "left", "clickCount": 1, "force": 0.5}
+    for k, kind in enumerate(["mousePressed", *["mouseMoved"] * 30]):
+        at = {"x": x + 4 * k, "y": y - 50 * np.sin(k / 5)}
+        client.send("Input.dispatchMouseEvent", {"type": kind, **at, **pen, "buttons": 1})
+    assert page.inner_text("#verdict-kind") not in {"Too short", "The answer"}
+    client.send("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": x, "y": y, "pointerType": "pen", "buttons": 0})
+    wait_until(page, ANSWERED)
+    client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    draw(page, letters("GShape")[SHOWN])
+    wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'GShape'")
+
+
 def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_letters, monkeypatch):
     page = opened(served_letters)
     shown = page.locator("#live-source-text pre").all_text_contents()

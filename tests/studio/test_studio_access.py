@@ -46,6 +46,11 @@ def test_the_address_with_the_token_sets_a_cookie_that_scripts_and_other_sites_c
     assert client.get("/api/library", headers=bare).status_code == 200  # the client kept it
 
 
+def test_two_studios_on_one_machine_have_cookies_of_their_own():
+    """Browsers send a cookie to every port of a host."""
+    assert access.Guard(None, TOKEN).cookie == access.Guard(None, TOKEN).cookie != access.Guard(None, "other").cookie
+
+
 def test_the_address_of_the_browser_opens_once_and_does_not_hold_the_token(folder, open_studio):
     client, bare, once = (
         open_studio(folder, once="a-code-for-tests"),
@@ -186,11 +191,25 @@ def test_every_answer_tells_browsers_to_keep_to_this_server(client, path):
     policy = dict(part.strip().partition(" ")[::2] for part in headers["content-security-policy"].split(";"))
     assert policy["default-src"] == "'none'"
     assert policy["script-src"] == policy["style-src"] == "'self'"
-    assert policy["frame-ancestors"] == "'none'"
+    assert policy["frame-ancestors"] == policy["base-uri"] == policy["form-action"] == "'none'"
     assert "unsafe" not in headers["content-security-policy"]
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["referrer-policy"] == "no-referrer"
     assert headers["x-frame-options"] == "DENY"
+    assert headers["cross-origin-resource-policy"] == headers["cross-origin-opener-policy"] == "same-origin"
+
+
+def test_nobody_writes_into_the_policy(client):
+    for host in ("127.0.0.1:1; script-src *", "127.0.0.1:1,x", "127.0.0.1:1 *"):
+        assert "*" not in client.get("/", headers={"Host": host}).headers["content-security-policy"]
+
+
+def test_secrets_are_compared_in_constant_time(client, monkeypatch):
+    compared = []
+    monkeypatch.setattr(access.hmac, "compare_digest", lambda a, b: compared.append((a, b)))
+    assert client.get("/", params={"token": "x"}, headers={"Authorization": f"Bearer {TOKEN}"}).status_code == 401
+    assert {one for one, _ in compared} == {b"", b"x", TOKEN.encode()}
+    assert {secret for _, secret in compared} == {TOKEN.encode()}
 
 
 def test_refusals_tell_it_too(client):
@@ -297,11 +316,17 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-def test_every_writing_route_is_among_those(client):
-    writing = set()
+READING = {"/recognize", "/rollout", "/primitive", "/export", "/robots/move", "/recordings", "/recordings/{key}/spotted"}
+
+
+def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):
+    client, writing = open_studio(folder, read_only=True), set()
     for path, methods in client.get("/api/openapi.json").json()["paths"].items():
-        writing |= {(method, path) for method in methods if path.startswith("/api/library") and method != "get"}
-    assert len(writing) == len(WRITES)
+        if path.removeprefix("/api") not in READING:
+            writing |= {(method, path) for method in methods if method != "get"}
+    assert len(writing) == len(WRITES) + 3  # of proposals and recordings
+    for method, path in writing:
+        assert client.request(method, path.replace("{key}", "x")).status_code == 403, path
 
 
 def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch, caplog):

@@ -169,9 +169,11 @@ const placeOf = (event) => {
 };
 
 function down(event) {
-  if (state.pointer !== null || event.button > 0) return;
+  const palm = state.kind === "touch" && event.pointerType === "pen"; // the hand came to rest before the pen
+  if ((state.pointer !== null && !palm) || event.button > 0) return;
   element("stage").setPointerCapture(event.pointerId);
   state.pointer = event.pointerId;
+  state.kind = event.pointerType;
   state.played = null;
   state.held = state.moving?.held(stage, placeOf(event)) ?? null;
   if (state.held) return;
@@ -191,6 +193,7 @@ function take(event) {
 
 function move(event) {
   if (event.pointerId !== state.pointer) return hover(event);
+  if (!event.buttons) return up(event); // lifted where the page did not hear it
   if (state.held) {
     const like = state.held.what === "via" ? box.center : state.moving[state.held.what];
     state.note = state.moving.drag(state.held, stage.unproject(...placeOf(event), like)) ?? "";
