@@ -246,7 +246,7 @@ function play() {
   const duration = moving.times.at(-1);
   const step = (now) => {
     if (state.moving !== moving || state.pointer !== null) return;
-    const share = still ? 1 : Math.min((now - begun) / 1000 / duration, 1);
+    const share = still ? 1 : Math.min(Math.max(now - begun, 0) / 1000 / duration, 1); // a frame may be older than its wish
     state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
     later();
     if (share < 1) requestAnimationFrame(step);
