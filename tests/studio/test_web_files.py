@@ -128,6 +128,17 @@ told.asked = said();
 told.wanted = sending.answered();
 sending.renewed();
 told.answered = said();
+const draw = (from, to) => (sending.reset(), sending.push(samples(from, to)));
+draw(0, 5);
+sending.finish();
+sending.heard();
+draw(5, 9);
+sending.heard();
+sending.finish();
+told.answers = [sending.answered(), sending.answered()]; // the first is to the movement before
+draw(0, 5);
+draw(5, 9); // before the state of the one before came
+told.stale = [sending.heard(), sending.heard()];
 console.log(JSON.stringify(told));"""
 
 
@@ -139,6 +150,8 @@ def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modul
         "asked": [[0, 4999], [5000, 6999], "finish"],
         "wanted": True,
         "answered": [],
+        "answers": [False, True],
+        "stale": [False, True],
     }
 
 
