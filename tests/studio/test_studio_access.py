@@ -316,7 +316,8 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-READING = {"/recognize", "/rollout", "/primitive", "/export", "/robots/move", "/recordings", "/recordings/{key}/spotted"}
+READING = {f"/{one}" for one in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING.add("/recordings/{key}/spotted")
 
 
 def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):

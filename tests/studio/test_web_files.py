@@ -104,7 +104,8 @@ def test_the_canvas_is_as_high_as_the_movements_of_the_library_in_powers_of_ten(
 
 SENDS = """const { Sending } = await import(`${process.argv[1]}/draw/sending.js`);
 let [here, sent] = [true, []];
-const sending = new Sending((message) => here && sent.push("samples" in message ? message.samples : Object.keys(message)[0]) > 0);
+const what = (message) => message.samples ?? Object.keys(message)[0];
+const sending = new Sending((message) => here && sent.push(what(message)) > 0);
 const samples = (from, to) => Array.from({ length: to - from }, (_, k) => [from + k]);
 const said = () => sent.splice(0).map((one) => (typeof one === "string" ? one : [one[0][0], one.at(-1)[0]]));
 const told = {};
