@@ -262,6 +262,10 @@ def test_hostile_names_are_text(opened, studio, tmp_path):
     wait_until(page, "document.querySelectorAll('.chip').length > 0")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     assert page.locator("main img, main script").count() == 0
+    page.locator(".chip").first.click()
+    wait_for_text(page, "#verdict-kind", "Learned")
+    with kineme.ActionLibrary(folder, read_only=True) as library:
+        assert {one.name for one in library.symbols()} == set(HOSTILE)  # also where a name ends with a blank
 
 
 def test_movements_without_a_name_are_proposed_and_named_together(opened, studio, tmp_path):
