@@ -191,7 +191,7 @@ def test_reading_works_in_a_read_only_folder_and_writing_is_refused_there(open_p
 
 
 @pytest.mark.parametrize("gone", ["deleted", "replaced", "moved"])
-def test_a_file_that_vanished_is_not_written_to(folder, gone):
+def test_a_file_that_vanished_is_not_written_to_nor_called_damaged(folder, gone):
     with ActionLibrary(folder) as library:
         if gone == "moved":
             folder.rename(folder.with_name("elsewhere"))
@@ -201,6 +201,8 @@ def test_a_file_that_vanished_is_not_written_to(folder, gone):
                 (folder / FILE).write_bytes(b"something else")
         with pytest.raises(DataError, match=r"moved, deleted or replaced; nothing was written: put it back"):
             library.learn(draw_movements(3, seed=5))
+        with pytest.raises(DataError, match=r"moved, deleted or replaced; nothing was read: put it back"):
+            library.movements()
 
 
 def test_a_library_of_a_later_version_is_refused_and_left_alone(folder):

@@ -172,8 +172,14 @@ def test_the_path_follows_the_goal_without_asking_the_server(opened, served_lett
 def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    settle(page)
+    firsts = iter([True])  # how it was shown, but not how it moves
+    page.route("**/api/rollout", lambda route: route.continue_() if next(firsts, False) else None)
+    page.click("#move-reset")
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
     page.click("#add-via")
     assert page.evaluate("document.activeElement.getAttribute('aria-label')").startswith("Via point 1 at")
+    page.unroute("**/api/rollout")
     for _ in range(6):
         page.keyboard.press("Shift+ArrowUp")
     wait_until(
@@ -294,6 +300,10 @@ def test_hostile_names_are_text(opened, studio, tmp_path):
     wait_until(page, "document.querySelectorAll('.chip').length > 0")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     assert page.locator("main img, main script").count() == 0
+    page.locator(".chip").first.click()
+    wait_for_text(page, "#verdict-kind", "Learned")
+    with kineme.ActionLibrary(folder, read_only=True) as library:
+        assert {one.name for one in library.symbols()} == set(HOSTILE)  # also where a name ends with a blank
 
 
 def test_movements_without_a_name_are_proposed_and_named_together(opened, studio, tmp_path):
@@ -340,6 +350,23 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     assert page.inner_text(".rank:first-child .rank-name") == "GShape"
     assert page.evaluate("window.scrollY") == 0
     assert page.evaluate("window.focused") is None
+
+
+def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened, served_letters):
+    page = opened(served_letters, has_touch=True)
+    x, y = center(page, "#draw-canvas")
+    client = page.context.new_cdp_session(page)
+    client.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x + 200, "y": y + 100}]})
+    pen = {"pointerType": "pen", "button": "left", "clickCount": 1, "force": 0.5}
+    for k, kind in enumerate(["mousePressed", *["mouseMoved"] * 30]):
+        at = {"x": x + 4 * k, "y": y - 50 * np.sin(k / 5)}
+        client.send("Input.dispatchMouseEvent", {"type": kind, **at, **pen, "buttons": 1})
+    assert page.inner_text("#verdict-kind") not in {"Too short", "The answer"}
+    client.send("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": x, "y": y, "pointerType": "pen", "buttons": 0})
+    wait_until(page, ANSWERED)
+    client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    draw(page, letters("GShape")[SHOWN])
+    wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'GShape'")
 
 
 def test_the_program_that_the_page_shows_is_followed_by_the_page(opened, served_letters, monkeypatch):
@@ -485,14 +512,19 @@ def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
     folder = make_letters(tmp_path / "letters", shown=2)
     studio = Running(folder, "--port", _free_port())  # where it listens again
     page = opened(studio, tolerated=("net::ERR_", "WebSocket connection"))
+    draw(page, letters("GShape")[SHOWN], share=0.9)
+    wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'GShape'")
     studio.end(signal.SIGKILL)
     wait_until(page, "!document.getElementById('away-note').hidden")
-    draw(page, letters("GShape")[SHOWN])
+    page.mouse.up()
     wait_for_text(page, "#verdict-kind", "No answer yet")
     with running(folder, "--port", studio.address.rpartition(":")[2]):
         wait_until(page, "document.getElementById('away-note').hidden")
-        wait_until(page, ANSWERED)  # to what was drawn meanwhile
+        wait_until(page, ANSWERED)  # what was drawn is sent anew, from its beginning
         assert page.inner_text(".rank:first-child .rank-name") == "GShape"
+        draw(page, letters("CShape")[SHOWN])
+        wait_until(page, "document.querySelector('.rank .rank-name').textContent === 'CShape'")
+        wait_until(page, ANSWERED)
         page.close()
 
 

@@ -46,6 +46,11 @@ def test_the_address_with_the_token_sets_a_cookie_that_scripts_and_other_sites_c
     assert client.get("/api/library", headers=bare).status_code == 200  # the client kept it
 
 
+def test_two_studios_on_one_machine_have_cookies_of_their_own():
+    """Browsers send a cookie to every port of a host."""
+    assert access.Guard(None, TOKEN).cookie == access.Guard(None, TOKEN).cookie != access.Guard(None, "other").cookie
+
+
 def test_the_address_of_the_browser_opens_once_and_does_not_hold_the_token(folder, open_studio):
     client, bare, once = (
         open_studio(folder, once="a-code-for-tests"),
@@ -186,11 +191,25 @@ def test_every_answer_tells_browsers_to_keep_to_this_server(client, path):
     policy = dict(part.strip().partition(" ")[::2] for part in headers["content-security-policy"].split(";"))
     assert policy["default-src"] == "'none'"
     assert policy["script-src"] == policy["style-src"] == "'self'"
-    assert policy["frame-ancestors"] == "'none'"
+    assert policy["frame-ancestors"] == policy["base-uri"] == policy["form-action"] == "'none'"
     assert "unsafe" not in headers["content-security-policy"]
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["referrer-policy"] == "no-referrer"
     assert headers["x-frame-options"] == "DENY"
+    assert headers["cross-origin-resource-policy"] == headers["cross-origin-opener-policy"] == "same-origin"
+
+
+def test_nobody_writes_into_the_policy(client):
+    for host in ("127.0.0.1:1; script-src *", "127.0.0.1:1,x", "127.0.0.1:1 *"):
+        assert "*" not in client.get("/", headers={"Host": host}).headers["content-security-policy"]
+
+
+def test_secrets_are_compared_in_constant_time(client, monkeypatch):
+    compared = []
+    monkeypatch.setattr(access.hmac, "compare_digest", lambda a, b: compared.append((a, b)))
+    assert client.get("/", params={"token": "x"}, headers={"Authorization": f"Bearer {TOKEN}"}).status_code == 401
+    assert {one for one, _ in compared} == {b"", b"x", TOKEN.encode()}
+    assert {secret for _, secret in compared} == {TOKEN.encode()}
 
 
 def test_refusals_tell_it_too(client):
@@ -248,6 +267,30 @@ def test_nonsense_is_refused_in_a_sentence_and_changes_nothing(client, path, bod
     assert client.get("/api/library").json()["version"] == version
 
 
+def _texts(schema, every):
+    """What a schema says of each text in it."""
+    if isinstance(schema, dict):
+        if "$ref" in schema:
+            yield from _texts(every[schema["$ref"].rpartition("/")[2]], every)
+        if schema.get("type") == "string" and "enum" not in schema:
+            yield schema
+        schema = list(schema.values())
+    for one in schema if isinstance(schema, list) else ():
+        yield from _texts(one, every)
+
+
+def test_texts_are_limited_and_hold_whole_characters(client):
+    """A limit makes both so; JSON can hold half of a character, which no answer, file or library can."""
+    described = client.get("/api/openapi.json").json()
+    for path, methods in described["paths"].items():
+        for one in methods.values():
+            body = one.get("requestBody", {}).get("content", {}).get("application/json", {})
+            assert all("maxLength" in text for text in _texts(body, described["components"]["schemas"])), path
+    body, kind = json.dumps({"what": {"symbol": "\ud800"}}), {"Content-Type": "application/json"}
+    half = client.post("/api/rollout", content=body, headers=kind)
+    assert (half.status_code, "what.symbol" in half.json()["error"]) == (422, True)
+
+
 WRITES = [
     ("post", "/api/library/movements", asked(5, label="x")),
     ("post", "/api/library/movements/assign", {"ids": [1], "symbol": "x"}),
@@ -273,11 +316,18 @@ def test_for_reading_only_every_change_is_refused(folder, open_studio):
     assert client.get("/api/library").json() == before
 
 
-def test_every_writing_route_is_among_those(client):
-    writing = set()
+READING = {f"/{one}" for one in ("recognize", "rollout", "primitive", "export", "robots/move", "recordings")}
+READING.add("/recordings/{key}/spotted")
+
+
+def test_every_other_route_that_does_not_only_read_is_refused_too(folder, open_studio):
+    client, writing = open_studio(folder, read_only=True), set()
     for path, methods in client.get("/api/openapi.json").json()["paths"].items():
-        writing |= {(method, path) for method in methods if path.startswith("/api/library") and method != "get"}
-    assert len(writing) == len(WRITES)
+        if path.removeprefix("/api") not in READING:
+            writing |= {(method, path) for method in methods if method != "get"}
+    assert len(writing) == len(WRITES) + 3  # of proposals and recordings
+    for method, path in writing:
+        assert client.request(method, path.replace("{key}", "x")).status_code == 403, path
 
 
 def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch, caplog):
@@ -288,7 +338,8 @@ def test_an_error_of_our_own_is_no_traceback_for_the_client(client, monkeypatch,
     answer = client.get("/api/library/movements?symbol=x")
     assert answer.status_code == 500
     assert "secret" not in answer.text
-    assert "secret" in caplog.text
+    assert caplog.text.count("RuntimeError: secret") == 1
+    assert "script-src 'self'" in answer.headers["content-security-policy"]
 
 
 def test_the_interface_is_described(client):

@@ -342,7 +342,11 @@ def test_drawings_of_more_than_a_thousand_samples_are_taken(client):
     times, positions = drawing(2, n=5000, seed=7)
     long = {"times": times.tolist(), "positions": positions.tolist()}
     assert client.post("/api/recognize", json=long).json()["label"] == "kind 2"
-    assert client.post("/api/library/movements", json={**long, "label": "kind 2"}).status_code == 200
+    stored = client.post("/api/library/movements", json={**long, "label": "kind 2"}).json()["ids"]
+    shown = client.get("/api/library/movements?limit=500").json()["movements"]
+    path = next(one["path"] for one in shown if one["id"] == stored[0])
+    assert len(path) <= 64
+    assert np.array(path)[[0, -1]] == pytest.approx(positions[[0, -1]], abs=1e-3)
 
 
 def _array(given):

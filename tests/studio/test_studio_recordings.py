@@ -26,8 +26,8 @@ from kineme.studio.server import work as work_module
 from kineme.studio.server.refusals import MissingError
 
 
-def _table(*kinds, rest=0.6, heads="t,x,y"):
-    """A recording of drawings with rests between, and when each begins and ends."""
+def _table(*kinds, rest=0.6, heads="t,x,y", clock=0.0):
+    """A recording of drawings with rests between, and when each begins and ends, from its first sample on."""
     times, rows, spans, now, at = [], [], [], 0.0, np.zeros(2)
     for k in kinds:
         still = np.arange(0, rest, 0.025)
@@ -40,7 +40,7 @@ def _table(*kinds, rest=0.6, heads="t,x,y"):
         rows += list(at + x - x[0])
         now, at = now + t[-1] + 0.025, at + x[-1] - x[0]
     text = io.StringIO()
-    np.savetxt(text, np.column_stack((times, rows)), "%.6f", ",", header=heads, comments="")
+    np.savetxt(text, np.column_stack((np.add(times, clock), rows)), "%.6f", ",", header=heads, comments="")
     return text.getvalue().encode(), spans
 
 
@@ -49,7 +49,7 @@ def _send(client, data, name="drawn.csv"):
 
 
 def test_a_recording_is_read_searched_corrected_and_learned(client):
-    data, spans = _table(0, 2, 1)
+    data, spans = _table(0, 2, 1, clock=1e6)
     read = _send(client, data, "my%20drawing%20%E2%82%AC.csv")
     assert read.status_code == 200, read.text
     read = read.json()
@@ -57,8 +57,10 @@ def test_a_recording_is_read_searched_corrected_and_learned(client):
     table = read["tables"][0]
     assert [one["name"] for one in table["channels"]] == ["x", "y"]
     assert table["rate"] == pytest.approx(40, rel=0.1)
-    assert [one["name"] for one in read["plots"][0]["columns"]] == ["x", "y"]
-    assert len(read["plots"][0]["times"]) == len(read["plots"][0]["columns"][0]["values"]) <= 1000
+    plot = read["plots"][0]
+    assert [one["name"] for one in plot["columns"]] == ["x", "y"]
+    assert len(plot["times"]) == len(plot["columns"][0]["values"]) <= 1000
+    assert (plot["times"][0], plot["times"][-1]) == (0, pytest.approx(table["duration"]))
     found = client.post(f"/api/recordings/{read['recording']}/spotted", json={}).json()
     known = [one for one in found["spans"] if one["label"]]
     assert {one["label"] for one in known} <= {"kind 0", "kind 1", "kind 2"}

@@ -121,6 +121,60 @@ def test_movements_in_space_are_seen_from_the_front_where_they_are_flat(modules)
     np.testing.assert_allclose(seen, [[0, np.pi / 2], [0, 0], [np.pi / 2, 0], [-0.6, 0.5]])
 
 
+SENDS = """const { Sending } = await import(`${process.argv[1]}/draw/sending.js`);
+let [here, sent] = [true, []];
+const what = (message) => message.samples ?? Object.keys(message)[0];
+const sending = new Sending((message) => here && sent.push(what(message)) > 0);
+const samples = (from, to) => Array.from({ length: to - from }, (_, k) => [from + k]);
+const said = () => sent.splice(0).map((one) => (typeof one === "string" ? one : [one[0][0], one.at(-1)[0]]));
+const told = {};
+sending.reset();
+sending.push(samples(0, 10));
+sending.push(samples(10, 20)); // waits for the answer to the first
+told.one = said();
+here = false; // while it is drawn
+sending.push(samples(20, 30));
+here = true;
+sending.renewed();
+sending.push(samples(30, 7000));
+sending.heard();
+sending.finish();
+sending.heard();
+told.again = said();
+sending.renewed(); // after its end, before the answer
+sending.heard();
+sending.heard();
+told.asked = said();
+told.wanted = sending.answered();
+sending.renewed();
+told.answered = said();
+const draw = (from, to) => (sending.reset(), sending.push(samples(from, to)));
+draw(0, 5);
+sending.finish();
+sending.heard();
+draw(5, 9);
+sending.heard();
+sending.finish();
+told.answers = [sending.answered(), sending.answered()]; // the first is to the movement before
+draw(0, 5);
+draw(5, 9); // before the state of the one before came
+told.stale = [sending.heard(), sending.heard()];
+console.log(JSON.stringify(told));"""
+
+
+@needs_node
+def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modules):
+    assert _in_node(SENDS, modules) == {
+        "one": ["reset", [0, 9]],
+        "again": [[0, 29], [30, 5029], [5030, 6999]],
+        "asked": [[0, 4999], [5000, 6999], "finish"],
+        "wanted": True,
+        "answered": [],
+        "answers": [False, True],
+        "stale": [False, True],
+    }
+
+
 REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
 let [version, asked, fails, tag] = [1, 0, false, null];
 const told = [];

@@ -139,7 +139,14 @@ class Store:
 
     @property
     def size(self) -> int:
-        """Bytes of the database and of its log."""
+        """Bytes of the database and of its log.
+
+        Raises
+        ------
+        DataError
+            The file was moved, deleted or replaced.
+        """
+        self._check_there("read")
         return size_of(self.path)
 
     @property

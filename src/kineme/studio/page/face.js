@@ -160,9 +160,11 @@ const placeOf = (event) => {
 };
 
 function down(event) {
-  if (state.pointer !== null || event.button > 0) return;
+  const palm = state.kind === "touch" && event.pointerType === "pen"; // the hand came to rest before the pen
+  if ((state.pointer !== null && !palm) || event.button > 0) return;
   element("stage").setPointerCapture(event.pointerId);
   state.pointer = event.pointerId;
+  state.kind = event.pointerType;
   state.played = null;
   state.held = state.moving?.held(stage, placeOf(event)) ?? null;
   if (state.held) return;
@@ -182,6 +184,7 @@ function take(event) {
 
 function move(event) {
   if (event.pointerId !== state.pointer) return hover(event);
+  if (!event.buttons) return up(event); // lifted where the page did not hear it
   if (state.held) {
     const like = state.held.what === "via" ? box.center : state.moving[state.held.what];
     state.note = state.moving.drag(state.held, stage.unproject(...placeOf(event), like)) ?? "";
@@ -234,7 +237,7 @@ function play() {
   const duration = moving.times.at(-1);
   const step = (now) => {
     if (state.moving !== moving || state.pointer !== null) return;
-    const share = still ? 1 : Math.min((now - begun) / 1000 / duration, 1);
+    const share = still ? 1 : Math.min(Math.max(now - begun, 0) / 1000 / duration, 1); // a frame may be older than its wish
     state.played = share < 1 || still ? Math.round(share * (moving.positions.length - 1)) : null;
     later();
     if (share < 1) requestAnimationFrame(step);

@@ -26,7 +26,7 @@ from kineme.studio.server.bodies import LimitedBodies
 from kineme.studio.server.changes import Changes, LooksAfterChanges
 from kineme.studio.server.description import ABOUT, REFUSALS, Described
 from kineme.studio.server.live_sources import Sources
-from kineme.studio.server.refusals import answer_errors
+from kineme.studio.server.refusals import AnswersFailures, answer_errors
 from kineme.studio.server.static_files import StaticFiles
 from kineme.studio.server.studio import Studio
 
@@ -85,6 +85,7 @@ def create_app(
     app.add_middleware(LooksAfterChanges)
     app.add_middleware(LimitedBodies)
     app.add_middleware(StaticFiles)
+    app.add_middleware(AnswersFailures)
     app.add_middleware(Guard, token=token, once=once, hosts=hosts)
     return app
 

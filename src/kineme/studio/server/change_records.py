@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from kineme.studio.server.records import Change, Ids, Name, Point, Times
+from kineme.studio.server.records import Change, Description, Ids, Name, Point, Text, Times
 
 
 class NewMovement(Change):
@@ -31,7 +31,7 @@ class Rename(Change):
 class Describe(Change):
     """A description of a symbol."""
 
-    text: str = Field(max_length=1_000_000)
+    text: Description
 
 
 class Split(Change):
@@ -44,7 +44,7 @@ class Split(Change):
 class Merge(Change):
     """Symbols that become one."""
 
-    ids: list[str] = Field(min_length=1, max_length=10_000)
+    ids: list[Text] = Field(min_length=1, max_length=10_000)
     into: Name
 
 

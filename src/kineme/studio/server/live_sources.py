@@ -157,9 +157,9 @@ def parsed_name(given: Any) -> str:
     Raises
     ------
     TrajectoryError
-        Anything but some characters.
+        Anything but some characters; halves of them cannot be sent on.
     """
     name = given.strip() if isinstance(given, str) else ""
-    if not 0 < len(name) <= LONGEST:
+    if not 0 < len(name) <= LONGEST or any("\ud800" <= mark <= "\udfff" for mark in name):
         raise TrajectoryError(f"expected a name of 1 to {LONGEST} characters, got something else; send one")
     return name

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from kineme.studio.server.records import Change, Name, Points
+from kineme.studio.server.records import Change, Description, Name, Points
 
 
 class Named(Change):
     """A name for a proposal."""
 
     name: Name
-    description: str | None = None
+    description: Description | None = None
 
 
 class ProposalOut(BaseModel):

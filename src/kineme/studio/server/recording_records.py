@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
-from kineme.studio.server.records import Change, ChannelOut, Name, Number, Sent
+from kineme.studio.server.records import Change, ChannelOut, Name, Number, Sent, Text
 
 
 class ChannelsAsked(Change):
     """Which table of a recording, and which of its columns; by default the first, and those that are found."""
 
-    table: str | None = None
-    channels: list[str] | None = Field(None, max_length=1000)
+    table: Text | None = None
+    channels: list[Text] | None = Field(None, max_length=1000)
 
 
 class Spotting(ChannelsAsked):

@@ -7,7 +7,10 @@ from typing import Annotated
 from fastapi import Path
 from pydantic import BaseModel, ConfigDict, Field
 
-Name = Annotated[str, Field(min_length=1, max_length=10_000)]
+#: With a limit pydantic also refuses halves of characters, which JSON can hold and which nothing can write.
+Text = Annotated[str, Field(max_length=10_000)]
+Name = Annotated[Text, Field(min_length=1)]
+Description = Annotated[str, Field(max_length=1_000_000)]
 Ids = Annotated[list[int], Field(min_length=1, max_length=1_000_000)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=1, max_length=1000)]

@@ -11,7 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse
-from starlette.types import Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.errors import KinemeError
 from kineme.library.storage.sqlite_errors import BusyError
@@ -38,10 +38,38 @@ async def refuse(scope: Scope, send: Send, status: int, text: str) -> None:
         name == b"accept" and b"text/html" in value for name, value in scope["headers"]
     )
     kind, body = (b"text/html; charset=utf-8", _page(text)) if as_page else (b"application/json", _plain(text))
-    headers = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
-    if status in {408, 413}:  # the rest of the body is not read
-        headers.append((b"connection", b"close"))
-    await send({"type": "http.response.start", "status": status, "headers": headers})
+    more = [(b"connection", b"close")] if status in {408, 413} else []  # the rest of the body is not read
+    await _answer(send, status, [(b"content-type", kind), *more], body)
+
+
+class AnswersFailures:
+    """Answer where the server itself fails: the framework would answer outside of the guard, without its headers."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on; what failed stands in the log alone."""
+        begun = scope["type"] != "http"
+
+        async def noted(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        try:
+            await self.app(scope, receive, noted)
+        except Exception:
+            if begun:
+                raise
+            _LOG.exception("%s %s failed", scope["method"], scope["path"])
+            text = _plain("the server failed at this, and goes on; what it was is in its window")
+            await _answer(send, 500, [(b"content-type", b"application/json")], text)
+
+
+async def _answer(send: Send, status: int, headers: list[tuple[bytes, bytes]], body: bytes) -> None:
+    length = (b"content-length", str(len(body)).encode())
+    await send({"type": "http.response.start", "status": status, "headers": [*headers, length]})
     await send({"type": "http.response.body", "body": body})
 
 
@@ -90,10 +118,6 @@ def answer_errors(app: FastAPI) -> None:
     async def other(_: Request, error: Any) -> JSONResponse:
         return answer(error.status_code, str(error.detail))
 
-    async def broken(request: Request, error: Any) -> JSONResponse:
-        _LOG.error("%s %s failed", request.method, request.url.path, exc_info=error)
-        return answer(500, "the server failed at this, and goes on; what it was is in its window")
-
     for kind, handler in (
         (KinemeError, refused),
         (MissingError, missing),
@@ -103,7 +127,6 @@ def answer_errors(app: FastAPI) -> None:
         (RequestValidationError, invalid),
         (ClientDisconnect, gone),
         (HTTPException, other),
-        (Exception, broken),
     ):
         app.add_exception_handler(kind, handler)
 

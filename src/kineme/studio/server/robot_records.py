@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
-from kineme.studio.server.records import Number, Point
+from kineme.studio.server.records import Number, Point, Text
 from kineme.studio.server.rollout_records import Operated
 
 
@@ -24,7 +24,7 @@ class ArmWanted(Operated):
     Instead of a goal, `displacement` is the way from start to goal in the unit of the library.
     """
 
-    robot: str
+    robot: Text
     at: Point | None = None
     goal: Point | None = None
     displacement: Point | None = None

@@ -7,20 +7,20 @@ from typing import Any, Self
 from pydantic import BaseModel, Field, model_validator
 
 from kineme.files.write_movement import WRITERS
-from kineme.studio.server.records import Number, Point, Points, Sent
+from kineme.studio.server.records import Number, Point, Points, Sent, Text
 
 
 class Style(Sent):
     """A symbol with values of the directions in which its members differ."""
 
-    symbol: str
+    symbol: Text
     values: list[Number] = Field(min_length=1, max_length=100)
 
 
 class What(Sent):
     """What moves: the prototype of a symbol, a stored movement, or a style of a symbol; one of the three."""
 
-    symbol: str | None = None
+    symbol: Text | None = None
     movement: int | None = None
     style: Style | None = None
 
@@ -42,7 +42,7 @@ class Operated(Sent):
     """A primitive, in the formulation of the library or in another one."""
 
     what: What
-    formulation: str | None = None
+    formulation: Text | None = None
 
 
 class Wanted(Operated):
@@ -59,7 +59,7 @@ class Wanted(Operated):
 class Exported(Wanted):
     """The same as a file."""
 
-    format: str = Field(description=f"One of {', '.join(WRITERS)}.")
+    format: Text = Field(description=f"One of {', '.join(WRITERS)}.")
 
 
 class Moved(BaseModel):

@@ -10,16 +10,16 @@ export function startNaming(page) {
   /** @param {string|null} name */
   const keep = async (name) => {
     const drawn = page.drawn();
-    if (!drawn || (name !== null && !name.trim())) return;
+    if (!drawn || name === "") return;
     byId("naming-learn").disabled = true;
-    const done = await learn(drawn, name === null ? null : name.trim());
+    const done = await learn(drawn, name);
     byId("naming-learn").disabled = !page.drawn();
-    if (done && page.drawn() === drawn) page.learned(name === null ? null : name.trim()); // not where another is drawn by now
+    if (done && page.drawn() === drawn) page.learned(name); // not where another is drawn by now
   };
 
   byId("naming").addEventListener("submit", (/** @type {Event} */ event) => {
     event.preventDefault();
-    keep(field.value);
+    keep(field.value.trim());
   });
   byId("draw-save").addEventListener("click", () => keep(null));
 

@@ -8,6 +8,7 @@
  */
 export function followPointer(canvas, hear) {
   let pointer = null;
+  let kind = "";
   let last = -Infinity;
   let first = 0;
 
@@ -34,8 +35,10 @@ export function followPointer(canvas, hear) {
   };
 
   canvas.addEventListener("pointerdown", (event) => {
-    if (pointer !== null || event.button !== 0 || !hear.begins(event.pointerType)) return;
+    const palm = kind === "touch" && event.pointerType === "pen"; // the hand came to rest before the pen
+    if ((pointer !== null && !palm) || event.button !== 0 || !hear.begins(event.pointerType)) return;
     pointer = event.pointerId;
+    kind = event.pointerType;
     canvas.setPointerCapture(pointer);
     first = event.timeStamp;
     last = -Infinity;
@@ -43,6 +46,7 @@ export function followPointer(canvas, hear) {
   });
   const goes = (/** @type {PointerEvent} */ event) => {
     if (event.pointerId !== pointer) return;
+    if (!event.buttons) return end(event); // lifted where the page did not hear it
     const samples = samplesOf(event);
     if (samples.length) hear.goes(samples);
   };

@@ -24,6 +24,8 @@ class Move {
     this.steps = new Steps();
     this.camera = new Camera();
     this.plan = null;
+    /** @type {{id: string}|null} */
+    this.chosen = null;
     this.version = -1;
     this.dragging = false;
     this.named = null;
@@ -64,14 +66,15 @@ class Move {
     for (const part of ["pick-part", "move-name", "move-tools", "move-plots", "move-panel"]) byId(part).hidden = id === null;
     for (const name of ["move-play", "add-via", "add-obstacle", "move-reset", "export", "duration"]) byId(name).disabled = id === null;
     showPick(id, (chosen) => this.choose(chosen));
-    if (id === null) this.plan = this.picture.plan = null;
-    else if (this.plan?.symbol !== id || this.version !== version) this.choose(id);
+    if (id === null) this.plan = this.picture.plan = this.chosen = null;
+    else if (this.chosen?.id !== id || this.version !== version) this.choose(id);
   }
 
   /** @param {string|undefined} id Start anew with this symbol. */
   async choose(id) {
     const symbol = id && symbolOf(id);
     if (!symbol) return;
+    const chosen = (this.chosen = { id: symbol.id });
     chooseToMove(symbol.id);
     this.version = library().version;
     this.plan = null;
@@ -81,7 +84,8 @@ class Move {
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
-    if (!rollout || toMove(library().symbols) !== symbol.id) return;
+    if (this.chosen !== chosen) return; // another one since then, or this one anew
+    if (!rollout) return void (this.chosen = null); // so that it is asked for again
     this.plan = this.picture.plan = asShown(symbol, rollout);
     for (const one of this.rollouts.values()) one.reset();
     byId("duration").value = "0";
@@ -213,21 +217,24 @@ class Move {
     this.structure();
   }
 
+  /** A point of the path that is shown, or of the recording as long as there is none. @param {number} share @returns {number[]} */
+  pointAt(share) {
+    const points = this.picture.paths[0]?.path.positions ?? this.plan.path;
+    return [...points[Math.round(share * (points.length - 1))]];
+  }
+
   addVia() {
-    const path = this.picture.paths[0]?.path;
-    if (!path) return;
+    if (!this.plan) return;
     const at = [0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875][this.plan.via.length % 7];
-    this.plan.via.push({ at, point: [...path.positions[Math.round(at * (path.positions.length - 1))]] });
+    this.plan.via.push({ at, point: this.pointAt(at) });
     this.structure();
     this.focusHandle(`via ${this.plan.via.length - 1}`);
   }
 
   addObstacle() {
-    const path = this.picture.paths[0]?.path;
-    if (!path) return;
+    if (!this.plan) return;
     const size = extent(this.plan.path);
-    const on = path.positions[Math.round(0.6 * (path.positions.length - 1))];
-    this.plan.obstacles.push({ center: on.map((/** @type {number} */ value, /** @type {number} */ k) => value + (k < 2 ? 0.08 * size : 0)), radius: 0.07 * size });
+    this.plan.obstacles.push({ center: this.pointAt(0.6).map((/** @type {number} */ value, /** @type {number} */ k) => value + (k < 2 ? 0.08 * size : 0)), radius: 0.07 * size });
     this.structure();
     this.focusHandle(`obstacle ${this.plan.obstacles.length - 1}`);
   }
