@@ -84,6 +84,15 @@ def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_p
     assert "left out CShape/bad.csv, line 3" in text
 
 
+def test_a_gripper_beside_which_joints_hardly_count_is_said(tmp_path):
+    rows = "".join(f"{k / 20},{k / 20},{k / 10},{4 * k}\n" for k in range(21))
+    (tmp_path / "pick.csv").write_text("t,j1,j2,gripper\n" + rows)
+    command = ("learn", tmp_path / "pick.csv", "--label", "pick", "-l", tmp_path / "actions")
+    (note,) = answer(*command)["notes"]
+    assert f"note: {note}" in run(*command)[1]
+    assert answer(*command[:-1], tmp_path / "others", "--kind", "gripper=discrete")["notes"] == []
+
+
 def test_labels_can_be_given_or_left_out(recordings, tmp_path):
     library = tmp_path / "actions"
     assert answer("learn", recordings / "CShape", "--no-labels", "-l", library)["symbols"] == []

@@ -52,6 +52,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.files.entries import root_of
+    from kineme.files.inspection.extents import notes_on_extents
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -78,6 +79,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "people": sorted({one for one in people or () if one is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
+            "notes": notes_on_extents(parsed.demonstrations),
         }
     say(as_json, data, lambda: _text(data))
 
@@ -170,4 +172,5 @@ def _text(data: dict[str, Any]) -> str:
     lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
     if len(problems) > _SHOWN:
         lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")
+    lines += [f"note: {printable(note)}" for note in data["notes"]]
     return "\n".join(lines)
