@@ -184,9 +184,9 @@ class ActionLibrary:
 
         Notes
         -----
-        A movement is stored already if its samples are, or its position in a file of the same content read with the
-        same options. Such a movement is added to the symbol of its label only if it belongs to none, and who showed it
-        is stored only if that was not known.
+        A movement is stored already if its samples are, in the precision of the library, or its position in a file of
+        the same content read with the same options. Such a movement is added to the symbol of its label only if it
+        belongs to none, and who showed it is stored only if that was not known.
         """
         from kineme.library.learning.learn import learn
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.library.learning.commit import Committed, commit, serialize_new
 from kineme.library.learning.deduplicate import Batch, find_stored
-from kineme.library.learning.serialize import check, digests, evenly_sampled
+from kineme.library.learning.digests import digests, exact_digests
+from kineme.library.learning.serialize import check, evenly_sampled
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
@@ -115,7 +116,8 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 
 def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any, Any]) -> Batch:
     """A batch ready to be committed; only what is new is serialized."""
-    batch = Batch(demos, digests(demos, evenly_sampled(demos)), *given)
+    even = evenly_sampled(demos)
+    batch = Batch(demos, digests(demos, even), exact_digests(demos, even), *given)
     with store.reading() as connection:
         stored = find_stored(connection, batch)
     new = [i for i in range(len(demos)) if stored.id_of(batch, i) is None]
