@@ -164,8 +164,11 @@ def test_a_proposal_that_was_accepted_is_one_change(library):
     version = library.version
     library.release(library.ids())
     proposal = library.propose(n_clusters=2, min_members=2)[0]
-    library.accept(proposal, "new")
-    assert library["new"].prototype == proposal.medoid
+    with pytest.raises(SpecificationError, match="expected a description, got 3"):
+        library.accept(proposal, "new", 3)
+    library.accept(proposal, "new", "down and up")
+    assert (library["new"].prototype, library["new"].description) == (proposal.medoid, "down and up")
+    assert library.history()[-1].detail["description"] == "down and up"
     library.undo()
     assert len(library.symbols()) == 2
     assert not np.concatenate([one.members for one in library.symbols()]).size

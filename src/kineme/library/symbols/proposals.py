@@ -126,8 +126,7 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
             f"expected movements without a symbol, all {len(proposal.members)} of this proposal show one by now; "
             "propose again"
         )
-    version = changes.assign(store, members, name, "anchored", proposal.medoid)
-    return version if description is None else changes.annotate(store, name, description=description)
+    return changes.assign(store, members, name, "anchored", proposal.medoid, description)
 
 
 def reject(store: Store, proposal: Proposal) -> int:
