@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
-from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
 from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
