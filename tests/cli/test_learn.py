@@ -80,7 +80,7 @@ def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_p
     assert learned["added"] == 14
     assert learned["problems"] == ["CShape/bad.csv, line 3: expected a number in 'y', got 'oops'"]
     text = start("learn", recordings, "-l", tmp_path / "actions").stdout
-    assert "14 known already" in text
+    assert "14 stored already" in text
     assert "left out CShape/bad.csv, line 3" in text
 
 
@@ -200,7 +200,7 @@ def test_a_label_that_is_not_taken_is_said(recordings, tmp_path):
     name = sorted(recordings.glob("*/*"))[0]
     answer("learn", name, "--label", "wave", "-l", tmp_path / "library")
     done = run("learn", name, "--label", "other", "-l", tmp_path / "library")
-    assert "1 movement known as wave already: the label other is not taken; kineme library" in done.stdout
+    assert "1 movement in wave already: the label other is not taken; kineme library" in done.stdout
     again = answer("learn", name, "--label", "other", "-l", tmp_path / "library")
     assert again["kept"] == [{"symbol": "wave", "label": "other", "movements": 1}]
     assert "no symbol" not in done.stdout

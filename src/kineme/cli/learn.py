@@ -154,14 +154,14 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
 def _text(data: dict[str, Any]) -> str:
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
-    known = f", {data['known']:,} known already{joined}" if data["known"] else ""
+    stored = f", {data['known']:,} stored already{joined}" if data["known"] else ""
     held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
     problems, people = data["problems"], data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""
-    lines = [f"learned {counted(data['added'], 'movement')}{known}{new}{by}; {held}"]
+    lines = [f"learned {counted(data['added'], 'movement')}{stored}{new}{by}; {held}"]
     for kept in data["kept"]:
         lines.append(
-            f"{counted(kept['movements'], 'movement')} known as {printable(kept['symbol'])} already: the label "
+            f"{counted(kept['movements'], 'movement')} in {printable(kept['symbol'])} already: the label "
             f"{printable(kept['label'])} is not taken; kineme library rename, merge and split change symbols"
         )
     if n := data["without_symbol"]:
