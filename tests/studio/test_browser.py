@@ -421,10 +421,11 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
     page.click("#learn-file")
     wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'of a file')")
+    says = "(words) => [...document.querySelectorAll('.toast')].some((one) => one.textContent.includes(words))"
+    wait_until(page, f"({says})('Learned the whole file')")
+    assert not page.evaluate(says, "Nothing is new")
     page.click("#learn-file")
-    wait_until(
-        page, "[...document.querySelectorAll('.toast')].some((one) => one.textContent.includes('Nothing is new'))"
-    )
+    wait_until(page, f"({says})('Nothing is new')")
     with kineme.ActionLibrary(tmp_path / "letters", read_only=True) as library:
         assert len(library["from a file"].members) == 1
         assert len(library["of a file"].members) == 2
