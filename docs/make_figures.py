@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from browser_pictures import pictures
 from concept_figures import SCRIPTS, drawn
 from guide_figures import (
     adapting,
@@ -72,6 +73,7 @@ def main(folder: Path) -> None:
         (folder / f"{name}.png").write_bytes(render(drawn(name), dpi=110)["png"])
     for walked, prefix in DRAWING.items():
         pictures_of_page(folder, walked, prefix)
+    pictures(folder)
 
 
 if __name__ == "__main__":

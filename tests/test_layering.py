@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ PACKAGE = ROOT / "src" / "kineme"
 FRONT_DOOR = ("__init__", "__main__", "control", "orientation", "styles")  # they may import everything
 
 
+@cache  # the sources do not change while they are read here
 def _layers():
     """Chapter, or chapter/room -> its line in the list, from the bottom up."""
     listed = (ROOT / "CONTRIBUTING.md").read_text().partition("    src/kineme/\n")[2].partition("\n\n")[0]
@@ -27,16 +29,25 @@ def _layers():
     return layers
 
 
-def _imported(path):
-    """Modules of kineme that a file imports, at the top or inside functions."""
+@cache
+def _all_imports(path):
+    """Full names of all that a file imports, at the top or inside functions: of ``from a import b`` it is a.b."""
+    names = []
     for node in ast.walk(ast.parse(path.read_text())):
-        names = [alias.name for alias in node.names] if isinstance(node, (ast.Import, ast.ImportFrom)) else []
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path.name}: import with the full name"
-            names = [f"{node.module}.{name}" for name in names]
-        yield from (name.split(".") for name in names if name.startswith("kineme."))
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
 
 
+def _imported(path):
+    """Modules of kineme that a file imports, each as its parts."""
+    return [name.split(".") for name in _all_imports(path) if name.startswith("kineme.")]
+
+
+@cache
 def _modules():
     return [path for path in sorted(PACKAGE.rglob("*.py")) if path.stem not in FRONT_DOOR or path.parent != PACKAGE]
 
@@ -78,21 +89,13 @@ def test_kernels_know_nothing_of_movements():
     assert imported <= {"kernels", "runtime", "validation", "errors", "sampling", "_lazy"}
 
 
+@cache
 def _compiled_modules():
     """Modules with compiled functions, and the one that keeps their machine code: importing them imports Numba."""
     jitted = [path for path in _modules() if re.search(r"^@_?jit|= jit\(", path.read_text(), re.MULTILINE)]
     return {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): path for path in jitted} | {
         "kineme.runtime.machine_code": PACKAGE / "runtime" / "machine_code.py"
     }
-
-
-def _all_imports(path):
-    """Whatever a file imports, as full names: ``import a.b`` and ``from a import b`` are both a.b."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        if isinstance(node, ast.ImportFrom):
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 @pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))

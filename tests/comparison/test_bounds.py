@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -40,15 +42,25 @@ def _exact(similarity, A, B):
     return similarity.log_average(*(prepare(rows, HOW, similarity.procrustes) for rows in (A, B)))
 
 
+@cache
+def _asked_and_stored(d):
+    return _rows(draw_shapes([2] * 6, d, seed=1)), _rows(draw_shapes([3] * 20, d, seed=2))
+
+
+@cache
+def _reduced(d, n_reduced):
+    asked, stored = _asked_and_stored(d)
+    bases = fit_bases(stored, d, n_reduced)
+    return reduce_features(bases, asked, d), reduce_features(bases, stored, d)
+
+
 @pytest.mark.parametrize("mean", LOG_MEANS)
 @pytest.mark.parametrize(("d", "angle"), [(d, angle) for d, angles in ANGLES.items() for angle in angles])
 @pytest.mark.parametrize("n_reduced", [1, 3, 12, 100])
 def test_no_movement_is_more_alike_than_its_reduced_features_allow(d, angle, mean, n_reduced):
-    asked, stored = _rows(draw_shapes([2] * 6, d, seed=1)), _rows(draw_shapes([3] * 20, d, seed=2))
     similarity = AveragedSimilarity(_procrustes(d, angle), np.array([0.5, 2.0, 2.2]), mean)
-    bases = fit_bases(stored, d, n_reduced)
-    bounds = log_bounds(similarity, reduce_features(bases, asked, d), reduce_features(bases, stored, d))
-    exact = _exact(similarity, asked, stored)
+    bounds = log_bounds(similarity, *_reduced(d, n_reduced))
+    exact = _exact(similarity, *_asked_and_stored(d))
     assert bounds.shape == exact.shape
     assert (bounds >= exact - 1e-6).all()
 

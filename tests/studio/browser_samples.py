@@ -69,9 +69,9 @@ def settle(page):
         wait_until(page, "window.unanswered === 0")
 
 
-def draw(page, movement, seconds=1.6, n=60, share=1.0):
+def draw(page, movement, seconds=1.6, n=60, share=1.0, on="#draw-canvas"):
     """Draw a movement by the mouse, all of it in `seconds`; with a share, begin it and hold the button."""
-    box = page.locator("#draw-canvas").bounding_box()
+    box = page.locator(on).bounding_box()
     size = np.ptp(movement.positions, axis=0)
     scale = min(0.5 * box["width"] / size[0], 0.6 * box["height"] / size[1])
     away = (movement.positions - movement.positions.min(axis=0) - size / 2) * [scale, -scale]

@@ -78,7 +78,9 @@ def served_letters(tmp_path_factory):
 @pytest.mark.parametrize("shape", LETTERS[:2])
 def test_a_letter_is_recognized_while_it_is_drawn(opened, served_letters, shape):
     page = opened(served_letters)
+    assert page.is_hidden("#draw-legend")
     draw(page, letters(shape)[SHOWN], share=0.8)
+    assert page.is_visible("#draw-legend")
     wait_until(page, "name => document.querySelector('.rank-name').textContent === name", shape)
     assert float(page.get_attribute("#draw-progress", "aria-valuenow")) > 30
     page.mouse.up()
@@ -127,6 +129,8 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
 def test_the_path_follows_the_goal_without_asking_the_server(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    assert page.get_attribute(".handle.goal", "aria-label") == "Goal at 0, 0"  # no 1e-7 of the fit
+    assert page.input_value("[data-key='number Goal 0']") == "0"
     page.wait_for_timeout(1500)  # the primitive is asked for once
     page.route("**/api/rollout", lambda route: None)  # from now on it never answers
     x, y = center(page, ".handle.goal")
@@ -268,8 +272,11 @@ def test_movements_without_a_name_are_proposed_and_named_together(opened, studio
     with kineme.ActionLibrary(tmp_path / "unnamed", create=True) as library:
         for shape in LETTERS[:3]:
             library.learn(letters(shape), [None] * len(letters(shape)))
-    page = opened(studio(tmp_path / "unnamed"), "library")
+    page = opened(studio(tmp_path / "unnamed"), "library", width=820)
     wait_until(page, "document.querySelectorAll('.proposal').length > 1")
+    shown = "[document.documentElement, ...document.querySelectorAll('.proposal')]"
+    assert set(page.evaluate(f"{shown}.map((one) => one.scrollWidth - one.clientWidth)")) == {0}  # nothing is cut
+    assert "Name movements that are here" in page.inner_text("#library-empty-text")
     first = page.locator(".proposal").first
     assert first.locator(".member").count() >= 3
     first.locator("input").fill("named together")
@@ -358,8 +365,10 @@ def test_everything_goes_by_the_keyboard(opened, studio, tmp_path):
     page.keyboard.press("Control+z")  # here it takes back the step, and not what was learned
     assert page.get_attribute(".handle.goal", "aria-label") == before
     assert "5 symbols" in page.inner_text("#library-count")
+    page.set_viewport_size({"width": 390, "height": 500})
     page.keyboard.press("?")
     assert page.is_visible("#keys")
+    assert page.evaluate("document.getElementById('keys').scrollTop") == 0
     page.keyboard.press("Escape")
     assert not page.is_visible("#keys")
 
@@ -438,10 +447,10 @@ def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):
     studio.end(signal.SIGKILL)
     wait_until(page, "!document.getElementById('away-note').hidden")
     draw(page, letters("GShape")[SHOWN])
+    wait_for_text(page, "#verdict-kind", "No answer yet")
     with running(folder, "--port", studio.address.rpartition(":")[2]):
         wait_until(page, "document.getElementById('away-note').hidden")
-        draw(page, letters("GShape")[SHOWN])
-        wait_until(page, ANSWERED)
+        wait_until(page, ANSWERED)  # to what was drawn meanwhile
         assert page.inner_text(".rank:first-child .rank-name") == "GShape"
         page.close()
 
@@ -452,6 +461,7 @@ def test_every_view_fits_its_window(opened, served_letters, scheme):
     for width, view in product(WIDTHS, VIEWS):
         page.set_viewport_size({"width": width, "height": 900})
         show(page, view)
+        assert page.is_visible("#library-mode")  # why nothing can be changed
         assert page.evaluate("document.documentElement.scrollWidth") <= width, (width, view)
         small = page.evaluate(
             """() => [...document.querySelectorAll("button, select, input[type=text], input[type=number]")]
@@ -460,6 +470,19 @@ def test_every_view_fits_its_window(opened, served_letters, scheme):
             .map((one) => one.outerHTML.slice(0, 80))"""
         )
         assert small == [], (width, view)
+
+
+#: What the panel says of a movement of which this much is done, with the evidence that it is unknown.
+SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ AnswerPanel }) => {
+  new AnswerPanel().drawing({ ranked: [], unknown, decided: null, progress, arrival: null }, 0);
+  return document.getElementById("verdict").textContent;
+})"""
+
+
+def test_unknown_is_not_said_before_much_is_drawn(opened, served_letters):
+    page = opened(served_letters)
+    assert page.evaluate(SAYS, [0.05, 1]) == "…"  # every beginning is unlike the whole
+    assert page.evaluate(SAYS, [0.3, 1]) == "Unknown"
 
 
 def test_drawing_does_not_move_anything_else(opened, served_letters):
@@ -535,8 +558,13 @@ def test_no_rule_of_accessibility_is_broken(opened, studio, tmp_path):
 def test_sliders_move_between_the_recordings_of_a_symbol(opened, served_letters):
     page = opened(served_letters, "move")
     wait_until(page, "!document.getElementById('styles').hidden")
+    other = page.locator("#formulations input").nth(1)
+    with page.expect_response("**/api/rollout"):
+        other.check()
     with page.expect_response("**/api/rollout"):
         page.locator("#styles input[type=checkbox]").check()
+    assert other.is_disabled()  # styles move in one formulation alone, and no other is asked for
+    assert page.locator("#move-legend li").count() == 2
     with page.expect_response("**/api/rollout") as answered:
         page.locator("#styles input[type=range]").first.press("ArrowRight")
     asked = answered.value.request.post_data_json

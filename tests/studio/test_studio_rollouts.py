@@ -37,6 +37,9 @@ def test_a_symbol_moves_as_demonstrated_and_to_another_goal(client, symbol):
     assert made["times"][-1] == pytest.approx(1.5)
     assert len(made["times"]) == len(made["positions"]) == len(made["velocities"]) == len(made["accelerations"]) >= 200
     assert np.abs(np.array(made["positions"][0]) - drawing(2, seed=0)[1][0]).max() < 0.2
+    recorded = np.array(made["recorded"])  # of the recording that moves, which the first of the symbol need not be
+    assert len(recorded) <= 64
+    np.testing.assert_allclose(recorded[[0, -1]], [made["start"], made["goal"]], atol=1e-3)
     other = _rollout(client, {"symbol": symbol}, start=[1.0, 2.0], goal=[3.0, -1.0], duration=4.0, rate=50)
     assert other["positions"][0] == pytest.approx([1.0, 2.0])
     assert other["positions"][-1] == pytest.approx([3.0, -1.0])
@@ -140,6 +143,8 @@ def test_styles_lie_between_the_members(client, folder, symbol):
         model = learn_styles(library.primitives("kind 2"))
     assert styles["highest"] == pytest.approx(model.highest.tolist())
     made = _rollout(client, {"style": {"symbol": symbol, "values": [0.0] * len(styles["lowest"])}})
+    assert made["recorded"] is None
+    assert styles["formulation"] == "bio-inspired"
     assert len(made["positions"]) >= 200
     outside = {"what": {"style": {"symbol": symbol, "values": [99.0] * len(styles["lowest"])}}}
     assert client.post("/api/rollout", json=outside).status_code == 400

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 WEB = Path(__file__).parents[2] / "src" / "kineme" / "studio" / "web"
@@ -100,6 +101,22 @@ def test_the_canvas_is_as_high_as_the_movements_of_the_library_in_powers_of_ten(
     symbols[6][0]["path"] = [[3, 5], [3, 5]]  # it does not move
     heights = _in_node(HEIGHTS, modules, *map(json.dumps, symbols))
     assert heights == [1, 1, 1, 100, 0.01, 100, 100, 1, 10]
+
+
+FACING = """const [folder, ...several] = process.argv.slice(1);
+const { facing } = await import(`${folder}/parts/facing.js`);
+const views = several.map((path) => facing([JSON.parse(path)]));
+console.log(JSON.stringify(views.map(({ around, above }) => [around, above])));"""
+
+
+@needs_node
+def test_movements_in_space_are_seen_from_the_front_where_they_are_flat(modules):
+    u = np.linspace(0, 6, 64)
+    wave = np.column_stack((u, 2 * np.sin(u), 0.1 * np.cos(u)))
+    knot = np.column_stack((np.cos(u), np.sin(u), np.sin(2 * u)))
+    paths = [wave, wave[:, [0, 2, 1]], wave[:, [2, 0, 1]], knot]  # on a table, a wall, the wall beside it, none
+    seen = _in_node(FACING, modules, *(json.dumps(one.tolist()) for one in paths))
+    np.testing.assert_allclose(seen, [[0, np.pi / 2], [0, 0], [np.pi / 2, 0], [-0.6, 0.5]])
 
 
 REFRESHES = """const { library, onLibrary, refresh } = await import(`${process.argv[1]}/parts/library_state.js`);
@@ -227,6 +244,19 @@ def _luminance(color):
 def _contrast(one, other):
     light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
     return (light + 0.05) / (dark + 0.05)
+
+
+ON_COLORS = """
+const { readableOn } = await import(`${process.argv[1]}/parts/lines.js`);
+console.log(JSON.stringify(process.argv.slice(2).map((one) => readableOn(one))));"""
+
+
+@needs_node
+def test_names_of_spans_stand_out_from_their_colors(modules):
+    tokens = (WEB / "tokens.css").read_text()
+    colors = dict(re.findall(r"--(blue|orange|green|purple|sky|amber): (#[0-9a-f]{6});", tokens))
+    for paint, text in zip(colors.values(), _in_node(ON_COLORS, modules, *colors.values()), strict=True):
+        assert _contrast(paint, text[0] + 2 * text[1:]) >= 4.5, (paint, text)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -43,7 +43,10 @@ export function pairDistances(how, d, own, cloud = true, elastic = true) {
   turned(own.segments, 0, K, d, d, IDENTITY, factors, a);
   turned(own.points, 0, P, d, d + 1, IDENTITY, place, x);
   const work = { elastic: new Float64Array(K + 1), turning: new Float64Array(K + 1) };
-  const room = { rows: new Float64Array(P), columns: new Float64Array(P), nearest: new Int32Array(P), halves: new Float64Array(2 * P) };
+  const room = {
+    rows: new Float64Array(P), columns: new Float64Array(P), nearest: new Int32Array(P),
+    halves: new Float64Array(2 * P), costs: new Float64Array(P * P),
+  };
   return (others, j, R, squares) => {
     if (elastic) {
       turned(others.segments, j * K * w, K, d, d, R, factors, b);
@@ -94,31 +97,35 @@ function squaredGap(a, i, b, j, n) {
   return total;
 }
 
+/** The smaller number without a branch: processors cannot guess which one it is, and lose time by wrong guesses. */
+const smaller = (x, y) => 0.5 * (x + y - Math.abs(x - y));
+
 /** Dynamic time warping of segments: the sums of both costs along their best paths, divided by K. */
-function warp(a, b, K, w, band, work, squares) {
-  const { elastic, turning } = work;
-  elastic.fill(FAR);
-  turning.fill(FAR);
-  elastic[0] = turning[0] = 0;
-  for (let p = 0; p < K; p++) {
+function warp(a, b, K, w, band, { elastic, turning }, squares) {
+  for (let q = 0, from = 0; q < Math.min(K, band + 1); q++, from += w) {
+    const angle = a[w - 1] - b[from + w - 1];
+    elastic[q + 1] = squaredGap(a, 0, b, from, w) + (q > 0 ? elastic[q] : 0);
+    turning[q + 1] = angle * angle + (q > 0 ? turning[q] : 0);
+  }
+  for (let p = 1, at = w; p < K; p++, at += w) {
     const first = Math.max(0, p - band);
     const end = Math.min(K, p + band + 1);
-    const at = p * w;
-    let corner = elastic[first];
-    let cornerTurning = turning[first];
-    let left = FAR;
-    let leftTurning = FAR;
-    elastic[first] = turning[first] = FAR;
+    if (p + band < K) {
+      elastic[end] = elastic[end - 1]; // no path comes from above
+      turning[end] = turning[end - 1];
+    }
+    const before = Math.max(first, 1); // the first of a row is never reached from the corner
+    let corner = elastic[before];
+    let cornerTurning = turning[before];
+    let left = corner;
+    let leftTurning = cornerTurning;
     for (let q = first, from = first * w; q < end; q++, from += w) {
       const angle = a[at + w - 1] - b[from + w - 1];
       const square = angle * angle;
-      const cost = square + squaredGap(a, at, b, from, w - 1);
       const above = elastic[q + 1];
       const aboveTurning = turning[q + 1];
-      let least = above < corner ? above : corner;
-      left = cost + (least < left ? least : left);
-      least = aboveTurning < cornerTurning ? aboveTurning : cornerTurning;
-      leftTurning = square + (least < leftTurning ? least : leftTurning);
+      left = square + squaredGap(a, at, b, from, w - 1) + smaller(smaller(above, corner), left);
+      leftTurning = square + smaller(smaller(aboveTurning, cornerTurning), leftTurning);
       elastic[q + 1] = left;
       turning[q + 1] = leftTurning;
       corner = above;
@@ -131,29 +138,18 @@ function warp(a, b, K, w, band, work, squares) {
 
 /** Squared mean distance of matched points, in the direction in which it is smaller. */
 function matched(x, y, P, d, room) {
-  const { rows, columns, nearest, halves } = room;
-  const w = 2 * d + 1;
+  const { rows, columns, nearest, costs, halves } = room;
+  halfFourthPowers(x, P, d, halves, 0);
+  halfFourthPowers(y, P, d, halves, P);
+  if (d === 2) planePointCosts(x, y, P, halves, costs);
+  else pointCosts(x, y, P, d, halves, costs);
   columns.fill(FAR);
-  for (let p = 0; p < P; p++) {
-    let square = 0;
-    let other = 0;
-    for (let k = d + 1; k < w; k++) {
-      square += x[p * w + k] * x[p * w + k];
-      other += y[p * w + k] * y[p * w + k];
-    }
-    // The weight of the tangents' lines is in their lengths twice: once here.
-    halves[p] = 0.5 * square * square;
-    halves[P + p] = 0.5 * other * other;
-  }
   let taken = 0; // bits of the points of y that a point of x is nearest to
-  for (let p = 0; p < P; p++) {
+  for (let p = 0, pair = 0; p < P; p++) {
     let smallest = FAR;
     let at = 0;
-    const from = p * w;
-    for (let q = 0, to = 0; q < P; q++, to += w) {
-      let both = x[from + d + 1] * y[to + d + 1];
-      for (let k = d + 2; k < w; k++) both += x[from + k] * y[to + k];
-      const cost = halves[p] + halves[P + q] + squaredGap(x, from, y, to, d + 1) - both * both;
+    for (let q = 0; q < P; q++, pair++) {
+      const cost = costs[pair];
       if (cost < smallest) {
         smallest = cost;
         at = q;
@@ -167,6 +163,42 @@ function matched(x, y, P, d, room) {
     rows[p] = Math.sqrt(Math.max(smallest, 0));
   }
   return sums(rows, columns, nearest, taken, P);
+}
+
+/** Halves of the fourth powers of the tangents' lengths: the weight of their lines is in these lengths twice. */
+function halfFourthPowers(points, P, d, halves, from) {
+  const w = 2 * d + 1;
+  for (let p = 0; p < P; p++) {
+    let square = 0;
+    for (let k = p * w + d + 1; k < (p + 1) * w; k++) square += points[k] * points[k];
+    halves[from + p] = 0.5 * square * square;
+  }
+}
+
+/** Squared distances of all points of x to all of y: of points and angles, and of the tangents' lines. */
+function pointCosts(x, y, P, d, halves, costs) {
+  const w = 2 * d + 1;
+  for (let p = 0, from = 0, pair = 0; p < P; p++, from += w) {
+    for (let q = 0, to = 0; q < P; q++, to += w, pair++) {
+      let both = x[from + d + 1] * y[to + d + 1];
+      for (let k = d + 2; k < w; k++) both += x[from + k] * y[to + k];
+      costs[pair] = halves[p] + halves[P + q] + squaredGap(x, from, y, to, d + 1) - both * both;
+    }
+  }
+}
+
+/** The same in the plane, without inner loops. */
+function planePointCosts(x, y, P, halves, costs) {
+  for (let p = 0, from = 0, pair = 0; p < P; p++, from += 5) {
+    const [x0, x1, x2, x3, x4] = [x[from], x[from + 1], x[from + 2], x[from + 3], x[from + 4]];
+    for (let q = 0, to = 0; q < P; q++, to += 5, pair++) {
+      const u = x0 - y[to];
+      const v = x1 - y[to + 1];
+      const angle = x2 - y[to + 2];
+      const both = x3 * y[to + 3] + x4 * y[to + 4];
+      costs[pair] = halves[p] + halves[P + q] + (u * u + v * v + angle * angle) - both * both;
+    }
+  }
 }
 
 function sums(rows, columns, nearest, taken, P) {

@@ -7,6 +7,7 @@ import { boxOf, createStage } from "./stage.js";
 const ROWS = 5; // bars
 const MANY = 12; // known movements that can be looked through
 const STEP = 0.03; // of the stage, by an arrow key
+const BEGUN = 0.1; // share of the path from which a name or unknown is said: every beginning is unlike the whole
 const ERROR_RATE = 0.05;
 const DRAWN = "Your drawing";
 
@@ -80,8 +81,9 @@ function say(verdict, reason, kind = "") {
 function showLive() {
   const { live } = state;
   if (!live) return say("…", "Go on drawing.");
-  const sure = live.decided ?? live.ranked[0].name;
-  const unknown = live.unknown > live.ranked[0].share;
+  const begun = live.decided !== null || live.progress >= BEGUN;
+  const sure = begun ? live.decided ?? live.ranked[0].name : "…";
+  const unknown = begun && live.unknown > live.ranked[0].share;
   say(unknown ? "Unknown so far" : sure, `${percent(live.progress)} done, ${live.decided ? "decided" : "not decided yet"}`, unknown ? "unknown" : "");
   bars([...live.ranked, { name: null, share: live.unknown }]);
 }

@@ -72,6 +72,7 @@ class Moved(BaseModel):
     columns: list[str]
     start: list[float]
     goal: list[float]
+    recorded: Points | None = Field(description="At most 64 points of the recording that moves; null for a style.")
     warnings: list[str]
 
 
@@ -91,3 +92,4 @@ class StylesOut(BaseModel):
     lowest: list[float]
     highest: list[float]
     explained: list[float]
+    formulation: str = Field(description="That of the library, the only one in which styles move.")

@@ -9,10 +9,10 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from kineme.files.write_movement import encode_movement
-from kineme.studio.server.plain import numbers
+from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.records import SymbolKey
 from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
-from kineme.studio.server.rollouts import make, primitive_document, styles_of
+from kineme.studio.server.rollouts import learned_as, make, primitive_document, styles_of
 from kineme.studio.server.studio import Reads
 
 router = APIRouter(prefix="/api", tags=["movement"])
@@ -21,13 +21,14 @@ router = APIRouter(prefix="/api", tags=["movement"])
 @router.post("/rollout", response_model=Moved, summary="A new movement")
 def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
     """Of a symbol, a stored movement or a style: from another start, to another goal, past points and obstacles."""
-    made = make(studio, asked)
+    made, recording = make(studio, asked), learned_as(studio, asked).demonstration
     columns = made.movement.columns
     return {
         **{name: numbers(columns[name]) for name in ("times", "positions", "velocities", "accelerations")},
         "columns": list(made.movement.names.positions),
         "start": numbers(columns["positions"][0]),
         "goal": numbers(columns["positions"][-1] if asked.goal is None else asked.goal),
+        "recorded": None if recording is None else thumbnail(recording.positions),
         "warnings": made.warnings,
     }
 
@@ -47,7 +48,8 @@ def styles(studio: Reads, key: SymbolKey) -> dict[str, Any]:
     """The range of each direction; values of a rollout's style lie between."""
     model = styles_of(studio, key)
     ranges = {"lowest": model.lowest, "highest": model.highest, "explained": model.explained_variance}
-    return {name: numbers(values) for name, values in ranges.items()}
+    shown = {name: numbers(values) for name, values in ranges.items()}
+    return {**shown, "formulation": studio.library.specification.dmp.formulation}
 
 
 @router.post(

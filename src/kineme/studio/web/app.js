@@ -21,7 +21,8 @@ const lastPart = (folder) => folder.replace(/[/\\]+$/, "").split(/[/\\]/).pop() 
 onLibrary((known) => {
   byId("library-name").textContent = lastPart(known.folder);
   byId("library-name").title = known.folder;
-  byId("library-count").textContent = `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}${known.read_only ? ", read only" : ""}`;
+  byId("library-count").textContent = `${counted(known.symbols.length, "symbol")}, ${counted(known.n_movements, "movement")}`;
+  byId("library-mode").hidden = !known.read_only;
   byId("undo").disabled = !known.can_undo || known.read_only;
   document.body.classList.toggle("read-only", known.read_only);
   fill(byId("names"), ...known.symbols.map((/** @type {any} */ one) => make("option", { value: one.name })));

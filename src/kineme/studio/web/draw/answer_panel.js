@@ -2,6 +2,7 @@
 import { byId, fill, make, write } from "../parts/elements.js";
 
 const ROWS = 5;
+const BEGUN = 0.1; // share of the path from which unknown is said: every beginning is unlike the whole
 const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
 const pValue = (/** @type {number} */ p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
 
@@ -69,7 +70,7 @@ export class AnswerPanel {
     const note = [state.progress === null ? "" : `${percent(state.progress)} of the path`, left === null ? "" : `arrives in ${left.toFixed(1)} s`];
     if (state.decided !== null) this.words("Decided while drawing", state.decided, note.filter(Boolean).join(", "), "known");
     else if (best && best.share >= 0.5) this.words("Probably", best.name, note.filter(Boolean).join(", "), "open");
-    else if (unknown > 0.5) this.words("Probably", "Unknown", "like nothing that is known so far", "open");
+    else if (unknown > 0.5 && state.progress >= BEGUN) this.words("Probably", "Unknown", "like nothing that is known so far", "open");
     else this.words("Still open", "…", note.filter(Boolean).join(", "), "open");
     this.progress(state.progress ?? 0);
     this.kind("Evidence for each name so far");

@@ -1,5 +1,6 @@
 // A program's movement on the canvas, while it happens: as if it were drawn there.
 import { byId } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
 import { usualSide } from "./scale.js";
 import { Frame } from "./frame.js";
 import { Sources } from "./sources.js";
@@ -54,8 +55,8 @@ export class Follow {
   begin() {
     this.draw.clear();
     this.draw.kind = "program";
-    this.draw.picture.frame = new Frame(usualSide() ?? 0.5);
-    byId("draw-empty").hidden = true;
+    this.draw.picture.frame = new Frame(usualSide() ?? 0.5, library().symbols.map((/** @type {any} */ one) => one.path).filter(Boolean));
+    this.draw.filled(true);
   }
 
   /** @param {import("./sources.js").Source} source @param {number} known How many of its samples are painted. */

@@ -4,9 +4,10 @@ import { Camera } from "../parts/camera.js";
 const WIDER = 0.25; // of the size, on the side on which it leaves
 
 export class Frame {
-  /** @param {number} size Of a usual movement. */
-  constructor(size) {
+  /** @param {number} size Of a usual movement. @param {number[][][]} paths Like which it may be. */
+  constructor(size, paths) {
     this.camera = new Camera();
+    this.camera.face(paths);
     this.size = size;
     /** @type {number[]} */
     this.low = [];

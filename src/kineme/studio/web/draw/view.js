@@ -2,7 +2,6 @@
 import { post } from "../parts/api.js";
 import { byId } from "../parts/elements.js";
 import { isLoaded, library, onLibrary, symbolNamed } from "../parts/library_state.js";
-import { tried } from "../parts/toasts.js";
 import { followTurns } from "../parts/turning.js";
 import { currentView, show } from "../parts/views.js";
 import { chooseToMove } from "../move/chosen.js";
@@ -68,7 +67,7 @@ class Draw {
   invite() {
     const { symbols, read_only: readOnly } = library();
     const takes = takesDrawings();
-    byId("draw-empty").hidden = this.picture.ink.length > 0;
+    this.filled(this.picture.ink.length > 0);
     byId("draw-empty-title").textContent = !takes ? "Movements in space" : symbols.length ? "Draw a movement here" : "Nothing is known yet";
     byId("draw-empty-text").textContent = !takes
       ? "This library holds movements that a mouse cannot draw. Send samples from a program and see them here, or drop a recording in Recordings."
@@ -79,6 +78,12 @@ class Draw {
     if (!takes) byId("live-source").open = true;
   }
 
+  /** @param {boolean} on Whether there is a movement: the invitation goes, and what its colors mean is said. */
+  filled(on) {
+    byId("draw-empty").hidden = on;
+    byId("draw-legend").hidden = !on || !library().symbols.length;
+  }
+
   /** @param {string} kind */
   begins(kind) {
     if (!takesDrawings() || this.picture.turns) return false;
@@ -87,7 +92,7 @@ class Draw {
     this.kind = kind;
     this.sending.reset();
     this.height = canvasHeight();
-    byId("draw-empty").hidden = true;
+    this.filled(true);
     this.panel.words("Drawing", "…", "", "open");
     return true;
   }
@@ -143,8 +148,11 @@ class Draw {
   /** Without a websocket the whole movement is asked for at once. */
   async askOnce() {
     const asked = this.whole;
-    const answer = await tried(() => post("/api/recognize", asked));
-    if (answer && asked === this.whole) this.answered(answer);
+    const answer = await post("/api/recognize", asked).catch((/** @type {any} */ error) => ({ error }));
+    if (asked !== this.whole) return;
+    if (!answer.error) this.answered(answer);
+    else if (!answer.error.status) this.panel.words("No answer yet", "…", "It is asked for again when the server is there.", "open");
+    else this.refused(answer.error.message);
   }
 
   /** @param {any} state Of the server, while drawing. */
@@ -176,11 +184,16 @@ class Draw {
     if (this.drawing) this.sending.heard();
     if (this.waits) {
       this.sending.answered();
-      this.waits = false;
-      this.panel.words("No answer", "?", text, "unknown");
-      this.focusName();
+      this.refused(text);
     }
     return about;
+  }
+
+  /** @param {string} text Why there is no answer. */
+  refused(text) {
+    this.waits = false;
+    this.panel.words("No answer", "?", text, "unknown");
+    this.focusName();
   }
 
   /** A keyboard of glass would cover the drawing: with a finger the field waits to be touched, as while programs move. */
@@ -227,6 +240,6 @@ class Draw {
 /** @param {(message: any) => boolean} send @returns {any} What hears the server. */
 export function startDraw(send) {
   const draw = new Draw(send);
-  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed());
+  const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed(), draw.waits && draw.askOnce());
   return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
 }

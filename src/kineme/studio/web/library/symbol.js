@@ -85,10 +85,11 @@ export class SymbolPanel {
     if (this.version === library().version) return;
     this.version = library().version;
     panel.classList.add("opened");
-    const count = make("p", { class: "soft small", role: "status" }, "Choose movements to split, rename or delete them.");
+    const hint = `Choose some to ${symbol ? "split, rename" : "name"} or delete.`;
+    const count = make("p", { class: "soft small", role: "status" }, hint);
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
       for (const one of acts) one.disabled = library().read_only || !members.ids().length;
-      count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : "Choose movements to split, rename or delete them.";
+      count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : hint;
     });
     const acts = actions(symbol, members);
     for (const one of acts) one.disabled = true;

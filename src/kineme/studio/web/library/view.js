@@ -44,7 +44,9 @@ export function startLibrary() {
     shown = library().version;
     const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
-    for (const id of ["symbol", "history", "library-head"]) byId(id).hidden = nothing;
+    byId("library-empty-text").textContent = `A symbol is a movement with a name. ${nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
+    byId("library-head").hidden = !library().symbols.length;
+    byId("history").hidden = byId("symbol").hidden = nothing;
     panel.show();
     cards();
     chose();

@@ -9,7 +9,7 @@ const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDo
  */
 
 export class Handles {
-  /** @param {import("../parts/camera.js").Camera} camera @param {{moving: (on: boolean) => void}} page */
+  /** @param {import("../parts/camera.js").Camera} camera @param {{moving: (on: boolean) => void, said: (value: number) => string}} page */
   constructor(camera, page) {
     this.camera = camera;
     this.page = page;
@@ -79,7 +79,7 @@ export class Handles {
       const [x, y] = this.camera.toScreen(handle.at());
       button.style.setProperty("--x", `${x.toFixed(1)}px`);
       button.style.setProperty("--y", `${y.toFixed(1)}px`);
-      button.setAttribute("aria-label", `${handle.name} at ${handle.at().map((value) => value.toPrecision(3)).join(", ")}`);
+      button.setAttribute("aria-label", `${handle.name} at ${handle.at().map((value) => this.page.said(value)).join(", ")}`);
       button.title = handle.name;
     }
   }

@@ -12,7 +12,7 @@ async function stylesOf(symbol) {
 
 /**
  * @param {any} symbol
- * @param {(values: number[]|null) => void} changed Values of the directions; null is the prototype as it was recorded.
+ * @param {(values: number[]|null, formulation: string) => void} changed Values of the directions and the only formulation in which they move; null is the prototype as it was recorded.
  * @param {() => boolean} current Whether the symbol is still the one that moves.
  */
 export async function showStyles(symbol, changed, current) {
@@ -28,14 +28,14 @@ export async function showStyles(symbol, changed, current) {
     slider.addEventListener("input", () => {
       const at = Number(slider.value) / 100;
       values[k] = at < 0 ? -at * low : at * high;
-      changed([...values]);
+      changed([...values], styles.formulation);
     });
     return { slider, row: make("label", { class: "style-row" }, make("span", { class: "small" }, `Style ${k + 1}`, make("span", { class: "soft says" }, `${Math.round(100 * styles.explained[k])} % of differences`)), slider) };
   });
   box.addEventListener("change", () => {
     for (const { slider } of sliders) slider.disabled = !box.checked;
-    changed(box.checked ? [...values] : null);
+    changed(box.checked ? [...values] : null, styles.formulation);
   });
-  fill(byId("style-rows"), make("label", { class: "check" }, box, make("span", {}, "Between its recordings", make("span", { class: "soft small says" }, "from their average in the ways they differ"))), ...sliders.map((/** @type {any} */ one) => one.row));
+  fill(byId("style-rows"), make("label", { class: "check" }, box, make("span", {}, "Between its recordings", make("span", { class: "soft small says" }, `from their average in the ways they differ; moves as ${styles.formulation}`))), ...sliders.map((/** @type {any} */ one) => one.row));
   byId("styles").hidden = false;
 }

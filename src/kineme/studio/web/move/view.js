@@ -13,7 +13,7 @@ import { FORMULATIONS, showFormulations } from "./formulations.js";
 import { Handles } from "./handles.js";
 import { showPick } from "./pick.js";
 import { MovePicture } from "./picture.js";
-import { asShown, draggedWay, extent, question } from "./plan.js";
+import { asShown, draggedWay, extent, question, rounded } from "./plan.js";
 import { showPoints } from "./points.js";
 import { Rollouts } from "./rollouts.js";
 import { Steps } from "./steps.js";
@@ -31,7 +31,7 @@ class Move {
     this.named = null;
     this.on = new Set([FORMULATIONS[0].name]);
     this.rollouts = new Map(FORMULATIONS.map((one) => [one.name, new Rollouts(one.name, () => this.redraw())]));
-    this.handles = new Handles(this.camera, { moving: (on) => this.moving(on) });
+    this.handles = new Handles(this.camera, { moving: (on) => this.moving(on), said: (value) => rounded(value, extent(this.plan.path)) });
     this.picture = new MovePicture(this.camera, () => this.handles.place());
     this.speed = new Plot(byId("plot-speed"));
     this.acceleration = new Plot(byId("plot-acceleration"));
@@ -79,6 +79,7 @@ class Move {
     this.plan = null;
     this.steps = new Steps();
     this.handles.set([]);
+    this.camera.face([symbol.path]);
     this.picture.sketch(symbol.path);
     byId("move-name").textContent = symbol.name;
     const rollout = await tried(() => post("/api/rollout", { what: { symbol: symbol.id }, formulation: FORMULATIONS[0].name }));
@@ -86,21 +87,28 @@ class Move {
     this.plan = this.picture.plan = asShown(symbol, rollout);
     for (const one of this.rollouts.values()) Object.assign(one, { path: null, primitive: null, problem: "" });
     byId("duration").value = "0";
+    byId("formulations").disabled = false;
     this.picture.paths = [];
     this.picture.fit();
     this.structure();
     const plan = this.plan;
-    showStyles(symbol, (values) => this.style(values), () => this.plan === plan);
+    showStyles(symbol, (...style) => this.style(...style), () => this.plan === plan);
     await this.prepare();
   }
 
-  async prepare() {
-    await Promise.all([...this.on].map((name) => this.rollouts.get(name).prepare(this.plan)));
+  /** Formulations that move: those that are ticked; a style moves in its own alone. @returns {string[]} */
+  names() {
+    return this.plan?.style ? [this.plan.styled] : [...this.on];
   }
 
-  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values */
-  style(values) {
-    this.plan.style = values;
+  async prepare() {
+    await Promise.all(this.names().map((name) => this.rollouts.get(name).prepare(this.plan)));
+  }
+
+  /** Another style moves; its primitive is asked for once the slider rests. @param {number[]|null} values @param {string} formulation */
+  style(values, formulation) {
+    Object.assign(this.plan, { style: values, styled: formulation });
+    byId("formulations").disabled = values !== null;
     for (const one of this.rollouts.values()) one.primitive = null;
     this.changed();
     clearTimeout(this.resting);
@@ -132,7 +140,7 @@ class Move {
     this.keepInSight();
     this.handles.place();
     byId("duration-text").textContent = `${(this.plan.usual * this.plan.share).toFixed(2)} s`;
-    for (const name of this.on) this.rollouts.get(name).follow(this.plan);
+    for (const name of this.names()) this.rollouts.get(name).follow(this.plan);
     this.picture.board.draw();
     dragGoal(this.plan.symbol, draggedWay(this.plan));
     if (!this.dragging) this.numbers();
@@ -162,14 +170,14 @@ class Move {
   /** New paths are there. */
   redraw() {
     if (!this.plan) return;
-    const shown = FORMULATIONS.filter((one) => this.on.has(one.name) && this.rollouts.get(one.name).path).map((one) => ({ ...one, path: this.rollouts.get(one.name).path }));
+    const shown = FORMULATIONS.filter((one) => this.names().includes(one.name) && this.rollouts.get(one.name).path).map((one) => ({ ...one, path: this.rollouts.get(one.name).path }));
     this.picture.paths = shown;
     this.keepInSight();
     this.picture.board.draw();
     this.speed.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.velocities), look })));
     this.acceleration.show(shown.map(({ path, look }) => ({ times: path.times, values: lengths(path.accelerations), look })));
     this.legend(shown);
-    const said = [...this.on].flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
+    const said = this.names().flatMap((name) => [this.rollouts.get(name).problem, ...(this.rollouts.get(name).path?.warnings ?? [])]).filter(Boolean);
     const text = [...new Set(said)].join(" ");
     if (byId("move-warnings").textContent !== text) byId("move-warnings").textContent = text;
   }
@@ -189,7 +197,7 @@ class Move {
     this.redraw();
     if (!on) return;
     await this.rollouts.get(name).prepare(this.plan);
-    this.rollouts.get(name).follow(this.plan);
+    if (this.names().includes(name)) this.rollouts.get(name).follow(this.plan);
   }
 
   /** From a quarter of the demonstrated duration to four times it. */
@@ -250,7 +258,7 @@ class Move {
   async save() {
     if (!this.plan) return;
     const format = byId("export-format").value;
-    const name = [...this.on][0] ?? FORMULATIONS[0].name;
+    const name = this.names()[0] ?? FORMULATIONS[0].name;
     const saved = await tried(() => download("/api/export", { ...question(this.plan, name), format }, `movement.${format}`));
     if (saved) say(`Saved as ${saved}.`);
   }

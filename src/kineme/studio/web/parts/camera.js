@@ -1,22 +1,26 @@
 // From coordinates to pixels: straight from above in the plane; in space orthographic, turned by dragging.
+import { axesOf, facing, OBLIQUE } from "./facing.js";
 
 const MARGIN = 0.14; // of the smaller side
 
 export class Camera {
   constructor() {
     this.flat = true;
-    this.around = -0.6;
-    this.above = 0.5;
+    this.around = OBLIQUE.around;
+    this.above = OBLIQUE.above;
     this.scale = 1;
     this.middle = [0, 0, 0];
     this.size = [1, 1];
   }
 
+  /** Look from where paths are seen best. @param {number[][][]} paths */
+  face(paths) {
+    if (paths[0]?.[0].length >= 3) Object.assign(this, facing(paths));
+  }
+
   /** Directions on the screen: right and up. */
   axes() {
-    const [a, e] = this.flat ? [0, Math.PI / 2] : [this.around, this.above];
-    const [c, s] = [Math.cos(a), Math.sin(a)];
-    return { right: [c, s, 0], up: [-s * Math.sin(e), c * Math.sin(e), Math.cos(e)] };
+    return axesOf(this.flat ? { around: 0, above: Math.PI / 2 } : this);
   }
 
   /** Show all of the points. @param {number[][]} points @param {number} width @param {number} height */

@@ -1,5 +1,11 @@
 // Lines and marks on a canvas.
 
+/** Black or white, whichever reads better on a color. @param {string} hex As #rrggbb. */
+export function readableOn(hex) {
+  const [r, g, b] = [1, 3, 5].map((at) => (parseInt(hex.slice(at, at + 2), 16) / 255) ** 2.2);
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b > 0.18 ? "#000" : "#fff";
+}
+
 /**
  * @param {CanvasRenderingContext2D} context @param {number[][]} points In pixels.
  * @param {{color: string, width?: number, dash?: number[], alpha?: number}} options

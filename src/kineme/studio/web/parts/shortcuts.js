@@ -8,10 +8,11 @@ const KEYS = [
   ["← →", "from view to view, where a view's name has the focus"],
   ["Ctrl Z", "undo the last change of the library; in Move, the last change of a point or the duration"],
   ["Esc", "clear the drawing"],
-  ["Enter", "learn the drawing under the name in the field"],
+  ["Enter", "learn the drawing under the name in the field; on the map, open the symbol"],
   ["Space", "in the drawing area: pen down, pen up; in Move: play; in Robot: play and pause"],
   ["← ↑ → ↓", "move the pen, the point or the boundary in focus; turn a view in space"],
   ["Shift ← ↑ → ↓", "the same, ten times as far"],
+  ["+ −", "in a recording, show less of the time or more"],
   ["Delete", "remove the via point or obstacle in focus"],
   ["?", "this list"],
 ];
@@ -22,6 +23,7 @@ const writes = (target) => target.closest?.("input:not([type=range],[type=checkb
 function list() {
   fill(byId("keys-list"), ...KEYS.flatMap(([keys, text]) => [make("dt", {}, ...keys.split(" ").map((key) => make("kbd", {}, key))), make("dd", {}, text)]));
   byId("keys").showModal();
+  byId("keys").scrollTop = 0; // the focus went to the button at its end
 }
 
 /** Whether a key takes back, other than in a field in which one writes. @param {KeyboardEvent} event */

@@ -1,7 +1,7 @@
 // The recording over time: its columns, what was found, and the edges of the span that is chosen.
 import { Board, color } from "../parts/canvas.js";
 import { byId, make } from "../parts/elements.js";
-import { line } from "../parts/lines.js";
+import { line, readableOn } from "../parts/lines.js";
 import { lookOf, symbolNamed } from "../parts/library_state.js";
 
 const BAND = 40; // height of the spans [px]
@@ -75,7 +75,7 @@ export class Timeline {
     context.fill();
     context.globalAlpha = 1;
     if (k === this.chosen) Object.assign(context, { lineWidth: 3, strokeStyle: color("--text") }).stroke();
-    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", fillStyle: span.label === null ? color("--text") : "#fff" });
+    Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", fillStyle: span.label === null ? color("--text") : readableOn(paint) });
     const text = span.label ?? "unknown";
     if (context.measureText(text).width < w - 10) context.fillText(text, x + w / 2, top + BAND / 2 + 5);
   }

@@ -22,7 +22,9 @@ function showArm(scene, joints) {
   if (matchMedia("(max-width: 60rem)").matches) byId("arm").scrollIntoView({ block: "start" });
 }
 
-const number = (/** @type {number|null} */ value, /** @type {string} */ unit) => (value === null || value === undefined ? "–" : `${Number(Number(value).toPrecision(4))} ${unit ?? ""}`);
+const TINY = 1e-4; // written with an exponent: no zeros to count
+const written = (/** @type {number} */ value) => (value && Math.abs(value) < TINY ? value.toExponential(1) : String(Number(value.toPrecision(4))));
+const number = (/** @type {number|null} */ value, /** @type {string} */ unit) => (value === null || value === undefined ? "–" : `${written(Number(value))} ${(unit ?? "").replace("^2", "²")}`);
 
 /** @param {any} check */
 function row(check) {
