@@ -31,7 +31,7 @@ default_role = "literal"  # between single backticks in docstrings
 nitpicky = True
 highlight_language = "text"
 suppress_warnings = ["sphinx_gallery.space_in_filename"]  # in the path of the checkout; the scripts have none
-smartquotes_action = "D"  # dashes, and quotes as they are written
+smartquotes = False  # options begin with two hyphens, and quotes are as they are written
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_dmath_allow_digits = myst_dmath_allow_space = False

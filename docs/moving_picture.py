@@ -15,6 +15,8 @@ from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE
 
 _WIDTH, _HEIGHT, _PANEL = 760, 270, 240
 _SECONDS = 9.0
+_WHOLE = 7.6  # seconds after which all is to be seen: the picture begins there, and stays there without motion
+_TIME = f"{_SECONDS}s linear -{_WHOLE}s infinite"
 _DRAWN = 0.4  # share of the time in which the letter is drawn
 _GOALS = 6
 _AFTER = "84%,96%{opacity:.55}99%,100%{opacity:0}"  # the last goal has come
@@ -103,24 +105,23 @@ def _goals(frame: _Frame, shown: kineme.Trajectory) -> Iterator[str]:
         first = 46 + 5 * k
         steps = f"0%,{first}%{{opacity:0}}{first + 2}%,{first + 6}%{{opacity:1}}{_AFTER}"
         yield f"<style>@keyframes goal{k}{{{steps}}}</style>"
-        yield f'<g style="animation:goal{k} {_SECONDS}s linear infinite">'
+        yield f'<g style="animation:goal{k} {_TIME}">'
         yield f'<path class="moved" d="{_d(points)}"/>{_dot(end, GREEN, 5)}</g>'
 
 
 def _style() -> str:
-    time = f"{_SECONDS}s linear infinite"
     return (
         ".head{font:600 17px system-ui,sans-serif;text-anchor:middle;fill:#222}"
         ".name{font:600 17px system-ui,sans-serif;text-anchor:end;fill:#222}"
         "path{fill:none;stroke-linecap:round;stroke-linejoin:round}"
         f".gray{{stroke:{GRAY};stroke-width:7;opacity:.35}}"
-        f".pen{{stroke:{BLUE};stroke-width:5;stroke-dasharray:1;animation:draw {time}}}"
+        f".pen{{stroke:{BLUE};stroke-width:5;stroke-dasharray:1;animation:draw {_TIME}}}"
         f".moved{{stroke:{GREEN};stroke-width:2.5;opacity:.85}}"
-        f".tip{{animation:tip {time}}}.bar{{transform-box:fill-box;transform-origin:left}}"
-        + "".join(f".bar{k}{{animation:bar{k} {time}}}" for k in range(3))
+        f".tip{{animation:tip {_TIME}}}.bar{{transform-box:fill-box;transform-origin:left}}"
+        + "".join(f".bar{k}{{animation:bar{k} {_TIME}}}" for k in range(3))
         + f"@keyframes draw{{0%{{stroke-dashoffset:1}}{_percent(1)}{{stroke-dashoffset:0}}100%{{stroke-dashoffset:0}}}}"
         "@media (prefers-reduced-motion:reduce)"
-        "{*{animation-play-state:paused!important;animation-delay:-8.5s!important}}"
+        "{*{animation-play-state:paused!important}}"
     )
 
 

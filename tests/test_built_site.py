@@ -64,6 +64,9 @@ QUESTIONS = {
     "planner PDDL": "how-to/planner",
     "citation": "how-to/cite",
     "install": "start/install",
+    "docker": "how-to/the-first-call-is-slow",
+    "NUMBA_CACHE_DIR": "how-to/the-first-call-is-slow",
+    "column_stack": "how-to/phone",  # it stands in code alone
     "what is a movement primitive": "concepts/movement-primitive",
     "inverse kinematics": "guide/robots",
     "recognize while it is made": "tutorials/recognize-live",
@@ -81,7 +84,7 @@ MESSAGES = {
     "Error: expected a file or folder of recordings, found nothing at wave/": "expected a file or folder of recordings",
     "topic /tf: each of its messages is a movement of its own, expected it alone": "topic …: each of its messages",
     "expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'": "expected the package pyarrow",
-    "expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7": "expected a matlab file of version",
+    "expected a MATLAB file of version 7.2 or earlier, got 7.3; save it with -v7": "expected a MATLAB file of version",
     "walk.trc: expected frame 12 next, got frame 14": "expected frame … next",
     "expected one place at 0.5, got two via points there: [1. 2.] and [3. 4.]": "expected one place at",
 }

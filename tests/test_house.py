@@ -83,6 +83,12 @@ _BRITISH = re.compile(
 )
 
 
+def test_warnings_are_given_in_one_way():
+    """By `kineme.errors.warn`, which `heard_warnings` hears; `_lazy` lies below it."""
+    given = {path.name for path in SOURCES if re.search(r"\bwarnings(\.| import )warn\b", path.read_text())}
+    assert given == {"errors.py", "_lazy.py"}
+
+
 def test_spelling_is_american():
     texts = {".py", ".pyi", ".md", ".toml", ".json", ".in", ""}
     pages = [path for path in _tracked() if path.suffix in texts and "results" not in path.parts]

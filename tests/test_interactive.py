@@ -123,3 +123,20 @@ def test_it_is_used_by_pointer_and_keyboard_from_a_file(tmp_path, browser, writt
     assert off.locator(".primitive-picture").is_visible()
     assert not off.locator(".primitive").is_visible()
     assert said == []
+
+
+def test_the_view_grows_with_a_path_that_a_goal_far_out_leads_beyond_it(tmp_path, browser, written):
+    page_file = tmp_path / "page.html"
+    page_file.write_text(f"<!doctype html><meta charset=utf-8><title>x</title>{written}", encoding="utf-8")
+    page = browser.new_page(viewport={"width": 900, "height": 700})
+    page.goto(page_file.as_uri())
+    plane, star = page.locator(".drawings svg").first, page.locator(".goal").bounding_box()
+    box = plane.bounding_box()
+    page.mouse.move(star["x"] + star["width"] / 2, star["y"] + star["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] - 5, box["y"] + 5, steps=10)
+    path = page.locator("path.path").bounding_box()
+    assert plane.bounding_box() == pytest.approx(box, abs=1)  # what comes into view takes no more room
+    assert box["x"] < path["x"]
+    assert path["x"] + path["width"] < box["x"] + box["width"]
+    page.close()

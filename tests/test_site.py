@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from types import SimpleNamespace
 
@@ -183,3 +184,11 @@ def test_pages_that_were_deleted_leave_the_site_and_the_others_are_written_again
     assert _files(tmp_path) == kept
     assert set(leftovers.outdated(None, env, set(), {"index"}, {"how-to/gone"})) == env.found_docs
     assert leftovers.outdated(None, env, set(), {"index"}, set()) == []
+
+
+def test_the_first_picture_is_whole_when_it_begins():
+    """A page that opens with an empty frame says nothing in its first second."""
+    picture = (DOCS / "images" / "kineme.svg").read_text(encoding="utf-8")
+    delays = re.findall(r"animation:\w+ 9.0s linear( -7.6s)? infinite", picture)
+    assert len(delays) == 11
+    assert all(delays)

@@ -1,8 +1,8 @@
-"""Entries of the index, which the search reads: those of error messages; all are kept for the next build."""
+"""What the search reads beside words: error messages, and entries of the index, which are kept for the next build."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
 from sphinx import addnodes
@@ -12,15 +12,27 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
     from sphinx.environment import BuildEnvironment
 
+_MESSAGES = "reference/generated/messages"
 
-def add_messages(app: Sphinx, doctree: nodes.document) -> None:
-    """Give each message of the page of messages a place and an entry, so that the search leads to the message."""
-    if app.env.docname != "reference/generated/messages":
-        return
-    for k, item in enumerate(doctree.findall(nodes.list_item)):
-        item["ids"].append(f"message-{k}")
-        text = item.astext().replace(";", ",")
-        item.insert(0, addnodes.index(entries=[("single", text, item["ids"][0], "", None)]))
+
+def place_messages(app: Sphinx, doctree: nodes.document) -> None:
+    """Give each message of the page of messages a place, to which the search leads."""
+    if app.env.docname == _MESSAGES:
+        for k, item in enumerate(doctree.findall(nodes.list_item)):
+            item["ids"].append(f"message-{k}")
+
+
+def add_messages(app: Sphinx) -> list[tuple[str, dict[str, Any], str]]:
+    """Put the messages among the titles that the search reads: Sphinx writes entries of the index in lower case."""
+    indexer = getattr(app.builder, "indexer", None)
+    if indexer is not None and _MESSAGES in app.env.found_docs:
+        titles = [one for one in indexer._all_titles.get(_MESSAGES, ()) if not str(one[1]).startswith("message-")]
+        items = app.env.get_doctree(_MESSAGES).findall(nodes.list_item)
+        indexer._all_titles[_MESSAGES] = [
+            *titles,
+            *((" ".join(item.astext().split()), item["ids"][0]) for item in items),
+        ]
+    return []  # no page of its own
 
 
 def forget(app: Sphinx, env: BuildEnvironment, page: str) -> None:

@@ -23,6 +23,7 @@ const Ranking = {
     "": [0.5, "Reference"],
   },
   most: 25,
+  isMessage: (line) => /^message-\d+$/.test(line?.id ?? ""),
   mostMessages: 6,
 
   /** Stems of the words of a text that say something; names such as load_lasa also by their parts. */
@@ -30,6 +31,15 @@ const Ranking = {
     const found = splitQuery(text.toLowerCase()).flatMap((word) => (word.includes("_") ? [word, ...word.split("_")] : [word]));
     const stemmer = new Stemmer();
     return new Set(found.filter((word) => word && !stopwords.has(word) && !/^\d+$/.test(word)).map((word) => stemmer.stemWord(word)));
+  },
+
+  /** The stems that a question asks for; of a name such as column_stack its parts only where no page holds the whole. */
+  asked: (query) => {
+    const { pages } = Ranking.prepared;
+    const names = splitQuery(query).filter((word) => word.includes("_"));
+    const whole = names.filter((word) => [...Ranking.words(word)].some((stem) => stem.includes("_") && pages.has(stem)));
+    const parts = new Set(whole.flatMap((word) => [...Ranking.words(word)].filter((stem) => !stem.includes("_"))));
+    return [...Ranking.words(query)].filter((stem) => !parts.has(stem));
   },
 
   /** What the index holds, prepared once: stem -> pages; and titles and entries with their stems. */
@@ -66,7 +76,7 @@ const Ranking = {
     Ranking.prepared ??= Ranking.prepare();
     const { pages, lines } = Ranking.prepared;
     const { docnames, filenames, titles } = Search._index;
-    const asked = [...Ranking.words(query)];
+    const asked = Ranking.asked(query);
     const wanted = asked.map((word, k) => Ranking.meant(word, k === asked.length - 1)).filter((words) => words.length);
     const rarity = (word) => Math.log(1 + docnames.length / (pages.get(word)?.size ?? 1));
     const weights = wanted.map((words) => Math.max(...words.map(rarity)));
@@ -81,7 +91,7 @@ const Ranking = {
       line.score = (2 * matched) / (total + Math.max(own, matched));
       if (line.text.toLowerCase() === query.trim().toLowerCase()) line.score = 1.5;
       else if (line.entry && docnames[line.page].startsWith("reference/generated/kineme")) line.score *= 0.8;
-      if (line.entry && docnames[line.page].endsWith("/messages")) messages.push(line);
+      if (Ranking.isMessage(line)) messages.push(line);
       else if (line.score > (bestLine.get(line.page)?.score ?? 0)) bestLine.set(line.page, line);
     }
     const found = [];
@@ -94,7 +104,7 @@ const Ranking = {
     for (const line of messages) if (line.score > 0.4) found.push([line.page, line, 1 + 2 * line.score]);
     const item = ([page, line, score]) => {
       const here = line && line.score > 0.3 && line.id ? `#${line.id}` : "";
-      const message = line?.entry && docnames[page].endsWith("/messages");
+      const message = Ranking.isMessage(line);
       const title = message ? line.text : here && !line.entry && line.text !== titles[page] ? `${titles[page]} > ${line.text}` : titles[page];
       return [docnames[page], title, here, Ranking.chapter(docnames[page])[1], score, filenames[page], message ? "index" : "text"];
     };

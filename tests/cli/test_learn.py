@@ -80,8 +80,17 @@ def test_what_cannot_be_read_is_listed_and_the_rest_is_learned(recordings, tmp_p
     assert learned["added"] == 14
     assert learned["problems"] == ["CShape/bad.csv, line 3: expected a number in 'y', got 'oops'"]
     text = start("learn", recordings, "-l", tmp_path / "actions").stdout
-    assert "14 known already" in text
+    assert "14 stored already" in text
     assert "left out CShape/bad.csv, line 3" in text
+
+
+def test_a_gripper_beside_which_joints_hardly_count_is_said(tmp_path):
+    rows = "".join(f"{k / 20},{k / 20},{k / 10},{4 * k}\n" for k in range(21))
+    (tmp_path / "pick.csv").write_text("t,j1,j2,gripper\n" + rows)
+    command = ("learn", tmp_path / "pick.csv", "--label", "pick", "-l", tmp_path / "actions")
+    (note,) = answer(*command)["notes"]
+    assert f"note: {note}" in run(*command)[1]
+    assert answer(*command[:-1], tmp_path / "others", "--kind", "gripper=discrete")["notes"] == []
 
 
 def test_labels_can_be_given_or_left_out(recordings, tmp_path):
@@ -191,7 +200,7 @@ def test_a_label_that_is_not_taken_is_said(recordings, tmp_path):
     name = sorted(recordings.glob("*/*"))[0]
     answer("learn", name, "--label", "wave", "-l", tmp_path / "library")
     done = run("learn", name, "--label", "other", "-l", tmp_path / "library")
-    assert "1 movement known as wave already: the label other is not taken; kineme library" in done.stdout
+    assert "1 movement in wave already: the label other is not taken; kineme library" in done.stdout
     again = answer("learn", name, "--label", "other", "-l", tmp_path / "library")
     assert again["kept"] == [{"symbol": "wave", "label": "other", "movements": 1}]
     assert "no symbol" not in done.stdout

@@ -11,6 +11,7 @@ import pytest
 from commands import answer, run, start
 
 import kineme
+from kineme.library.storage import changes
 
 WICKED = "../wave'; DROP TABLE movement; -- $(touch x) \u202e\x1b[31m Ünï"
 
@@ -87,6 +88,27 @@ def test_annotate_merge_delete_and_history(folder):
     assert [one["action"] for one in versions] == ["learn", "annotate", "merge", "delete", "delete"]
     assert answer("library", "list", "--at", 1, "-l", folder)["movements"] == 21
     assert len(answer("library", "history", "-n", 2, "-l", folder)) == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [("merge", ("CShape", "GShape", "--into", "round")), ("split", ("NShape", "--movement", 15, "--into", "en"))],
+)
+def test_merge_and_split_say_the_version_that_they_made(folder, monkeypatch, change, words):
+    """And not one that somebody else made meanwhile."""
+    done = getattr(changes, change)
+
+    def before_another(*given):
+        version = done(*given)
+        with kineme.ActionLibrary(folder) as library:
+            library.annotate(library.symbols()[0].name, "by somebody else")
+        return version
+
+    monkeypatch.setattr(changes, change, before_another)
+    assert answer("library", change, *words, "-l", folder)["version"] == 2
+    with kineme.ActionLibrary(folder) as library:
+        library.undo(to=1)
+    assert run("library", change, *words, "-l", folder).stdout.endswith("; version 5\n")
 
 
 def test_changes_are_taken_back_one_after_the_other(folder):

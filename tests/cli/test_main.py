@@ -46,7 +46,7 @@ def test_a_terminal_is_told_that_functions_are_compiled(monkeypatch, terminal):
         main(["inspect", "--help"])
     compiled._compiling()
     compiled._compiling()
-    assert told.getvalue() == ("compiling for this machine, once: about 20 s\n" if terminal else "")
+    assert told.getvalue() == ("compiling for this machine; later commands find it done\n" if terminal else "")
 
 
 def test_an_error_is_one_line_and_says_nothing_to_the_terminal(tmp_path):

@@ -54,7 +54,7 @@ def test_a_goal_needs_a_start(wave):
     result = run("wave.csv", "--robot", "panda", "--goal", "0.5,0,0.4")
     assert result.exit_code == 2
     assert "expected --at with --goal" in result.output
-    assert "--joints" in result.output  # columns j1 to j6 are not known to be angles
+    assert "--joints" in result.output  # whose columns do not say that they are joints
 
 
 def test_the_tip_ends_at_the_goal(wave):

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from library_samples import draw_movements
 
+import kineme
 from kineme import ActionLibrary
+from kineme.library.learning import learn
 from kineme.library.storage.source import Source
+from kineme.orientation import exp
 
 
 @pytest.fixture
@@ -55,3 +59,50 @@ def test_what_was_deleted_is_learned_anew(library, by):
     assert (again.added, again.known) == (1, 1)
     assert again.ids[0] not in first.ids
     assert again.ids[1] == first.ids[1]
+
+
+@pytest.mark.parametrize("origin", [0.0, 5.3, 1.7e9])
+@pytest.mark.parametrize("ragged", [False, True])
+def test_what_is_read_from_a_library_is_known_to_it(library, ragged, origin):
+    """It is stored in single precision, and read in double."""
+    demos = draw_movements(20, 3, ragged=ragged)
+    demos = kineme.Demonstrations.from_arrays(
+        [one.positions for one in demos], times=[one.times + origin for one in demos]
+    )
+    ids = library.learn(demos).ids
+    for again in (library.movements(), list(library.movements())):
+        assert library.learn(again).added == 0
+        np.testing.assert_array_equal(library.learn(again).ids, ids)
+
+
+def _poses(n_samples=40, turn=0.0):
+    """A hand that turns while it moves and opens, as a table."""
+    t = np.linspace(0, 1, n_samples)
+    q = exp(np.column_stack((np.sin(t), t**2, t + turn)))
+    table = pd.DataFrame({"t": t, "x": t, "y": t**2, "gripper": 0.08 * (t > 0.5)})
+    table[["qw", "qx", "qy", "qz"]] = q
+    return table
+
+
+def test_poses_that_are_read_from_a_library_are_known_to_it(library):
+    first, turned = (kineme.Demonstrations.of(_poses(turn=turn)) for turn in (0.0, 0.5))
+    library.learn(first)
+    assert library.learn(library.movements()).added == 0
+    assert library.learn(turned).added == 1
+
+
+def test_the_same_way_begun_in_another_direction_is_another_movement(library):
+    """What is learned of a rotation is told from its start."""
+    table = _poses()
+    straight, reversed_ = table.copy(), table.copy()
+    straight[["qw", "qx", "qy", "qz"]] = (1.0, 0.0, 0.0, 0.0)
+    reversed_[["qw", "qx", "qy", "qz"]] = (0.0, 0.0, 0.0, 1.0)
+    assert [library.learn(kineme.Demonstrations.of(one)).added for one in (straight, reversed_)] == [1, 1]
+
+
+def test_a_movement_of_an_earlier_library_is_known_by_its_exact_digest(library, monkeypatch):
+    demos = draw_movements(3, ragged=True)
+    with monkeypatch.context() as earlier:
+        earlier.setattr(learn, "digests", learn.exact_digests)
+        library.learn(demos)
+    assert library.learn(demos).added == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from library_samples import draw_movements
 
-from kineme import ActionLibrary, Demonstrations, SpecificationError
+from kineme import ActionLibrary, Demonstrations, SpecificationError, TrajectoryError
 from kineme.library.learning import learn as learning
 from kineme.library.storage.undo import can_undo
 
@@ -164,13 +164,23 @@ def test_a_proposal_that_was_accepted_is_one_change(library):
     version = library.version
     library.release(library.ids())
     proposal = library.propose(n_clusters=2, min_members=2)[0]
-    library.accept(proposal, "new")
-    assert library["new"].prototype == proposal.medoid
+    with pytest.raises(SpecificationError, match="expected a description, got 3"):
+        library.accept(proposal, "new", 3)
+    library.accept(proposal, "new", "down and up")
+    assert (library["new"].prototype, library["new"].description) == (proposal.medoid, "down and up")
+    assert library.history()[-1].detail["description"] == "down and up"
     library.undo()
     assert len(library.symbols()) == 2
     assert not np.concatenate([one.members for one in library.symbols()]).size
     library.undo()
     assert _state(library) == _state(library.at(version))
+
+
+def test_an_empty_library_says_why_it_keeps_its_dimensions(library):
+    library.undo(to=0)
+    with pytest.raises(TrajectoryError, match="2 dimensions as those of earlier versions, which can be restored"):
+        library.learn(draw_movements(2, 3))
+    assert library.learn(draw_movements(2)).added == 2
 
 
 def test_the_past_and_libraries_open_for_reading_undo_nothing(library):

@@ -440,6 +440,9 @@ def _labeled(name):
     return "movement,time,x,y,label\n" + "".join(f"{k},{t:.4f},{x:.4f},{y:.4f},{name}\n" for k, t, x, y in rows)
 
 
+_SAYS = "(words) => [...document.querySelectorAll('.toast')].some((one) => one.textContent.includes(words))"
+
+
 def _one_after_the_other():
     """A table of two letters with rests behind them."""
     rows, at, end = [], 0.0, np.zeros(2)
@@ -499,13 +502,12 @@ def test_a_dropped_recording_is_searched_corrected_and_learned(opened, studio, t
     assert page.input_value("#spans tbody tr:nth-child(1) input[type=text]") == "of a file"
     page.click("#learn-file")
     wait_until(page, "[...document.querySelectorAll('#names option')].some((one) => one.value === 'of a file')")
+    wait_until(page, _SAYS, "Learned the whole file")
+    assert not page.evaluate(_SAYS, "Nothing is new")
     page.click("#learn-file")
-    wait_until(
-        page, "[...document.querySelectorAll('.toast')].some((one) => one.textContent.includes('Nothing is new'))"
-    )
+    wait_until(page, _SAYS, "Nothing is new")
     with kineme.ActionLibrary(tmp_path / "letters", read_only=True) as library:
-        assert len(library["from a file"].members) == 1
-        assert len(library["of a file"].members) == 2
+        assert [len(library[name].members) for name in ("from a file", "of a file")] == [1, 2]
 
 
 def test_the_server_may_be_killed_and_comes_back(opened, tmp_path):

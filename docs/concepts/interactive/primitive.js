@@ -101,6 +101,15 @@
   const line = (points) => points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
   const planePath = (path) => line(path[0].map((x, t) => toPixels([x, path[1][t]])));
   const within = (value, low, high) => Math.min(high, Math.max(low, value));
+  const MOST = 8; // times as much of the plane as usual may come into view
+
+  /** The view that holds all points: as usual, or wider about the same center. */
+  function viewOf(points) {
+    const half = [(WIDE * SCALE) / 2, (HIGH * SCALE) / 2];
+    const reach = points.flatMap((point) => point.map((value, k) => (Math.abs(value - half[k]) + 4) / half[k]));
+    const wider = within(Math.max(...reach), 1, MOST);
+    return [...half.map((one) => one * (1 - wider)), ...half.map((one) => 2 * one * wider)].join(" ");
+  }
   const inPlane = ([x, y]) => [within(x, LEFT + 1, LEFT + WIDE - 1), within(y, TOP - HIGH + 1, TOP - 1)];
 
   function start(root) {
@@ -119,6 +128,7 @@
       const dot = (node, at) => ["cx", "cy"].forEach((key, k) => node.setAttribute(key, at[k]));
       parts.shown.setAttribute("d", planePath(state.shown));
       parts.path.setAttribute("d", planePath(path));
+      parts.plane.setAttribute("viewBox", viewOf(path[0].map((x, t) => toPixels([x, path[1][t]]))));
       dot(parts.start, toPixels(state.one.start));
       dot(parts.now, toPixels(path.map((row) => row[state.t])));
       parts.goal.setAttribute("transform", `translate(${toPixels(state.goal)})`);
@@ -156,7 +166,9 @@
       draw();
     }
 
-    drag(parts.goal, () => parts.goal.focus(), (event) => setGoal(...toMillimeters(at(parts.plane, event))));
+    let held; // where the plane is on the screen as a drag begins: while it goes on, the view may change
+    const hold = () => (parts.goal.focus(), (held = parts.plane.getScreenCTM()));
+    drag(parts.goal, hold, (event) => setGoal(...toMillimeters(at(parts.plane, event, held))));
     parts.goal.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       if (!step) return;
@@ -221,8 +233,8 @@
   }
 
   /** Where a pointer is, in the drawing's own pixels. */
-  function at(svg, event) {
-    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  function at(svg, event, place = svg.getScreenCTM()) {
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(place.inverse());
     return [point.x, point.y];
   }
 

@@ -52,6 +52,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.files.entries import root_of
+    from kineme.files.inspection.extents import notes_on_extents
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -78,6 +79,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "people": sorted({one for one in people or () if one is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
+            "notes": notes_on_extents(parsed.demonstrations),
         }
     say(as_json, data, lambda: _text(data))
 
@@ -152,14 +154,14 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
 def _text(data: dict[str, Any]) -> str:
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
-    known = f", {data['known']:,} known already{joined}" if data["known"] else ""
+    stored = f", {data['known']:,} stored already{joined}" if data["known"] else ""
     held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
     problems, people = data["problems"], data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""
-    lines = [f"learned {counted(data['added'], 'movement')}{known}{new}{by}; {held}"]
+    lines = [f"learned {counted(data['added'], 'movement')}{stored}{new}{by}; {held}"]
     for kept in data["kept"]:
         lines.append(
-            f"{counted(kept['movements'], 'movement')} known as {printable(kept['symbol'])} already: the label "
+            f"{counted(kept['movements'], 'movement')} in {printable(kept['symbol'])} already: the label "
             f"{printable(kept['label'])} is not taken; kineme library rename, merge and split change symbols"
         )
     if n := data["without_symbol"]:
@@ -170,4 +172,5 @@ def _text(data: dict[str, Any]) -> str:
     lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
     if len(problems) > _SHOWN:
         lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")
+    lines += [f"note: {printable(note)}" for note in data["notes"]]
     return "\n".join(lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -19,10 +20,12 @@ from kineme.output.text import counted, printable
 @json_option
 def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> None:
     """Merge several symbols into one."""
+    from kineme.library.storage import changes
+
     with opened(folder, read_only=False) as actions:
-        actions.merge(symbols, into)
-        data = {**brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}")
+        version = changes.merge(actions.store, symbols, into)
+        data = {**brief(actions[into]), "version": version}
+    say(as_json, data, lambda: _text(data))
 
 
 @click.command()
@@ -35,10 +38,17 @@ def merge(symbols: tuple[str, ...], into: str, folder: Path, as_json: bool) -> N
 @json_option
 def split(symbol: str, movements: tuple[int, ...], into: str, folder: Path, as_json: bool) -> None:
     """Split a symbol: some of its movements become a new symbol."""
+    from kineme.library.storage import changes
+
     with opened(folder, read_only=False) as actions:
-        actions.split(symbol, list(movements), into)
-        data = {**brief(actions[into]), "version": actions.version}
-    say(as_json, data, lambda: f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}")
+        version = changes.split(actions.store, symbol, list(movements), into)
+        data = {**brief(actions[into]), "version": version}
+    say(as_json, data, lambda: _text(data))
+
+
+def _text(data: dict[str, Any]) -> str:
+    holds = f"{printable(data['name'])} ({data['id']}): {counted(data['movements'], 'movement')}"
+    return f"{holds}; version {data['version']}"
 
 
 @click.command()

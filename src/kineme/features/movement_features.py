@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError, warn
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -160,7 +159,7 @@ class MovementFeatures(TransformerMixin, BaseEstimator, Generic[Specification]):
         if old:
             this, fields_of_dmp = type(self).__name__, [_RENAMED.get(name, name) for name in old]
             made = f"kineme.{self._specification_type.__name__}({', '.join(f'{name}=...' for name in fields_of_dmp)})"
-            warnings.warn(
+            warn(
                 f"{', '.join(old)} of {this} moved to its dmp: write {this}(dmp={made}), and "
                 f"{_NESTED}{fields_of_dmp[0]} in set_params and searches",
                 DeprecationWarning,

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
-from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.library.storage import changes, export_import, read, symbols, undo, verify
 from kineme.library.storage.folder import FILE, as_folder
 from kineme.library.storage.read import Ids
@@ -184,9 +183,9 @@ class ActionLibrary:
 
         Notes
         -----
-        A movement is stored already if its samples are, or its position in a file of the same content read with the
-        same options. Such a movement is added to the symbol of its label only if it belongs to none, and who showed it
-        is stored only if that was not known.
+        A movement is stored already if its samples are, in the precision of the library, or its position in a file of
+        the same content read with the same options. Such a movement is added to the symbol of its label only if it
+        belongs to none, and who showed it is stored only if that was not known.
         """
         from kineme.library.learning.learn import learn
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import SpecificationError, TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError, warn
 from kineme.movements.channels.alike import check_alike
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.indexing import as_indices
@@ -176,7 +175,7 @@ class Batch:
     @classmethod
     def join(cls, batches: Iterable[Self]) -> Self:
         """Deprecated name of `concatenate`."""
-        warnings.warn("join is deprecated: use concatenate", DeprecationWarning, stacklevel=2)
+        warn("join is deprecated: use concatenate", DeprecationWarning, stacklevel=2)
         return cls.concatenate(batches)
 
     def _row(self, name: str) -> NDArray[Any]:

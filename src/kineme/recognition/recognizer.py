@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Any, Self, overload
-from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +20,7 @@ from kineme.comparison.references import References
 from kineme.comparison.representation import Representation, default_representations
 from kineme.comparison.scores import Compared, Score, best_classes, nearest, score
 from kineme.comparison.specification import ComparisonSpecification
+from kineme.errors import warn
 from kineme.kernels.soft_rotation import RotationPrior
 from kineme.movements.channels.channel import Channels
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels

@@ -16,14 +16,13 @@ from __future__ import annotations
 import os
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from threading import RLock
 from typing import Any
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.runtime.forks import at_fork
 
 CHOICES = ("auto", "always", "never")
@@ -144,7 +143,7 @@ def _import_numba(required: bool) -> None:
         _remove_parts()
     _failure = failure
     if not required:
-        warnings.warn(
+        warn(
             f"Numba cannot be imported ({failure}); kineme goes on with plain NumPy, which is slower. Install Numba "
             "again, or set KINEME_COMPILED=never to do without it",
             RuntimeWarning,

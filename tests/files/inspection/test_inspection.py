@@ -113,6 +113,36 @@ def test_guesses_that_differ_between_files_are_noticed(tmp_path):
     assert inspect(read_recordings(tmp_path, units="ms")).notes == ()
 
 
+def spans(**spans):
+    """The notes on a recording whose columns go so far."""
+    rows = "".join(f"{k / 20}," + ",".join(f"{k / 20 * far}" for far in spans.values()) + "\n" for k in range(21))
+    return inspect(read_recordings_from_bytes(f"time,{','.join(spans)}\n{rows}".encode(), "a.csv", Layout())).notes
+
+
+def test_a_column_beside_which_the_others_hardly_count_is_noticed():
+    (note,) = spans(j1=1, j2=2, gripper=85)
+    assert note.startswith("gripper spans up to 85, the other columns up to 2, which hardly count")
+    assert note.endswith("or choose some with --columns, or say --kind gripper=discrete")
+    assert spans(j1=1, j2=2, gripper=19) == ()
+    (note,) = spans(**{"x": 300, "y": 20, "pressure": 0.4})
+    assert note.startswith("x, y span up to 300, the other columns up to 0.4")
+    assert note.endswith("with --columns")
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"x": 50, "y": 1, "z": 1},
+        {"joint1": 0.01, "elbow_angle": 2},
+        {"wrist.x [mm]": 400, "thumb [mm]": 8},
+        {"dim_0": 30, "dim_1": 1},
+        {"force": 30, "level": 0},
+    ],
+)
+def test_columns_of_one_kind_may_move_alone(columns):
+    assert spans(**columns) == ()
+
+
 def test_long_lists_are_cut_in_words_only(tmp_path, make_movement):
     recordings(tmp_path, make_movement)
     for k in range(30):

@@ -75,6 +75,27 @@ def test_heads_of_joints_are_angles(head):
     assert found("x", head)[1].kind == "angle"
 
 
+@pytest.mark.parametrize("form", ["j{}", "J{}", "q_{}", "q[{}]", "actual_q_{}", "left j{}", "joints.{}"])
+@pytest.mark.parametrize("first", [0, 1])
+def test_columns_that_are_numbered_as_joints_are_angles(form, first):
+    heads = [form.format(first + k) for k in range(6)]
+    assert [one.kind for one in found("x", *heads, "gripper")] == ["position", *["angle"] * 6, "discrete"]
+
+
+@pytest.mark.parametrize(
+    "heads", [["q1"], ["j2", "j3"], ["q1", "q3"], ["qd1", "qd2"], ["j1 [mm]", "j2 [mm]"], ["j1_torque", "j2_torque"]]
+)
+def test_numbers_that_do_not_say_that_columns_are_joints(heads):
+    assert {one.kind for one in found("x", *heads)} == {"position"}
+
+
+def test_numbered_columns_beyond_a_turn_are_no_joints():
+    ticks = np.column_stack([U, 2048 * U])
+    assert {one.kind for one in found("q1", "q2", columns=ticks)} == {"position"}
+    assert {one.kind for one in found("q1", "q2", columns=180 * U[:, None] * [0, 1])} == {"angle"}
+    assert [one.kind for one in found("q1", "q2", q1="position")] == ["position", "angle"]
+
+
 def test_a_column_that_wraps_is_an_angle_whatever_its_name():
     wrapped = np.mod(3 + 2 * U + np.pi, 2 * np.pi) - np.pi
     assert [one.kind for one in found("a1", "a2", columns=np.column_stack([wrapped, U]))] == ["angle", "position"]
@@ -250,9 +271,9 @@ def test_a_numbered_quaternion_whose_scalar_nothing_tells_is_asked_for():
     (one,) = found("q0", "q1", "q2", "q3", columns=steady, **{"q0,q1,q2,q3": "xyzw"})
     assert one.order == "xyzw"
     joints = found(*(f"q{k}" for k in range(4)), columns=2 * steady)
-    assert {one.kind for one in joints} == {"position"}
-    seven = found(*(f"q{k}" for k in range(5)), columns=np.column_stack([steady, U]))
-    assert {one.kind for one in seven} == {"position"}
+    assert {one.kind for one in joints} == {"angle"}
+    five = found(*(f"q{k}" for k in range(5)), columns=np.column_stack([steady, U]))
+    assert {one.kind for one in five} == {"angle"}
 
 
 def test_movements_one_after_the_other_do_not_change_the_sign_of_a_quaternion():

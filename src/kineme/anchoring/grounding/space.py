@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
-from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +19,7 @@ from kineme.comparison.described import Described
 from kineme.comparison.similarity import averaged
 from kineme.comparison.specification import Compares
 from kineme.comparison.widths import median_distances
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.validation import Array, check_count, check_number
 

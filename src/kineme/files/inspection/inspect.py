@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.files.column_order import notes_on_order
 from kineme.files.inspection.duplicates import duplicates_among
+from kineme.files.inspection.extents import extents_of, notes_on_extents
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
@@ -113,8 +114,7 @@ def _summaries(recordings: Recordings, sampling: Sampling) -> tuple[LabelSummary
     demos, order = recordings.demonstrations, labels_in_order(recordings)
     number = {label: k for k, label in enumerate(order)}
     codes = np.array([number[label] for label in recordings.labels])
-    x, starts = demos.positions, demos.offsets[:-1]
-    extents = (np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0)).max(axis=1)
+    extents = extents_of(demos).max(axis=1)
     return tuple(_summary(order[k], np.flatnonzero(codes == k), demos, sampling, extents) for k in range(len(order)))
 
 
@@ -158,7 +158,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     unlabeled = sum(one.movements for one in labels if one.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    return notes + _notes_on_channels(demos)
+    return notes + notes_on_extents(demos) + _notes_on_channels(demos)
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:

@@ -13,10 +13,11 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 
 @dataclass
 class Batch:
-    """Movements to be stored, with labels and sources."""
+    """Movements to be stored, with labels and sources; `exact_digests` are those that earlier libraries hold."""
 
     demos: Demonstrations
     digests: list[int]
+    exact_digests: list[int]
     labels: list[str | None]
     groups: list[str | None]
     sources: list[Source | None]
@@ -35,7 +36,8 @@ class Stored:
 
     def id_of(self, batch: Batch, i: int) -> int | None:
         """The id of movement i of the batch; None if it is new."""
-        key, where = self.by_digest.get(batch.digests[i]), self.place_of(batch, i)
+        key = self.by_digest.get(batch.digests[i], self.by_digest.get(batch.exact_digests[i]))
+        where = self.place_of(batch, i)
         return self.by_place.get(where) if key is None and where is not None else key
 
     def place_of(self, batch: Batch, i: int) -> tuple[int, str] | None:
@@ -60,7 +62,7 @@ def find_stored(connection: sqlite3.Connection, batch: Batch) -> Stored:
     query = f"SELECT source, place, id FROM movement WHERE removed IS NULL AND source IS NOT NULL AND {among('source')}"
     rows = connection.execute(query, {"keys": listed(sources.values())}) if sources else ()
     by_place = {(source, place): key for source, place, key in rows}
-    return Stored(_by_digest(connection, batch.digests), sources, by_place)
+    return Stored(_by_digest(connection, [*batch.digests, *batch.exact_digests]), sources, by_place)
 
 
 def _by_digest(connection: sqlite3.Connection, digests: list[int]) -> dict[int, int]:

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from kineme.errors import TrajectoryError
 from kineme.library.learning.commit import Committed, commit, serialize_new
 from kineme.library.learning.deduplicate import Batch, find_stored
-from kineme.library.learning.serialize import check, digests, evenly_sampled
+from kineme.library.learning.digests import digests, exact_digests
+from kineme.library.learning.serialize import check, evenly_sampled
+from kineme.library.storage.read import count
 from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
@@ -115,7 +117,8 @@ def learn(  # noqa: PLR0913, PLR0917 - those of `ActionLibrary.learn`
 
 def _prepared(store: Store, demos: Demonstrations, given: tuple[Any, Any, Any, Any]) -> Batch:
     """A batch ready to be committed; only what is new is serialized."""
-    batch = Batch(demos, digests(demos, evenly_sampled(demos)), *given)
+    even = evenly_sampled(demos)
+    batch = Batch(demos, digests(demos, even), exact_digests(demos, even), *given)
     with store.reading() as connection:
         stored = find_stored(connection, batch)
     new = [i for i in range(len(demos)) if stored.id_of(batch, i) is None]
@@ -181,7 +184,7 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
     n_dims = store.n_dims
     if n_dims is not None and n_dims != demos.n_dims:
         raise TrajectoryError(
-            f"expected movements of {n_dims} dimensions as all others of the library in {store.folder}, "
+            f"expected movements of {n_dims} dimensions as {_others(store)} of the library in {store.folder}, "
             f"got {demos.n_dims}; choose the columns, in the shell with --columns, or make another library"
         )
     ours = store.channels
@@ -192,9 +195,14 @@ def _check_dimensions(store: Store, demos: Demonstrations) -> None:
     ):
         return
     raise TrajectoryError(
-        f"expected movements recorded as {in_words(ours)}, as all others of the library in {store.folder}, got "
+        f"expected movements recorded as {in_words(ours)}, as {_others(store)} of the library in {store.folder}, got "
         f"{in_words(demos.channels)}; choose the columns and say their kinds, in the shell with --columns and --kind"
     )
+
+
+def _others(store: Store) -> str:
+    """The movements that new ones must be like; a library that is empty now keeps its earlier versions."""
+    return "all others" if count(store) else "those of earlier versions, which can be restored,"
 
 
 def _as_names(demos: Demonstrations, what: str, given: Any) -> list[str | None]:

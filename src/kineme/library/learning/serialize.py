@@ -1,4 +1,4 @@
-"""Serialize movements to the bytes of their rows, a batch at a time, and compute their digests.
+"""Serialize movements to the bytes of their rows, a batch at a time.
 
 Positions are stored in single precision relative to the start of the movement, which is stored in double: the error of
 a position is at most 2^-24 (6e-8) of its distance from the start. Times are stored in the same way; even ones are not
@@ -7,7 +7,6 @@ stored, but computed from the duration.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -69,27 +68,8 @@ def evenly_sampled(demos: Demonstrations) -> NDArray[np.bool_]:
     return np.asarray(np.maximum.reduceat(off, first) <= slack)
 
 
-def digests(demos: Demonstrations, even: NDArray[np.bool_]) -> list[int]:
-    """BLAKE2b of each movement's positions, other columns and times from its start, as 64-bit numbers; without names.
-
-    The probability that any two of a million different movements have the same digest is 3e-8.
-    """
-    positions, row = np.ascontiguousarray(demos.positions).data.cast("B"), 8 * demos.n_dims
-    recorded = demos.movements.recorded
-    others = None if recorded is None else to_bytes(recorded, demos.offsets, demos.channels or ())
-    relative = None if even.all() else _relative_times(demos).data.cast("B")
-    durations, offsets = demos.durations.tobytes(), demos.offsets.tolist()
-    parts = []
-    for i, (a, b) in enumerate(pairwise(offsets)):
-        digest = hashlib.blake2b(positions[a * row : b * row], digest_size=8)
-        digest.update(durations[8 * i : 8 * i + 8] if relative is None or even[i] else relative[8 * a : 8 * b])
-        if others is not None:
-            digest.update(others[i])
-        parts.append(digest.digest())
-    return np.frombuffer(b"".join(parts), np.int64).tolist()
-
-
-def _relative_times(demos: Demonstrations) -> Array:
+def relative_times(demos: Demonstrations) -> Array:
+    """Times (total,) from the start of each movement."""
     return demos.times - np.repeat(demos.times[demos.offsets[:-1]], demos.lengths)
 
 
@@ -112,15 +92,15 @@ def _raw(demos: Demonstrations, even: NDArray[np.bool_]) -> list[tuple[bytes, by
     offsets = demos.offsets.tolist()
     times: list[bytes | None] = [None] * len(demos)
     if not even.all():
-        stamps = _relative_times(demos)
+        stamps = relative_times(demos)
         for i in np.flatnonzero(~even).tolist():
-            times[i] = _times(stamps[offsets[i] : offsets[i + 1]])
+            times[i] = stored_times(stamps[offsets[i] : offsets[i + 1]])
     blob, row = relative.tobytes(), 4 * demos.n_dims
     positions = [blob[row * a : row * b] for a, b in pairwise(offsets)]
     return list(zip(_cut(starts), positions, times, strict=True))
 
 
-def _times(stamps: Array) -> bytes:
+def stored_times(stamps: Array) -> bytes:
     """Times in single precision; in double if single overflows, or makes two stamps equal."""
     if not _SMALL <= stamps[-1] <= _LARGE:
         return stamps.tobytes()

@@ -43,9 +43,7 @@ def annotate(store: Store, who: str, **values: Any) -> int:
         check_number("threshold", threshold)
         values["threshold"] = float(threshold)
     if "description" in values:
-        if not isinstance(values["description"], str):
-            raise SpecificationError(f"expected a description, got {values['description']!r}")
-        check_text("a description", values["description"], MAX_DOCUMENT // 2)  # the history repeats it, in JSON
+        _check_description(values["description"])
     detail = {"symbol": who, **values}
     with store.writing("annotate", detail) as change:
         state = state_of(change.connection, who, NOW)
@@ -134,14 +132,26 @@ def split(store: Store, name: str, ids: Any, new: str) -> int:
     return change.version
 
 
-def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int | None = None) -> int:
+def assign(
+    store: Store,
+    ids: Any,
+    who: str,
+    how: str = "anchored",
+    medoid: int | None = None,
+    description: str | None = None,
+) -> int:
     """Assign movements to a symbol, which is created if needed; they leave the one that they belonged to.
 
-    A symbol that is created has the medoid as its prototype, if that is among the movements.
+    A symbol that is created has the medoid as its prototype, if that is among the movements. The description is set if
+    one is given.
     """
     check_choice("how", how, HOW)
     wanted = as_ids(store, ids)
-    detail = {"symbol": who, "movements": len(wanted), "how": how}
+    detail: dict[str, Any] = {"symbol": who, "movements": len(wanted), "how": how}
+    values: dict[str, Any] = {}
+    if description is not None:
+        _check_description(description)
+        values["description"] = detail["description"] = description
     with store.writing("assign", detail) as change:
         state = _find(change.connection, who)
         detail["symbol"] = who if state is None else state[_NAME]
@@ -150,7 +160,9 @@ def assign(store: Store, ids: Any, who: str, how: str = "anchored", medoid: int 
         _forget_prototypes(change, [row for row in left if row[2] != key])
         add_members(change, [(movement, key) for movement in sorted(set(wanted.tolist()))], how)
         if state is None and medoid in wanted.tolist():
-            _replace_state(change, state_of(change.connection, who, NOW), prototype=medoid)
+            values["prototype"] = medoid
+        if values:
+            _replace_state(change, state_of(change.connection, who, NOW), **values)
     return change.version
 
 
@@ -201,6 +213,12 @@ def _find(connection: sqlite3.Connection, who: str) -> Row | None:
 def _ids_of(connection: sqlite3.Connection, states: Sequence[Row]) -> list[str]:
     keys = listed(state[1] for state in states)
     return [row[1] for row in select(connection, "symbol", among("key"), {"keys": keys})]
+
+
+def _check_description(text: Any) -> None:
+    if not isinstance(text, str):
+        raise SpecificationError(f"expected a description, got {text!r}")
+    check_text("a description", text, MAX_DOCUMENT // 2)  # the history repeats it, in JSON
 
 
 def _check_free(connection: sqlite3.Connection, name: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
-from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +13,7 @@ from kineme.anchoring.proposals.assign import assign_described
 from kineme.anchoring.proposals.proposals import Proposal, Proposals
 from kineme.anchoring.proposals.propose import DEFAULT_METHOD
 from kineme.anchoring.proposals.propose import propose as propose_clusters
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.library.recognition.members import described, groups_of
 from kineme.library.storage import changes, read
 from kineme.library.storage.read import Ids
@@ -126,8 +125,7 @@ def accept(store: Store, proposal: Proposal, name: str, description: str | None 
             f"expected movements without a symbol, all {len(proposal.members)} of this proposal show one by now; "
             "propose again"
         )
-    version = changes.assign(store, members, name, "anchored", proposal.medoid)
-    return version if description is None else changes.annotate(store, name, description=description)
+    return changes.assign(store, members, name, "anchored", proposal.medoid, description)
 
 
 def reject(store: Store, proposal: Proposal) -> int:

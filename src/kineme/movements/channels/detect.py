@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from kineme.errors import DataError, SpecificationError
 from kineme.movements.channels.channel import KINDS, ORDERS, Channel, Channels
 from kineme.movements.channels.coordinates import in_order, with_periods
+from kineme.movements.channels.joint_columns import find_numbered_joints
 from kineme.movements.channels.quaternion_columns import Quaternion, find_quaternions, quaternion_of, shared_name
 from kineme.movements.channels.wraps import wrap_period
 from kineme.movements.tables.columns import column_numbers
@@ -23,8 +24,8 @@ Given = Mapping[str, str]
 
 ANGLE_WORDS = frozenset(
     {
-        "joint", "angle", "angles", "theta", "yaw", "pitch", "roll", "heading", "azimuth", "elevation", "euler",
-        "rotation", "flexion", "abduction", "rad", "radian", "radians", "deg", "degree", "degrees",
+        "joint", "joints", "angle", "angles", "theta", "yaw", "pitch", "roll", "heading", "azimuth", "elevation",
+        "euler", "rotation", "flexion", "abduction", "rad", "radian", "radians", "deg", "degree", "degrees",
     }
 )  # fmt: skip
 DISCRETE_WORDS = frozenset(
@@ -103,6 +104,7 @@ def find_channels(
     orientations += find_quaternions(heads, free, columns, offsets)
     first = {min(one.columns): one for one in orientations}
     inside = {k for one in orientations for k in one.columns}
+    numbered = find_numbered_joints(heads, [k for k in range(len(heads)) if k not in inside], columns)
     channels: list[Channel] = []
     for k, head in enumerate(heads):
         if k in first:
@@ -111,7 +113,7 @@ def find_channels(
             channels.append(Channel(name, "orientation", tuple(heads[i] for i in four), None, order))
         elif k not in inside:
             unit = (units[k] if units else "") or unit_of(head)
-            kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets)
+            kind = kinds.get(k) or _kind(head, unit, columns[:, k], offsets, k in numbered)
             channels.append(Channel(head, kind, (head,), unit))
     if all(one.kind == "discrete" for one in channels):  # then they are what moves
         return tuple(one if k in kinds else one._replace(kind="position") for k, one in enumerate(channels))
@@ -163,7 +165,7 @@ def _columns_named(heads: Sequence[str], key: str) -> list[int]:
         ) from error
 
 
-def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp]) -> str:
+def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp], is_joint: bool) -> str:
     words = set(words_of(head))
     if words & DISCRETE_WORDS and len(np.unique(values)) <= _LEVELS:
         return "discrete"
@@ -171,6 +173,6 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp])
     rate = "/" in measure or (words & _PER_TIME and words & set(_UNITS_IN_WORDS))
     if rate or words & _OTHER_QUANTITIES or measure in _OTHER_UNITS:
         return "position"
-    if words & ANGLE_WORDS or measure in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
+    if is_joint or words & ANGLE_WORDS or measure in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"

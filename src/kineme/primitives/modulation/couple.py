@@ -12,14 +12,13 @@ the change is least; of averages, as their demonstrations differ.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError
+from kineme.errors import ExtrapolationWarning, SpecificationError, TrajectoryError, warn
 from kineme.primitives.discrete.changes import SLACK, changes
 from kineme.primitives.discrete.dmp import DMP, Primitives
 from kineme.primitives.discrete.modulate import mixed_factor, path_variance, smooth_factor
@@ -169,7 +168,7 @@ def _warn_loose(made: list[Primitives], times: tuple[float, ...], wanted: Array)
     extents = np.maximum(*(one.extents.max(axis=1) for one in made))
     if (worst > _LOOSE * extents).any():
         i = int(np.argmax(worst / extents))
-        warnings.warn(
+        warn(
             f"the difference of movements {i} is {worst[i]:.3g} off, {100 * worst[i] / extents[i]:.2g} % of their "
             "extent: it bends more than the basis functions can; use more of them, or a shorter stretch",
             ExtrapolationWarning,

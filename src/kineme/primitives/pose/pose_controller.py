@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kineme.errors import warn
 from kineme.movements.rotations.one_rotation import exp_one, log_one
 from kineme.movements.rotations.quaternions import conjugate, product_components
 from kineme.primitives.control import inputs
@@ -109,7 +109,7 @@ class PoseController(Controller):
         PoseState
         """
         if pose is not None:
-            warnings.warn("pose= is deprecated: write step(position=...)", DeprecationWarning, stacklevel=2)
+            warn("pose= is deprecated: write step(position=...)", DeprecationWarning, stacklevel=2)
             position = pose
         self._events = Status(0)
         self._step(position, velocity, (goal, goal_velocity), tempo, coupling, (obstacles, obstacle_velocities), dt)

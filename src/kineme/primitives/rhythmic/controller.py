@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kineme.errors import SpecificationError
+from kineme.errors import SpecificationError, warn
 from kineme.primitives.control import inputs
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.moving_goal import FilteredValue
@@ -130,7 +129,7 @@ class RhythmicController(Controller):
 
     def _set_now(self, name: str, change: Callable[[Any], None], value: Any) -> None:
         """Change something between two steps, as a former version allowed it."""
-        warnings.warn(f"setting it is deprecated: write step({name}=...)", DeprecationWarning, stacklevel=3)
+        warn(f"setting it is deprecated: write step({name}=...)", DeprecationWarning, stacklevel=3)
         self._events = Status(0)
         change(value)
         if self._events:

@@ -12,13 +12,12 @@ a few Gauss-Newton steps, safeguarded in ln tau, and the covariance is that arou
 
 from __future__ import annotations
 
-import warnings
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtri
 
-from kineme.errors import ExtrapolationWarning, SpecificationError
+from kineme.errors import ExtrapolationWarning, SpecificationError, warn
 from kineme.primitives.condition import condition
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.discrete.operators import decoder_at
@@ -189,13 +188,13 @@ def _warn_outside(rows: _Rows, whitened: Array, error: Array, deviation: Array, 
             )
     if said:
         message = f"{said}; the movement is a guess there: demonstrate such a one, or give a larger std"
-        warnings.warn(message, ExtrapolationWarning, stacklevel=4)
+        warn(message, ExtrapolationWarning, stacklevel=4)
 
 
 def _warn_unsettled(change: float) -> None:
     """Say that the duration which fits the velocities was not found."""
     if abs(change) > _UNSETTLED:
-        warnings.warn(
+        warn(
             f"after {_STEPS} steps the duration of the conditioned movement still changes by {100 * abs(change):.2g} % "
             "a step, so the velocities are met about as closely only; give a larger velocity_std, fewer velocities, or "
             "such as were demonstrated",

@@ -16,6 +16,7 @@ from kineme.library.storage import read
 from kineme.library.storage.undo import can_undo
 from kineme.output.text import printable
 from kineme.primitives.discrete.formulations import FORMULATIONS
+from kineme.runtime.collector import collector_paused
 from kineme.sampling import evenly_spaced
 from kineme.studio.server.history import listed_history
 from kineme.studio.server.library_records import HistoryOut, LibraryOut, MapOut, MovementsOut, RecordingOut
@@ -89,7 +90,8 @@ class _Document(NamedTuple):
 
 
 def _document(studio: Studio) -> _Document:
-    body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
+    with collector_paused():  # 10,000 symbols are 640,000 lists
+        body = LibraryOut.model_validate(_library(studio)).model_dump_json().encode()
     return _Document(body, f'"{sha256(body).hexdigest()[:20]}"')
 
 

@@ -1,0 +1,59 @@
+"""How far coordinates reach, and a note on columns beside which the others hardly count in what is learned."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from kineme.movements.channels.channel import Channel
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.validation import Array
+
+_MORE = 10.0  # times the extent of all others
+_NAMED = 6  # columns that the sentence names
+_END = re.compile(r"[\W\d_]*([\[(][^\[\]()]*[\])]\s*)?$")  # number and unit
+
+
+def extents_of(demos: Demonstrations) -> Array:
+    """The sides (n, d) of the box around each movement."""
+    x, starts = demos.positions, demos.offsets[:-1]
+    return np.asarray(np.maximum.reduceat(x, starts, axis=0) - np.minimum.reduceat(x, starts, axis=0))
+
+
+def notes_on_extents(demos: Demonstrations) -> list[str]:
+    """A sentence if some columns reach much further than all others, as a gripper in mm beside joints in radians.
+
+    Columns that belong together are one group: one axis or one joint may move alone. Rotations are left aside, they
+    are brought to the size of positions.
+    """
+    greatest = extents_of(demos).max(axis=0, initial=0.0)
+    groups: dict[str, dict[str, float]] = {}
+    at = 0
+    for one in demos.channels or ():
+        if one.kind in ("position", "angle"):
+            groups.setdefault(_group(one), {})[one.name] = float(greatest[at])
+        at += len(one.coordinates)
+    if len(groups) < 2:
+        return []
+    *_, second, widest = sorted(groups.values(), key=lambda group: max(group.values()))
+    here, there = max(widest.values()), max(second.values())
+    return [_note([*widest], here, there)] if there > 0 and here >= _MORE * there else []
+
+
+def _group(one: Channel) -> str:
+    """The same of columns that count in one unit: it is known, or their names are those of axes or joints."""
+    if one.unit or one.kind == "angle":
+        return one.unit or "an angle"
+    stem = _END.sub("", one.name).lower()
+    return "an axis" if stem.endswith(("x", "y", "z")) else stem
+
+
+def _note(names: Sequence[str], here: float, there: float) -> str:
+    what = ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if len(names) > _NAMED else "")
+    spans, steps = ("spans", f", or say --kind {names[0]}=discrete") if len(names) == 1 else ("span", "")
+    return (
+        f"{what} {spans} up to {here:.3g}, the other columns up to {there:.3g}, which hardly count in what is learned: "
+        f"bring all to similar sizes, or choose some with --columns{steps}"
+    )
