@@ -189,6 +189,12 @@ def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, ser
     )
     page.keyboard.press("Delete")
     assert page.locator(".handle").count() == 2
+    page.click("#add-via")
+    page.mouse.move(*center(page, ".handle.via"))
+    page.mouse.down()
+    page.keyboard.press("Delete")  # what the hand holds
+    page.mouse.up()
+    assert page.get_attribute("#move-stage", "class") == "stage"  # nothing is dragged any more
     page.click("#add-obstacle")
     assert page.locator(".handle.obstacle").count() == 1
     with page.expect_response("**/api/rollout") as answered:
@@ -350,6 +356,24 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     assert page.inner_text(".rank:first-child .rank-name") == "GShape"
     assert page.evaluate("window.scrollY") == 0
     assert page.evaluate("window.focused") is None
+
+
+def test_a_second_finger_on_a_handle_does_not_drag_it(opened, served_letters):
+    page = opened(served_letters, "move", has_touch=True)
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    (x, y), client = center(page, ".handle.goal"), page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        points = [{"id": k, "x": at[0], "y": at[1]} for k, at in enumerate(points)]
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", (x, y))
+    touch("touchStart", (x, y), (x + 12, y))
+    touch("touchMove", (x - 40, y), (x + 12, y + 30))
+    touch("touchMove", (x - 80, y), (x + 12, y + 60))
+    np.testing.assert_allclose(center(page, ".handle.goal"), (x - 80, y), atol=0.2)
+    touch("touchEnd")
+    assert page.get_attribute("#move-stage", "class") == "stage"
 
 
 def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened, served_letters):
