@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 import socket
@@ -189,6 +190,12 @@ def test_via_points_and_obstacles_change_the_path_and_can_be_removed(opened, ser
     )
     page.keyboard.press("Delete")
     assert page.locator(".handle").count() == 2
+    page.click("#add-via")
+    page.mouse.move(*center(page, ".handle.via"))
+    page.mouse.down()
+    page.keyboard.press("Delete")  # what the hand holds
+    page.mouse.up()
+    assert page.get_attribute("#move-stage", "class") == "stage"  # nothing is dragged any more
     page.click("#add-obstacle")
     assert page.locator(".handle.obstacle").count() == 1
     with page.expect_response("**/api/rollout") as answered:
@@ -350,6 +357,25 @@ def test_a_finger_draws_without_scrolling_and_without_a_keyboard_of_glass(opened
     assert page.inner_text(".rank:first-child .rank-name") == "GShape"
     assert page.evaluate("window.scrollY") == 0
     assert page.evaluate("window.focused") is None
+
+
+def test_a_second_finger_on_a_handle_does_not_drag_it(opened, served_letters):
+    page = opened(served_letters, "move", has_touch=True)
+    wait_until(page, "document.querySelectorAll('.handle').length === 2")
+    (x, y), client = center(page, ".handle.goal"), page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        points = [{"id": k, "x": at[0], "y": at[1]} for k, at in enumerate(points)]
+        client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", (x, y))
+    touch("touchStart", (x, y), (x + 12, y))
+    touch("touchMove", (x - 40, y), (x + 12, y + 30))
+    touch("touchMove", (x - 80, y), (x + 12, y + 60))
+    touch("touchEnd")
+    wait_until(page, "!document.getElementById('move-stage').classList.contains('dragging')", seconds=5)
+    np.testing.assert_allclose(center(page, ".handle.goal"), (x - 80, y), atol=0.2)
+    assert page.get_attribute("#move-stage", "class") == "stage"
 
 
 def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened, served_letters):
@@ -553,6 +579,14 @@ SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ Answe
 })"""
 
 
+#: Keep what the page tells over its websocket.
+TOLD = """() => {
+  const send = WebSocket.prototype.send;
+  window.told = [];
+  WebSocket.prototype.send = function (text) { window.told.push(text); send.call(this, text); };
+}"""
+
+
 def test_unknown_is_not_said_before_much_is_drawn(opened, served_letters):
     page = opened(served_letters)
     assert page.evaluate(SAYS, [0.05, 1]) == "…"  # every beginning is unlike the whole
@@ -576,6 +610,27 @@ def test_drawing_does_not_move_anything_else(opened, served_letters):
     page.mouse.up()
     assert page.inner_text("#verdict-kind") == "Nothing drawn yet"
     assert page.is_visible("#draw-empty")
+
+
+def test_a_drawing_is_what_the_hand_did_when_the_window_changes(opened, served_letters):
+    page = opened(served_letters)
+    page.evaluate(TOLD)
+    (x, y), height = center(page, "#draw-canvas"), page.locator("#draw-canvas").bounding_box()["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 38, y - 19, steps=19)
+    page.set_viewport_size({"width": 1000, "height": 640})
+    page.mouse.move(x - 40, y - 20)
+    wait_until(page, "document.getElementById('draw-canvas').clientHeight < 600")
+    page.mouse.move(x - 42, y - 21)
+    page.evaluate("location.hash = 'library'")  # as a swipe on the trackpad may do
+    wait_until(page, "document.getElementById('view-draw').hidden")
+    page.mouse.move(x - 44, y - 22)
+    page.mouse.up()
+    wait_until(page, "window.told.some((text) => text.includes('finish'))", seconds=10)
+    told = [sample for text in page.evaluate("window.told") for sample in json.loads(text).get("samples", [])]
+    moved = np.subtract(told[-4:], told[0])[:, 1:] * height / 100  # the canvas is 100 high in units of the letters
+    np.testing.assert_allclose(moved, [(-38, 19), (-40, 20), (-42, 21), (-44, 22)], atol=1e-6)
 
 
 def test_movements_in_space_turn(opened, studio, tmp_path):

@@ -246,6 +246,14 @@ def test_an_empty_host_is_not_every_address():
         serve._listening(serve.Options(Path("none"), host=""))
 
 
+@pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="no socket here listens for IPv6 and IPv4")
+def test_every_address_of_ipv6_is_every_address_of_ipv4_too():
+    with serve._listening(serve.Options(Path("none"), host="::", port=None)) as listening:
+        port = listening.getsockname()[1]
+        for address in ("::1", "127.0.0.1"):
+            socket.create_connection((address, port), 5).close()
+
+
 def test_a_token_that_is_too_short_is_refused(folder, monkeypatch):
     monkeypatch.setenv("KINEME_STUDIO_TOKEN", "short")
     code, said = _refused(folder)

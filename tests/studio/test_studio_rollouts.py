@@ -112,14 +112,23 @@ def test_the_page_lets_it_move_as_the_server_does(client, folder, symbol):
 
 def test_what_only_the_server_lets_move_is_not_sent(client, tmp_path, open_studio):
     times, positions = drawing(1)
-    table = np.column_stack((positions, times > 0.7))
-    channels = (*(Channel(one, "position", (one,)) for one in "xy"), Channel("grip", "discrete", ("grip",)))
-    plain = Demonstrations.from_arrays([table, 1.1 * positions @ np.eye(2, 3) + [0, 0, 1] * table], None, [times] * 2)
+    turn = np.sqrt(np.column_stack((1 - 0.1 * times, 0 * times, 0 * times, 0.1 * times)))
+    table = np.column_stack((times > 0.7, positions, times, turn))
+    channels = (
+        Channel("grip", "discrete", ("grip",)),
+        *(Channel(one, "position", (one,), "m") for one in "xyz"),
+        Channel("q", "orientation", ("qw", "qx", "qy", "qz"), None, "wxyz"),
+    )
+    plain = Demonstrations.from_arrays([table, table * [1, 1.1, 1.1, 1.1, 1, 1, 1, 1]], None, [times] * 2)
     with ActionLibrary(tmp_path / "channels", create=True) as library:
         library.learn(Demonstrations.of_movements(of_channels(plain.movements, channels)), ["grasp"] * 2)
     other = open_studio(tmp_path / "channels")
     assert other.post("/api/primitive", json={"what": {"movement": 1}}).json() is None
-    assert other.post("/api/rollout", json={"what": {"movement": 1}}).status_code == 200
+    made = _rollout(other, {"movement": 1})
+    assert made["columns"] == ["x", "y", "z", "qw", "qx", "qy", "qz"]  # of which start and goal are, as Move asks again
+    there = {one: made[one] for one in ("start", "goal")} | {"via": [[0.5, made["positions"][100]]]}
+    again = _rollout(other, {"movement": 1}, **there, obstacles=[{"center": made["positions"][60], "radius": 0.1}])
+    assert np.shape(again["positions"]) == np.shape(made["positions"])
     assert client.post("/api/primitive", json={"what": {"movement": 99}}).status_code == 404
 
 

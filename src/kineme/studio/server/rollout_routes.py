@@ -12,7 +12,7 @@ from kineme.files.write_movement import encode_movement
 from kineme.studio.server.plain import numbers, thumbnail
 from kineme.studio.server.records import SymbolKey
 from kineme.studio.server.rollout_records import Exported, Moved, Operated, PrimitiveOut, StylesOut, Wanted
-from kineme.studio.server.rollouts import learned_as, make, primitive_document, styles_of
+from kineme.studio.server.rollouts import learned_as, make, moving_positions, primitive_document, styles_of
 from kineme.studio.server.studio import Reads
 
 router = APIRouter(prefix="/api", tags=["movement"])
@@ -20,14 +20,19 @@ router = APIRouter(prefix="/api", tags=["movement"])
 
 @router.post("/rollout", response_model=Moved, summary="A new movement")
 def rollout(studio: Reads, asked: Wanted) -> dict[str, Any]:
-    """Of a symbol, a stored movement or a style: from another start, to another goal, past points and obstacles."""
-    made, recording = make(studio, asked), learned_as(studio, asked).demonstration
-    columns = made.movement.columns
+    """Of a symbol, a stored movement or a style: from another start, to another goal, past points and obstacles.
+
+    Its columns are those that a start and a goal have; the steps of a gripper are in the file that is exported.
+    """
+    made, learned = make(studio, asked), learned_as(studio, asked)
+    columns, recording = made.movement.columns, learned.demonstration
+    positions = moving_positions(learned, made.movement)
     return {
-        **{name: numbers(columns[name]) for name in ("times", "positions", "velocities", "accelerations")},
-        "columns": list(made.movement.names.positions),
-        "start": numbers(columns["positions"][0]),
-        "goal": numbers(columns["positions"][-1] if asked.goal is None else asked.goal),
+        **{name: numbers(columns[name]) for name in ("times", "velocities", "accelerations")},
+        "positions": numbers(positions),
+        "columns": list(learned.moving_columns),
+        "start": numbers(positions[0]),
+        "goal": numbers(positions[-1] if asked.goal is None else asked.goal),
         "recorded": None if recording is None else thumbnail(recording.positions),
         "warnings": made.warnings,
     }

@@ -18,6 +18,7 @@ from kineme.primitives.styles.model import StyleModel
 from kineme.studio.server.rollout_records import Obstacle, Operated, Wanted, What
 from kineme.studio.server.studio import Studio
 from kineme.studio.snapshot.primitive import snapshot_of_primitive
+from kineme.validation import Array
 
 _SAMPLES, _MOST_SAMPLES = 200, 20_000
 _STRONGER = (1.0, 2.0, 4.0, 8.0)  # steering that is tried until no obstacle is touched
@@ -70,6 +71,17 @@ def make(studio: Studio, asked: Wanted) -> Made:
     return Made(movement, list(dict.fromkeys([*heard, *said])))
 
 
+def moving_positions(learned: Learned, made: Generated) -> Array:
+    """The positions that can be led elsewhere: those of discrete channels, such as a gripper's, are left out."""
+    there = list(made.names.positions)
+    return np.asarray(made.columns["positions"])[:, [there.index(name) for name in learned.moving_columns]]
+
+
+def _placed(learned: Learned) -> list[int]:
+    """Which of these columns are no part of an orientation: those that have a velocity of the same name."""
+    return [k for k, name in enumerate(learned.moving_columns) if name in learned.rates]
+
+
 def primitive_document(studio: Studio, asked: Operated) -> str:
     """The primitive of what is asked for as JSON, for the runtime; ``null`` where only the server lets it move."""
     made = snapshot_of_primitive(learned_as(studio, asked).primitive)
@@ -101,11 +113,13 @@ def _around(learned: Learned, options: MovementOptions, balls: list[Obstacle]) -
     centers, radii = [one.center for one in balls], np.array([one.radius for one in balls])
     if len({len(one) for one in centers}) > 1:
         raise SpecificationError("expected obstacles of equally many dimensions")
-    points = np.array(centers)
+    points, placed = np.array(centers), _placed(learned)
+    if points.shape[1] == len(learned.moving_columns):  # a point of the movement: an orientation says nothing of where
+        points = points[:, placed]
     for stronger in _STRONGER:
         avoidance = ObstacleAvoidance(gamma=1000.0 * stronger)
         made = generate(learned, replace(options, obstacles=points, avoidance=avoidance))
-        path = made.columns["positions"][:, : points.shape[1]]
+        path = moving_positions(learned, made)[:, placed][:, : points.shape[1]]
         gaps = np.linalg.norm(path[:, None] - points, axis=2).min(axis=0) - radii
         if (gaps >= 0).all():
             return made, []

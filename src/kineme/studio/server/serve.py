@@ -165,7 +165,8 @@ def _listening(options: Options) -> socket.socket:
 
 def _bound(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    bound = socket.create_server((host, port), family=family)
+    both = host == "::" and socket.has_dualstack_ipv6()  # IPv4, too: the name of this machine is often one of those
+    bound = socket.create_server((host, port), family=family, dualstack_ipv6=both)
     # Connections inherit it. Without it the body of an answer waits 40 ms for the receipt of its head to be confirmed.
     bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return bound

@@ -11,6 +11,8 @@ export class Picture {
     this.ink = [];
     this.rest = [];
     this.pen = null;
+    /** @type {number|null} Of the canvas when what is being drawn began [px]: ink stays under the hand whatever the window does. */
+    this.height = null;
     this.replayed = null;
     this.run = {}; // of the replay that is under way
     /** @type {import("./frame.js").Frame|null} Of a movement that was not drawn here. */
@@ -22,7 +24,8 @@ export class Picture {
   /** @param {number[]} point */
   pixel(point) {
     if (this.frame) return this.frame.camera.toScreen(point);
-    return [point[0] * this.board.height, (1 - point[1]) * this.board.height];
+    const height = this.height ?? this.board.height;
+    return [point[0] * height, (1 - point[1]) * height];
   }
 
   /** Whether what is shown is in space. */

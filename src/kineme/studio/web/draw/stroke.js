@@ -11,6 +11,7 @@ export function followPointer(canvas, hear) {
   let kind = "";
   let last = -Infinity;
   let first = 0;
+  let box = canvas.getBoundingClientRect();
 
   /** @param {PointerEvent} event @returns {Sample[]} */
   const samplesOf = (event) => {
@@ -18,10 +19,7 @@ export function followPointer(canvas, hear) {
     return (events.length ? events : [event]).map((one) => sampleOf(one)).filter(later);
   };
   /** @param {PointerEvent} event @returns {Sample} */
-  const sampleOf = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return [(event.timeStamp - first) / 1000, (event.clientX - box.left) / box.height, 1 - (event.clientY - box.top) / box.height];
-  };
+  const sampleOf = (event) => [(event.timeStamp - first) / 1000, (event.clientX - box.left) / box.height, 1 - (event.clientY - box.top) / box.height];
   /** @param {Sample} sample */
   const later = (sample) => {
     if (sample[0] <= last) return false;
@@ -41,6 +39,7 @@ export function followPointer(canvas, hear) {
     kind = event.pointerType;
     canvas.setPointerCapture(pointer);
     first = event.timeStamp;
+    box = canvas.getBoundingClientRect(); // where it is now: the hand does not jump when the window does
     last = -Infinity;
     hear.goes([sampleOf(event)].filter(later));
   });

@@ -89,6 +89,7 @@ class Draw {
     if (!takesDrawings() || this.picture.turns) return false;
     this.clear();
     this.drawing = true;
+    this.picture.height = this.picture.board.height;
     this.kind = kind;
     this.sending.reset();
     this.height = canvasHeight();
@@ -106,6 +107,7 @@ class Draw {
 
   ends() {
     this.drawing = false;
+    this.picture.height = null;
     this.picture.rest = [];
     this.picture.board.draw();
     const { ink } = this.picture;
@@ -223,7 +225,7 @@ class Draw {
   clear() {
     this.follow.leave();
     byId("sources").classList.remove("waits");
-    Object.assign(this.picture, { ink: [], rest: [], replayed: null });
+    Object.assign(this.picture, { ink: [], rest: [], height: null, replayed: null });
     this.picture.board.draw();
     this.whole = null;
     this.label = null;

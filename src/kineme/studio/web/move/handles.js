@@ -1,4 +1,5 @@
 // The points one can take hold of: buttons over the picture, for the hand and for arrow keys.
+import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
 
 const STEP = 6; // of an arrow key [px]; ten times with Shift
@@ -15,6 +16,7 @@ export class Handles {
     this.page = page;
     /** @type {Map<string, {handle: Handle, button: HTMLElement}>} */
     this.made = new Map();
+    this.held = 0; // one by each finger
   }
 
   /** @param {Handle[]} handles Those that there are now. */
@@ -44,22 +46,20 @@ export class Handles {
 
   /** @param {{handle: Handle, button: HTMLElement}} made @param {PointerEvent} event */
   grab(made, event) {
-    if (event.button !== 0) return;
-    event.preventDefault();
-    made.button.focus({ preventScroll: true });
-    made.button.setPointerCapture(event.pointerId);
     let [x, y] = [event.clientX, event.clientY];
-    this.page.moving(true);
     const go = (/** @type {PointerEvent} */ now) => {
       made.handle.move(this.camera.moved(made.handle.at(), now.clientX - x, now.clientY - y));
       [x, y] = [now.clientX, now.clientY];
     };
     const end = () => {
-      made.button.removeEventListener("pointermove", go);
-      this.page.moving(false);
+      this.held -= 1;
+      this.page.moving(this.held > 0);
     };
-    made.button.addEventListener("pointermove", go);
-    made.button.addEventListener("lostpointercapture", end, { once: true });
+    if (!drag(made.button, event, go, end)) return;
+    event.preventDefault();
+    made.button.focus({ preventScroll: true });
+    this.held += 1;
+    this.page.moving(true);
   }
 
   /** @param {{handle: Handle, button: HTMLElement}} made @param {KeyboardEvent} event */

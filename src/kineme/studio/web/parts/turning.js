@@ -1,15 +1,12 @@
 // A view in space is turned by dragging its background, and by the arrow keys.
+import { drag } from "./dragging.js";
 
 const STEPS = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
 
 /** @param {HTMLCanvasElement} canvas @param {() => boolean} turns Whether it can be turned now. @param {(dx: number, dy: number) => void} turn By pixels. */
 export function followTurns(canvas, turns, turn) {
   canvas.addEventListener("pointerdown", (event) => {
-    if (!turns() || event.button !== 0) return;
-    canvas.setPointerCapture(event.pointerId);
-    const go = (/** @type {PointerEvent} */ now) => turn(now.movementX, now.movementY);
-    canvas.addEventListener("pointermove", go);
-    canvas.addEventListener("lostpointercapture", () => canvas.removeEventListener("pointermove", go), { once: true });
+    if (turns()) drag(canvas, event, (now) => turn(now.movementX, now.movementY));
   });
   canvas.addEventListener("keydown", (event) => {
     const step = STEPS[event.key];

@@ -1,5 +1,6 @@
 // The recording over time: its columns, what was found, and the edges of the span that is chosen.
 import { Board, color } from "../parts/canvas.js";
+import { drag } from "../parts/dragging.js";
 import { byId, make } from "../parts/elements.js";
 import { line, readableOn } from "../parts/lines.js";
 import { COLORS, lookOf, symbolNamed } from "../parts/library_state.js";
@@ -96,15 +97,12 @@ export class Timeline {
   /** @param {"begin"|"end"} which */
   edge(which) {
     const button = make("button", { class: "edge", type: "button", role: "slider", hidden: true, "data-key": `edge ${which}` });
+    const go = (/** @type {PointerEvent} */ now) => this.moveEdge(which, this.time(now.clientX - this.board.canvas.getBoundingClientRect().left));
     button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      if (!drag(button, event, go, () => this.page.changed())) return;
       event.preventDefault();
       button.focus({ preventScroll: true });
-      button.setPointerCapture(event.pointerId);
     });
-    button.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
-      if (button.hasPointerCapture(event.pointerId)) this.moveEdge(which, this.time(event.clientX - this.board.canvas.getBoundingClientRect().left));
-    });
-    button.addEventListener("lostpointercapture", () => this.page.changed());
     button.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const step = { ArrowLeft: -1, ArrowRight: 1, ArrowDown: -1, ArrowUp: 1 }[event.key];
       if (!step) return;
@@ -119,6 +117,7 @@ export class Timeline {
   /** @param {"begin"|"end"} which @param {number} time */
   moveEdge(which, time) {
     const span = this.spans[this.chosen];
+    if (!span) return; // another finger has chosen none
     const least = 0.02;
     span[which] = which === "begin" ? Math.min(Math.max(time, this.whole[0]), span.end - least) : Math.max(Math.min(time, this.whole[1]), span.begin + least);
     this.board.now();
@@ -139,11 +138,8 @@ export class Timeline {
   grab(event) {
     const at = this.time(event.offsetX);
     const hit = this.spans.findIndex((span) => span.begin <= at && at <= span.end);
-    this.page.choose(hit);
-    this.board.canvas.setPointerCapture(event.pointerId);
     const go = (/** @type {PointerEvent} */ now) => this.pan((-now.movementX / (this.board.width - 2 * SIDE)) * (this.range[1] - this.range[0]));
-    this.board.canvas.addEventListener("pointermove", go);
-    this.board.canvas.addEventListener("lostpointercapture", () => this.board.canvas.removeEventListener("pointermove", go), { once: true });
+    if (drag(this.board.canvas, event, go)) this.page.choose(hit);
   }
 
   pan(/** @type {number} */ by) {
