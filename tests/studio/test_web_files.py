@@ -345,13 +345,25 @@ def test_nothing_is_asked_from_another_host(path):
     assert not re.findall(r"(?:https?:)?//[\w.-]+\.\w+|@import|url\(", path.read_text())
 
 
+def _lines_that_find_elements():
+    """Lines of scripts that name elements by their ids, also as a list; the viewer of arms runs in `arm.html`."""
+    viewer = WEB.parents[1] / "robots" / "view" / "page" / "viewer.js"
+    return [line for path in (*SCRIPTS, viewer) for line in path.read_text().splitlines() if "byId" in line]
+
+
 def test_every_id_is_one_elements_and_is_used():
-    page = (WEB / "index.html").read_text()
-    ids = re.findall(r'\sid="([^"]+)"', page)
-    assert len(ids) == len(set(ids))
+    pages = [path.read_text() for path in PAGES]
+    ids = [re.findall(r'\sid="([^"]+)"', page) for page in pages]
+    assert all(len(one) == len(set(one)) for one in ids)
     wanted = {name for path in SCRIPTS for name in re.findall(r'byId\("([\w-]+)"\)', path.read_text())}
-    known = {*ids, *re.findall(r'\sid="([^"]+)"', (WEB / "arm.html").read_text())}
-    assert wanted - known <= {"data"}  # made by robot/arm.js
+    assert wanted - {name for one in ids for name in one} <= {"data"}  # made by robot/arm.js
+    views = json.loads(re.search(r"VIEWS = (\[.*?\])", (WEB / "parts" / "views.js").read_text())[1])
+    used = {f"{part}-{view}" for part in ("tab", "view") for view in views}
+    used |= {name for line in _lines_that_find_elements() for name in re.findall(r'"([\w-]+)"', line)}
+    used |= {name for path in STYLES for name in re.findall(r"#([\w-]+)", path.read_text())}
+    naming = r'\s(?:aria-(?:controls|labelledby|describedby)|for|list)="([^"]+)"'
+    used |= {name for page in pages for several in re.findall(naming, page) for name in several.split()}
+    assert [name for one in ids for name in one if name not in used] == []
 
 
 def test_what_a_module_exports_is_imported():
