@@ -243,6 +243,17 @@ def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_ask
     }
 
 
+BROKEN = """globalThis.document = { createElement: () => "|" };
+const { breakable } = await import(`${process.argv[1]}/parts/breakable.js`);
+console.log(JSON.stringify(process.argv.slice(2).map((name) => breakable(name).join(""))));"""
+
+
+@needs_node
+def test_names_break_where_their_words_meet(modules):
+    names = ["Double|Bended|Line", "pick_|and_|place", "GShape", "step-|2/|b", "a b", "x" * 190, "", "-"]
+    assert _in_node(BROKEN, modules, *(name.replace("|", "") for name in names)) == names
+
+
 REPLAYED = """const frames = [];
 globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
 globalThis.ResizeObserver = class { observe() {} };

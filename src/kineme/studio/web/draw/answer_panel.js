@@ -1,4 +1,5 @@
 // What it is: a word, how far along, the candidates with their bars. Rows stay where they are.
+import { breakable } from "../parts/breakable.js";
 import { byId, fill, make, write } from "../parts/elements.js";
 
 const ROWS = 5;
@@ -32,7 +33,7 @@ export class AnswerPanel {
   /** @param {string} kind @param {string} word @param {string} note @param {string} state open, known, unknown */
   words(kind, word, note, state) {
     write(byId("verdict-kind"), kind);
-    write(byId("verdict"), word);
+    if (byId("verdict").textContent !== word) fill(byId("verdict"), ...breakable(word));
     write(byId("verdict-note"), note || "\u00a0");
     byId("verdict").parentElement.dataset.state = state;
   }

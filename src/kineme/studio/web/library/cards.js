@@ -1,4 +1,5 @@
 // The symbols as cards: a picture, a name, how many movements; a box to choose several.
+import { breakable } from "../parts/breakable.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { found } from "../parts/find.js";
 import { keepingFocus } from "../parts/keep_focus.js";
@@ -16,7 +17,7 @@ function card(symbol, page) {
     "button",
     { class: "card-open", type: "button", "aria-current": symbol.id === page.opened ? "true" : null, "data-key": `open ${symbol.id}`, on: { click: () => page.open(symbol.id) } },
     thumbnail(symbol.path),
-    make("span", { class: "card-name", title: symbol.name }, symbol.name),
+    make("span", { class: "card-name", title: symbol.name }, ...breakable(symbol.name)),
     make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
   );
   return make("li", { class: "card" }, open, box);

@@ -1,4 +1,5 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
+import { breakable } from "../parts/breakable.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
@@ -103,7 +104,7 @@ export class SymbolPanel {
     const moveIt = () => (chooseToMove(symbol.id), show("move", true));
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
     return [
-      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, symbol.name), make("p", { class: "soft" }, facts))),
+      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts))),
       make("div", { class: "row" }, button("Move it", moveIt, "main"), button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")),
       description(symbol),
     ];
