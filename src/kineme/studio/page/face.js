@@ -1,7 +1,7 @@
 // The page: draw, see live what it is, drag start and goal.
 
-import { breakable } from "../web/parts/breakable.js";
 import { open } from "../javascript/runtime.js";
+import { breakable } from "../web/parts/breakable.js";
 import { element, make } from "./elements.js";
 import { createKnown } from "./known.js";
 import { createMoving, placed } from "./movements.js";
