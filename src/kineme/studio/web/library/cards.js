@@ -11,7 +11,7 @@ export const chosen = new Set();
 
 /** @param {any} symbol @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 function card(symbol, page) {
-  const box = make("input", { type: "checkbox", class: "choose", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
+  const box = make("input", { type: "checkbox", class: "choose changes", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
   box.addEventListener("change", () => (box.checked ? chosen.add(symbol.id) : chosen.delete(symbol.id), page.chose()));
   const open = make(
     "button",
