@@ -254,6 +254,42 @@ def test_names_break_where_their_words_meet(modules):
     assert _in_node(BROKEN, modules, *(name.replace("|", "") for name in names)) == names
 
 
+NAMED = """const [folder, n] = process.argv.slice(1);
+globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
+globalThis.document = {};
+globalThis.getComputedStyle = () => ({ getPropertyValue: () => "" });
+const symbols = Array.from({ length: n }, (_, k) => ({ id: `${k}`, name: `kind ${k}` }));
+globalThis.fetch = async () => new Response(JSON.stringify({ version: 1, symbols }));
+await (await import(`${folder}/parts/library_state.js`)).refresh();
+const { MovementMap } = await import(`${folder}/library/map.js`);
+const drawn = [];
+const context = {
+  measureText: () => ({ width: 40 }),
+  strokeText() {},
+  fillText: (text, x, y) => drawn.push([text, x, y, context.globalAlpha]),
+};
+const points = symbols.map(({ id }) => ({ symbol: id }));
+const board = { context, width: 800, height: 400 };
+const map = Object.assign(Object.create(MovementMap.prototype), { points, at: -1, board });
+const pixels = symbols.map((_, k) => [30 + ((k * 37) % 740), 30 + ((k * 61) % 340)]);
+map.names(pixels);
+const all = drawn.splice(0);
+map.at = n - 1;
+map.names(pixels);
+console.log(JSON.stringify([all, drawn.at(-1), pixels]));"""
+
+
+@needs_node
+def test_a_map_of_many_symbols_has_the_names_that_fit_and_the_one_that_is_pointed_at(modules):
+    names, pointed, dots = _in_node(NAMED, modules, 100)
+    assert len(names) > 20
+    at = np.array([name[1:3] for name in names])
+    apart = np.abs(at[:, None] - at) >= [40, 15]
+    assert (apart.any(axis=2) | np.eye(len(at), dtype=bool)).all()
+    assert (np.abs(at[:, None] - [0, 4] - dots) >= [20, 9]).any(axis=2).all()  # no name covers a dot
+    assert (pointed[0], pointed[3]) == ("kind 99", 1)
+
+
 REPLAYED = """const frames = [];
 globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
 globalThis.ResizeObserver = class { observe() {} };
