@@ -22,16 +22,13 @@ pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 _robot = lru_cache(load)
 
 
-def interpolated(trajectory, parts):
-    """Times, positions, velocities and accelerations between the samples by SciPy, of the fifth order."""
-    t = trajectory
-    curve = BPoly.from_derivatives(t.times, np.stack((t.positions, t.velocities, t.accelerations), axis=1))
-    fine = np.unique(np.concatenate([t.times[:-1] + np.diff(t.times) * k / parts for k in range(parts)]))
-    fine = np.append(fine, t.duration)
-    return fine, curve(fine), curve(fine, 1), curve(fine, 2)
+def fine_times(trajectory, parts):
+    """Times of the samples, and of `parts` - 1 instants between each two."""
+    t = trajectory.times
+    return np.append(np.unique(np.concatenate([t[:-1] + np.diff(t) * k / parts for k in range(parts)])), t[-1])
 
 
-def sent(robot, times, positions, rest=None):
+def sent(robot, times, positions):
     """Samples of one joint after another that stand at each of them."""
     still = np.zeros_like(positions)
     return JointTrajectory(robot.joints, np.asarray(times, dtype=float), positions, still, still, {})
@@ -42,7 +39,9 @@ def test_it_is_the_polynomial_of_the_fifth_order():
     times = np.cumsum(rng.uniform(0.1, 1, 6))
     q, v, a = rng.normal(size=(3, 6, 2))
     given = JointTrajectory(("a", "b"), times - times[0], q, v, a, {"grip": np.arange(6.0)})
-    fine, positions, velocities, accelerations = interpolated(given, 7)
+    fine = fine_times(given, 7)
+    curve = BPoly.from_derivatives(given.times, np.stack((q, v, a), axis=1))
+    positions, velocities, accelerations = curve(fine), curve(fine, 1), curve(fine, 2)
     made = between(given, fine)
     np.testing.assert_allclose(made.positions, positions, atol=1e-9)
     np.testing.assert_allclose(made.velocities, velocities, atol=1e-8)
@@ -63,7 +62,9 @@ def test_at_every_rate_limits_and_path_are_kept_between_samples_or_it_is_refused
         made = move(stroke(robot, seconds), robot, timing=timing, rate=rate)
     except TrajectoryError:
         return
-    times, q, v, _ = interpolated(made.trajectory, 4)
+    times = fine_times(made.trajectory, 4)
+    followed = between(made.trajectory, times)
+    q, v = followed.positions, followed.velocities
     assert np.all((q >= robot.lower - 1e-3) & (q <= robot.upper + 1e-3))
     assert np.all(np.abs(v) <= 1.05 * robot.velocity)
     assert np.all(np.abs(np.diff(v[::2], axis=0) / np.diff(times[::2])[:, None]) <= 1.15 * robot.acceleration)

@@ -68,9 +68,8 @@ def _in_words(error: Exception) -> str:
 def _say_compiling() -> None:
     from tqdm import tqdm
 
-    tqdm.write(
-        "compiling for this machine; later commands find it done", file=sys.stderr
-    )  # above a progress bar, if there is one
+    # above a progress bar, if there is one
+    tqdm.write("compiling for this machine; later commands find it done", file=sys.stderr)
 
 
 @click.group(cls=_OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})
