@@ -106,7 +106,28 @@ def test_a_movement_of_no_known_letter_is_unknown(opened, served_letters):
     page = opened(served_letters)
     draw(page, letters("Zshape")[0])
     wait_for_text(page, "#verdict", "Unknown")
-    assert page.is_disabled("#naming-name")  # it is open for reading only
+    wait_for_text(page, "#spoken", "Unknown.")  # and nothing about a name: it is open for reading only
+
+
+#: What looks as if it could change the library: buttons for that, and fields that are filled in for that.
+CHANGES = """() => [...document.querySelectorAll("main button, main textarea, main input, #undo")]
+  .filter((one) => one.checkVisibility())
+  .filter((one) => one.disabled || one.matches("textarea, .member") || /name|delete|learn|save/i.test(one.textContent))
+  .map((one) => one.id || one.textContent || one.className)"""
+
+
+def test_a_library_that_is_only_shown_offers_no_changes(opened, served_letters):
+    page = opened(served_letters)
+    draw(page, letters("GShape")[SHOWN])
+    wait_until(page, ANSWERED)
+    assert page.evaluate(CHANGES) == []
+    show(page, "library")
+    page.locator(".card-open").first.click()
+    wait_until(page, "n => document.querySelectorAll('.member').length === n", SHOWN)
+    assert page.evaluate(CHANGES) == []
+    page.evaluate(DROP, ["labeled.csv", _labeled("of a file")])
+    wait_for_text(page, "#recording-name", "labeled.csv")
+    assert page.evaluate(CHANGES) == []
 
 
 def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing(opened, studio, tmp_path):

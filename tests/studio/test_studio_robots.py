@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from studio_samples import drawing
 
+from kineme import ActionLibrary, Trajectory
 from kineme.errors import DataError
+from kineme.robots.kinematics import reach
+from kineme.robots.planning import remedy
 from kineme.studio.server import robot_routes
+from kineme.studio.server.studio_words import in_studio_words
 
 SIZE = 0.15  # meters on the arm
 
@@ -49,6 +54,26 @@ def test_what_an_arm_must_not_do_is_refused_with_the_checks_that_failed(client, 
     assert (made["passed"], made["scene"]) == (False, None)
     assert "cannot execute" in made["refusal"] or "expected" in made["refusal"]
     assert not made["checks"] or not all(one["passed"] for one in made["checks"])
+    assert "tick 'Slow down where limits need it'" in made["refusal"]
+    assert "--" not in made["refusal"]
+
+
+def test_what_to_do_about_a_refusal_is_there_in_the_studio(client, symbol, arms):
+    large = _move(client, symbol, size=3.0).json()["error"]
+    assert large.endswith("m away; make the movement smaller")
+    for text in (reach._REMEDY, remedy._ELSEWHERE, remedy._OTHER_JOINTS):
+        assert "--" not in in_studio_words(text)
+
+
+@pytest.mark.parametrize("d", [1, 4])
+def test_an_arm_that_has_nowhere_to_go_says_which_movements_it_needs(open_studio, tmp_path, arms, d):
+    with ActionLibrary(tmp_path / "other", create=True) as library:
+        t, x = drawing(0)
+        library.learn([Trajectory(t, np.tile(x, 2)[:, :d])], ["other"])
+    other = open_studio(tmp_path / "other")
+    refused = _move(other, other.get("/api/library").json()["symbols"][0]["id"]).json()["error"]
+    assert f"got {d} among" in refused
+    assert "make a library of movements in the plane or in space" in refused
 
 
 @pytest.mark.parametrize("robot", ["/etc/passwd", "x.urdf", "", "../panda.urdf"])

@@ -243,6 +243,53 @@ def test_what_moves_is_never_the_path_of_another_movement_and_what_failed_is_ask
     }
 
 
+BROKEN = """globalThis.document = { createElement: () => "|" };
+const { breakable } = await import(`${process.argv[1]}/parts/breakable.js`);
+console.log(JSON.stringify(process.argv.slice(2).map((name) => breakable(name).join(""))));"""
+
+
+@needs_node
+def test_names_break_where_their_words_meet(modules):
+    names = ["Double|Bended|Line", "pick_|and_|place", "GShape", "step-|2/|b", "a b", "x" * 190, "", "-"]
+    assert _in_node(BROKEN, modules, *(name.replace("|", "") for name in names)) == names
+
+
+NAMED = """const [folder, n] = process.argv.slice(1);
+globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
+globalThis.document = {};
+globalThis.getComputedStyle = () => ({ getPropertyValue: () => "" });
+const symbols = Array.from({ length: n }, (_, k) => ({ id: `${k}`, name: `kind ${k}` }));
+globalThis.fetch = async () => new Response(JSON.stringify({ version: 1, symbols }));
+await (await import(`${folder}/parts/library_state.js`)).refresh();
+const { MovementMap } = await import(`${folder}/library/map.js`);
+const drawn = [];
+const context = {
+  measureText: () => ({ width: 40 }),
+  strokeText() {},
+  fillText: (text, x, y) => drawn.push([text, x, y, context.globalAlpha]),
+};
+const points = symbols.map(({ id }) => ({ symbol: id }));
+const board = { context, width: 800, height: 400 };
+const map = Object.assign(Object.create(MovementMap.prototype), { points, at: -1, board });
+const pixels = symbols.map((_, k) => [30 + ((k * 37) % 740), 30 + ((k * 61) % 340)]);
+map.names(pixels);
+const all = drawn.splice(0);
+map.at = n - 1;
+map.names(pixels);
+console.log(JSON.stringify([all, drawn.at(-1), pixels]));"""
+
+
+@needs_node
+def test_a_map_of_many_symbols_has_the_names_that_fit_and_the_one_that_is_pointed_at(modules):
+    names, pointed, dots = _in_node(NAMED, modules, 100)
+    assert len(names) > 20
+    at = np.array([name[1:3] for name in names])
+    apart = np.abs(at[:, None] - at) >= [40, 15]
+    assert (apart.any(axis=2) | np.eye(len(at), dtype=bool)).all()
+    assert (np.abs(at[:, None] - [0, 4] - dots) >= [20, 9]).any(axis=2).all()  # no name covers a dot
+    assert (pointed[0], pointed[3]) == ("kind 99", 1)
+
+
 REPLAYED = """const frames = [];
 globalThis.window = { matchMedia: () => ({ addEventListener() {} }) };
 globalThis.ResizeObserver = class { observe() {} };
@@ -345,13 +392,25 @@ def test_nothing_is_asked_from_another_host(path):
     assert not re.findall(r"(?:https?:)?//[\w.-]+\.\w+|@import|url\(", path.read_text())
 
 
+def _lines_that_find_elements():
+    """Lines of scripts that name elements by their ids, also as a list; the viewer of arms runs in `arm.html`."""
+    viewer = WEB.parents[1] / "robots" / "view" / "page" / "viewer.js"
+    return [line for path in (*SCRIPTS, viewer) for line in path.read_text().splitlines() if "byId" in line]
+
+
 def test_every_id_is_one_elements_and_is_used():
-    page = (WEB / "index.html").read_text()
-    ids = re.findall(r'\sid="([^"]+)"', page)
-    assert len(ids) == len(set(ids))
+    pages = [path.read_text() for path in PAGES]
+    ids = [re.findall(r'\sid="([^"]+)"', page) for page in pages]
+    assert all(len(one) == len(set(one)) for one in ids)
     wanted = {name for path in SCRIPTS for name in re.findall(r'byId\("([\w-]+)"\)', path.read_text())}
-    known = {*ids, *re.findall(r'\sid="([^"]+)"', (WEB / "arm.html").read_text())}
-    assert wanted - known <= {"data"}  # made by robot/arm.js
+    assert wanted - {name for one in ids for name in one} <= {"data"}  # made by robot/arm.js
+    views = json.loads(re.search(r"VIEWS = (\[.*?\])", (WEB / "parts" / "views.js").read_text())[1])
+    used = {f"{part}-{view}" for part in ("tab", "view") for view in views}
+    used |= {name for line in _lines_that_find_elements() for name in re.findall(r'"([\w-]+)"', line)}
+    used |= {name for path in STYLES for name in re.findall(r"#([\w-]+)", path.read_text())}
+    naming = r'\s(?:aria-\w+|for|list)="([^"]+)"'
+    used |= {name for page in pages for several in re.findall(naming, page) for name in several.split()}
+    assert [name for one in ids for name in one if name not in used] == []
 
 
 def test_what_a_module_exports_is_imported():

@@ -1,6 +1,7 @@
 // The page: draw, see live what it is, drag start and goal.
 
 import { open } from "../javascript/runtime.js";
+import { breakable } from "../web/parts/breakable.js";
 import { element, make } from "./elements.js";
 import { createKnown } from "./known.js";
 import { createMoving, placed } from "./movements.js";
@@ -68,7 +69,8 @@ function paintMoving(moving) {
 /** Words of the answer; a reader of the screen is told once for each verdict. */
 function say(verdict, reason, kind = "") {
   const said = element("verdict");
-  if (said.textContent !== verdict) said.textContent = said.title = verdict;
+  if (said.textContent !== verdict) said.replaceChildren(...breakable(verdict));
+  said.title = verdict;
   said.className = kind;
   element("reason").textContent = state.note || reason;
 }

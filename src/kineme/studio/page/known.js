@@ -1,5 +1,6 @@
 // The known movements: small pictures as buttons, one of them chosen; many are found by words of their names.
 
+import { breakable } from "../web/parts/breakable.js";
 import { element, make } from "./elements.js";
 import { boxOf, createStage } from "./stage.js";
 
@@ -15,7 +16,7 @@ export function createKnown(runtime, prototypes, choose) {
   const buttons = runtime.classes.map((name) => {
     const picture = make("canvas", { className: "picture" });
     picture.setAttribute("aria-hidden", "true");
-    const button = make("button", { type: "button", title: name }, picture, make("span", { textContent: name }));
+    const button = make("button", { type: "button", title: name }, picture, make("span", {}, ...breakable(name)));
     button.addEventListener("click", () => choose(name));
     element("symbols").append(make("li", {}, button));
     return button;

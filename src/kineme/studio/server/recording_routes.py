@@ -31,6 +31,7 @@ from kineme.studio.server.recording_records import (
 )
 from kineme.studio.server.records import Learned, RecordingKey
 from kineme.studio.server.studio import Reads, Studio, Writes
+from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.uploads import go_on
 from kineme.studio.server.work import Work, while_wanted
 
@@ -60,7 +61,7 @@ async def send(
     return {
         "recording": key,
         "tables": [_table(read, k) for k in range(len(read))],
-        "problems": [str(one) for one in read.problems],
+        "problems": [in_studio_words(str(one)) for one in read.problems],
         "plots": [_plot(read, k) for k in range(len(read))],
     }
 

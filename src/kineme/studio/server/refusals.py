@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from kineme.errors import KinemeError
 from kineme.library.storage.sqlite_errors import BusyError
 from kineme.output.text import in_markup
+from kineme.studio.server.studio_words import in_studio_words
 from kineme.studio.server.work import StoppedError
 
 _LOG = logging.getLogger("kineme.studio")
@@ -95,7 +96,7 @@ def answer_errors(app: FastAPI) -> None:
         return JSONResponse({"error": text}, status)
 
     async def refused(_: Request, error: Any) -> JSONResponse:
-        return answer(503 if isinstance(error, BusyError) else 400, str(error))
+        return answer(503 if isinstance(error, BusyError) else 400, in_studio_words(str(error)))
 
     async def missing(_: Request, error: Any) -> JSONResponse:
         return answer(404, str(error))

@@ -24,6 +24,7 @@ from kineme.studio.server.plain import numbers
 from kineme.studio.server.robot_records import ArmMoved, ArmsOut, ArmWanted
 from kineme.studio.server.rollouts import learned_as
 from kineme.studio.server.studio import Reads
+from kineme.studio.server.studio_words import in_studio_words
 
 router = APIRouter(prefix="/api/robots", tags=["robots"])
 
@@ -67,7 +68,7 @@ def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
             steps=generated.steps,
         )
     except InfeasibleError as error:
-        return {**_answer(robot, error.preflight), "refusal": str(error), "scene": None}
+        return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
     return {**_answer(robot, made.preflight), "refusal": None, "scene": _scene(made)}
 
 

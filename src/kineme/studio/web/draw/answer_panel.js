@@ -1,5 +1,7 @@
 // What it is: a word, how far along, the candidates with their bars. Rows stay where they are.
+import { breakable } from "../parts/breakable.js";
 import { byId, fill, make, write } from "../parts/elements.js";
+import { library } from "../parts/library_state.js";
 
 const ROWS = 5;
 const BEGUN = 0.1; // share of the path from which unknown is said: every beginning is unlike the whole
@@ -32,7 +34,7 @@ export class AnswerPanel {
   /** @param {string} kind @param {string} word @param {string} note @param {string} state open, known, unknown */
   words(kind, word, note, state) {
     write(byId("verdict-kind"), kind);
-    write(byId("verdict"), word);
+    if (byId("verdict").textContent !== word) fill(byId("verdict"), ...breakable(word));
     write(byId("verdict-note"), note || "\u00a0");
     byId("verdict").parentElement.dataset.state = state;
   }
@@ -92,7 +94,7 @@ export class AnswerPanel {
     this.progress(1);
     this.kind("p-value of each name");
     this.list(ranked, null, pValue);
-    this.speak(answer.label === null ? "Unknown. Give it a name." : `${answer.calibrated ? "This is" : "Most like"} ${answer.label}.`);
+    this.speak(answer.label === null ? `Unknown.${library().read_only ? "" : " Give it a name."}` : `${answer.calibrated ? "This is" : "Most like"} ${answer.label}.`);
   }
 
   /** To a screen reader, once each. @param {string} text */

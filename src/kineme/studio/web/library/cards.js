@@ -1,4 +1,5 @@
 // The symbols as cards: a picture, a name, how many movements; a box to choose several.
+import { breakable } from "../parts/breakable.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
 import { found } from "../parts/find.js";
 import { keepingFocus } from "../parts/keep_focus.js";
@@ -10,13 +11,13 @@ export const chosen = new Set();
 
 /** @param {any} symbol @param {{open: (id: string) => void, opened: string|null, chose: () => void}} page */
 function card(symbol, page) {
-  const box = make("input", { type: "checkbox", class: "choose", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
+  const box = make("input", { type: "checkbox", class: "choose changes", "aria-label": `Choose ${symbol.name}`, checked: chosen.has(symbol.id), "data-key": `choose ${symbol.id}` });
   box.addEventListener("change", () => (box.checked ? chosen.add(symbol.id) : chosen.delete(symbol.id), page.chose()));
   const open = make(
     "button",
     { class: "card-open", type: "button", "aria-current": symbol.id === page.opened ? "true" : null, "data-key": `open ${symbol.id}`, on: { click: () => page.open(symbol.id) } },
     thumbnail(symbol.path),
-    make("span", { class: "card-name", title: symbol.name }, symbol.name),
+    make("span", { class: "card-name", title: symbol.name }, ...breakable(symbol.name)),
     make("span", { class: "soft small" }, counted(symbol.n_members, "movement")),
   );
   return make("li", { class: "card" }, open, box);

@@ -8,6 +8,7 @@ import { tried } from "../parts/toasts.js";
 
 const EDGE = 34; // [px]
 const NEAR = 18; // how close a pointer must be [px]
+const MANY = 40; // symbols, whose names would cover the dots
 
 export class MovementMap {
   /** @param {(symbol: string) => void} open "" for a movement without one. */
@@ -55,34 +56,48 @@ export class MovementMap {
     this.names(pixels);
   }
 
-  /** @param {number[][]} pixels */
+  /** As many names as fit; the one under the pointer in any case, and clearly. @param {number[][]} pixels */
   names(pixels) {
-    const { context, width } = this.board;
+    const { context } = this.board;
     const places = new Map();
-    /** @type {number[][]} */
-    const taken = [];
     this.points.forEach((point, k) => point.symbol !== null && places.set(point.symbol, [...(places.get(point.symbol) ?? []), pixels[k]]));
-    if (places.size > 40) return;
+    const chosen = this.points[this.at]?.symbol ?? null;
+    const taken = places.size > MANY ? pixels.map(([x, y]) => [x - 7, x + 7, y + 4, 12]) : [];
     Object.assign(context, { font: `600 13px ${color("--font")}`, textAlign: "center", lineWidth: 4, strokeStyle: color("--surface"), fillStyle: color("--text"), lineJoin: "round" });
-    for (const [id, members] of places) {
-      const name = symbolOf(id)?.name ?? "";
-      const short = name.length > 18 ? `${name.slice(0, 17)}…` : name;
-      const half = context.measureText(short).width / 2 + 4;
-      const x = Math.min(Math.max(members.reduce((/** @type {number} */ sum, /** @type {number[]} */ one) => sum + one[0], 0) / members.length, half), width - half);
-      const y = this.freeLine(members, x, half, taken);
-      if (y === null) continue;
-      taken.push([x - half, x + half, y]);
-      context.strokeText(short, x, y);
-      context.fillText(short, x, y);
-    }
+    context.globalAlpha = chosen === null ? 1 : 0.3;
+    for (const [id, members] of places) if (id !== chosen) this.name(id, members, taken);
+    context.globalAlpha = 1;
+    if (chosen !== null) this.name(chosen, places.get(chosen), []);
   }
 
-  /** Above or below the dots of a name, where no other name stands; null where there is no room. */
-  freeLine(/** @type {number[][]} */ members, /** @type {number} */ x, /** @type {number} */ half, /** @type {number[][]} */ taken) {
-    const heights = members.map((one) => one[1]);
-    const lines = [Math.max(Math.min(...heights) - 11, 14), Math.min(Math.max(...heights) + 21, this.board.height - 6)];
-    const free = (/** @type {number} */ y) => taken.every(([left, right, other]) => x + half < left || x - half > right || Math.abs(y - other) > 15);
-    return lines.find(free) ?? null;
+  /** @param {string} id @param {number[][]} members Their pixels. @param {number[][]} taken From where to where, on which line, how far from it; this name is added. */
+  name(id, members, taken) {
+    const { context, width } = this.board;
+    const name = symbolOf(id)?.name ?? "";
+    const short = name.length > 18 ? `${name.slice(0, 17)}…` : name;
+    const half = context.measureText(short).width / 2 + 4;
+    const place = this.freePlace(members, half, taken);
+    if (place === null) return;
+    const [x, y] = place;
+    taken.push([x - half, x + half, y, 15]);
+    context.strokeText(short, x, y);
+    context.fillText(short, x, y);
+  }
+
+  /** Above, below or beside the dots of a name, where nothing else stands; null where there is no room. */
+  freePlace(/** @type {number[][]} */ members, /** @type {number} */ half, /** @type {number[][]} */ taken) {
+    const { width, height } = this.board;
+    const [across, along] = [members.map((one) => one[0]), members.map((one) => one[1])];
+    const middle = (/** @type {number[]} */ some) => some.reduce((sum, one) => sum + one, 0) / some.length;
+    const x = Math.min(Math.max(middle(across), half), width - half);
+    const places = [
+      [x, Math.max(Math.min(...along) - 11, 14)],
+      [x, Math.min(Math.max(...along) + 21, height - 6)],
+      [Math.max(...across) + half + 8, middle(along) + 4],
+      [Math.min(...across) - half - 8, middle(along) + 4],
+    ];
+    const free = ([at, line]) => taken.every(([left, right, other, room]) => at + half < left || at - half > right || Math.abs(line - other) > room);
+    return places.find(([at, line]) => at >= half && at <= width - half && free([at, line])) ?? null;
   }
 
   /** @param {MouseEvent} event */

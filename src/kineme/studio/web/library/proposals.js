@@ -29,7 +29,7 @@ function card(proposal, movements) {
   const label = () => (yes.textContent = chosen.size ? `Name the ${chosen.size} chosen` : `Name all ${proposal.members.length}`);
   label();
   const shown = [proposal.medoid, ...proposal.members.filter((/** @type {number} */ id) => id !== proposal.medoid)].slice(0, SHOWN);
-  const grid = make("div", { class: "members", role: "group", "aria-label": "Its movements; choose some to name those alone" }, ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)));
+  const grid = make("div", { class: "members", role: "group", "aria-label": library().read_only ? "Its movements" : "Its movements; choose some to name those alone" }, ...shown.map((id) => memberButton(movements.get(id) ?? { id, path: null, name: null, duration: 0 }, chosen, label)));
   const form = make("form", { class: "naming" }, field, yes, make("button", { class: "button quiet", type: "button", on: { click: () => reject(proposal.id) } }, "Not a symbol"));
   form.addEventListener("submit", (event) => {
     event.preventDefault();

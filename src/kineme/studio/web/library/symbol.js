@@ -1,4 +1,5 @@
 // One symbol: its name, its description, its movements, and what can be done with them.
+import { breakable } from "../parts/breakable.js";
 import * as changes from "../parts/changes.js";
 import { ask } from "../parts/dialogs.js";
 import { byId, counted, fill, make } from "../parts/elements.js";
@@ -11,7 +12,7 @@ import { Members } from "./members.js";
 const UNLABELED = "";
 
 /** @param {string} text @param {() => any} act @param {string} kind */
-const button = (text, act, kind = "") => make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, disabled: library().read_only && !["Move it"].includes(text), on: { click: act } }, text);
+const button = (text, act, kind = "") => make("button", { class: `button ${kind}`, type: "button", "data-key": `symbol ${text}`, on: { click: act } }, text);
 
 /** @param {any} symbol */
 async function rename(symbol) {
@@ -27,7 +28,7 @@ async function forget(symbol) {
 
 /** @param {any} symbol */
 function description(symbol) {
-  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder: "What it means, for people and planners", readOnly: library().read_only });
+  const field = make("textarea", { rows: 2, maxlength: "2000", placeholder: "What it means, for people and planners" });
   field.value = symbol.description ?? "";
   field.addEventListener("change", () => changes.describe(symbol.id, field.value));
   return make("label", { class: "field" }, make("span", {}, "Description"), field);
@@ -88,24 +89,26 @@ export class SymbolPanel {
     const hint = `Choose some to ${symbol ? "split, rename" : "name"} or delete.`;
     const count = make("p", { class: "soft small", role: "status" }, hint);
     const members = new Members(symbol ? `symbol=${encodeURIComponent(symbol.id)}` : "unlabeled=1", () => {
-      for (const one of acts) one.disabled = library().read_only || !members.ids().length;
+      for (const one of acts) one.disabled = !members.ids().length;
       count.textContent = members.ids().length ? `${counted(members.ids().length, "movement")} chosen` : hint;
     });
-    const acts = actions(symbol, members);
+    const acts = library().read_only ? [] : actions(symbol, members);
     for (const one of acts) one.disabled = true;
     const bar = make("div", { class: "row", role: "group", "aria-label": "Chosen movements" }, ...acts);
     const close = make("button", { class: "button quiet square sheet-close", type: "button", "aria-label": "Close", on: { click: () => this.close() } }, "×");
-    fill(panel, close, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), count, bar, members.element);
+    const acting = acts.length ? [count, bar] : [];
+    fill(panel, close, ...(symbol ? this.head(symbol) : [make("h2", {}, "Without a name")]), make("h3", {}, counted(symbol ? symbol.n_members : library().unlabeled, "movement")), ...acting, members.element);
   }
 
   /** @param {any} symbol */
   head(symbol) {
     const moveIt = () => (chooseToMove(symbol.id), show("move", true));
+    const { read_only: readOnly } = library();
     const facts = symbol.duration ? `${Number(symbol.duration).toFixed(1)} s` : "";
     return [
-      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, symbol.name), make("p", { class: "soft" }, facts))),
-      make("div", { class: "row" }, button("Move it", moveIt, "main"), button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")),
-      description(symbol),
+      make("div", { class: "symbol-head" }, thumbnail(symbol.path), make("div", {}, make("h2", {}, ...breakable(symbol.name)), make("p", { class: "soft" }, facts))),
+      make("div", { class: "row" }, button("Move it", moveIt, "main"), ...(readOnly ? [] : [button("Rename", () => rename(symbol)), button("Delete symbol", () => forget(symbol), "danger")])),
+      readOnly ? symbol.description && make("p", {}, symbol.description) : description(symbol),
     ];
   }
 
@@ -113,6 +116,6 @@ export class SymbolPanel {
   hint(panel) {
     this.opened = null;
     panel.classList.remove("opened");
-    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.")));
+    fill(panel, make("div", { class: "empty" }, make("h3", {}, "Choose a symbol"), make("p", {}, library().read_only ? "Here its movements are shown." : "Here it can be renamed, described and deleted; its movements can be split off or given to another symbol. Everything can be undone.")));
   }
 }

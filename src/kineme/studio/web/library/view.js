@@ -44,7 +44,7 @@ export function startLibrary() {
     shown = library().version;
     const nothing = library().n_movements === 0;
     byId("library-empty").hidden = library().symbols.length > 0;
-    byId("library-empty-text").textContent = `A symbol is a movement with a name. ${nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
+    byId("library-empty-text").textContent = `A symbol is a movement with a name. ${library().read_only ? "This library holds none." : nothing ? "Draw one and name it, or drop recordings." : "Name movements that are here, or draw one."}`;
     byId("library-head").hidden = !library().symbols.length;
     byId("history").hidden = byId("symbol").hidden = nothing;
     panel.show();

@@ -1,4 +1,5 @@
 // What moves: the symbols as pictures in a row, one chosen.
+import { breakable } from "../parts/breakable.js";
 import { byId, fill, make } from "../parts/elements.js";
 import { found } from "../parts/find.js";
 import { keepingFocus } from "../parts/keep_focus.js";
@@ -9,7 +10,7 @@ import { thumbnail } from "../parts/thumbnails.js";
 export function showPick(chosen, choose) {
   const option = (/** @type {any} */ symbol) => {
     const radio = make("input", { type: "radio", name: "move", class: "away", checked: symbol.id === chosen, "data-key": `pick ${symbol.id}`, on: { change: () => choose(symbol.id) } });
-    return make("label", { class: "pick-one" }, radio, make("span", { class: "pick-face" }, thumbnail(symbol.path), make("span", { class: "pick-name", title: symbol.name }, symbol.name)));
+    return make("label", { class: "pick-one" }, radio, make("span", { class: "pick-face" }, thumbnail(symbol.path), make("span", { class: "pick-name", title: symbol.name }, ...breakable(symbol.name))));
   };
   const symbols = found(byId("find-pick"), library().symbols.filter((/** @type {any} */ one) => one.path));
   keepingFocus(() => fill(byId("move-pick"), ...symbols.map(option)));

@@ -24,12 +24,16 @@ function showArm(scene, joints) {
 
 const TINY = 1e-4; // written with an exponent: no zeros to count
 const written = (/** @type {number} */ value) => (value && Math.abs(value) < TINY ? value.toExponential(1) : String(Number(value.toPrecision(4))));
-const number = (/** @type {number|null} */ value, /** @type {string} */ unit) => (value === null || value === undefined ? "–" : `${written(Number(value))} ${(unit ?? "").replace("^2", "²")}`);
+const number = (/** @type {number|null|undefined} */ value) => (value === null || value === undefined ? "–" : written(Number(value)));
+
+/** A cell of two lines: a table beside the arm has no room for one. @param {string} tag @param {string} first @param {string} second */
+const cell = (tag, first, second) => make(tag, tag === "th" ? { scope: "row" } : {}, first, " ", make("span", { class: "says soft" }, second));
 
 /** @param {any} check */
 function row(check) {
-  const worst = `${number(check.worst, check.unit)}${check.time === null || check.time === undefined ? "" : ` at ${Number(check.time).toFixed(2)} s`}`;
-  return make("tr", { class: check.passed ? null : "failed" }, make("th", { scope: "row" }, check.where ? `${check.what}: ${check.where}` : check.what), make("td", {}, worst), make("td", {}, number(check.limit, check.unit)), make("td", {}, check.passed ? "passed" : "FAILED"));
+  const at = check.time === null || check.time === undefined ? "" : `at\u00a0${Number(check.time).toFixed(2)}\u00a0s`;
+  const cells = [cell("th", check.what, check.where ?? ""), cell("td", number(check.worst), at), cell("td", number(check.limit), (check.unit ?? "").replace("^2", "²"))];
+  return make("tr", { class: check.passed ? null : "failed" }, ...cells, make("td", {}, check.passed ? "passed" : "FAILED"));
 }
 
 /** @param {any} answer */
