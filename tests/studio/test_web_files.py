@@ -159,6 +159,10 @@ told.answers = [sending.answered(), sending.answered()]; // the first is to the 
 draw(0, 5);
 draw(5, 9); // before the state of the one before came
 told.stale = [sending.heard(), sending.heard()];
+draw(0, 5);
+here = false;
+sending.lost();
+told.hears = sending.finish(); // though no answer came to the samples
 console.log(JSON.stringify(told));"""
 
 
@@ -172,6 +176,7 @@ def test_a_movement_is_sent_from_its_beginning_where_the_connection_is_new(modul
         "answered": [],
         "answers": [False, True],
         "stale": [False, True],
+        "hears": False,
     }
 
 

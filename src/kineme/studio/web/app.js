@@ -43,7 +43,7 @@ const live = new Live({
   error: (text) => draw.error(text) || say(text, { failed: true }),
   changed: (version) => version !== library().version && tried(refresh),
   here: () => (connected(true), draw.renewed(), tried(refresh)),
-  away: () => connected(false),
+  away: () => (connected(false), draw.lost()),
 });
 tried(refresh); // without waiting for the websocket
 startLibrary();

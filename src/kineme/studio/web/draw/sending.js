@@ -76,6 +76,11 @@ export class Sending {
     this.over = this.asked = false;
   }
 
+  /** The connection is gone: no answer comes to what was sent. */
+  lost() {
+    this.open = false;
+  }
+
   /** The connection is new: nothing is open, and the movement is sent from its beginning. */
   renewed() {
     this.open = this.stale = this.asked = false;

@@ -243,5 +243,6 @@ class Draw {
 export function startDraw(send) {
   const draw = new Draw(send);
   const renewed = () => (draw.sending.renewed(), draw.follow.sources.renewed(), draw.waits && draw.askOnce());
-  return { state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
+  const lost = () => draw.sending.lost();
+  return { lost, state: draw.state.bind(draw), answer: draw.answer.bind(draw), error: draw.error.bind(draw), source: (/** @type {any} */ told) => draw.follow.sources.hear(told), renewed };
 }
