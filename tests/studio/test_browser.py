@@ -730,8 +730,7 @@ def test_an_arm_executes_a_letter(opened, served_letters):
     wait_until(page, "document.getElementById('robot-verdict').dataset.state !== ''")
     assert page.locator("#robot-checks tr").count() > 5
     frame = page.frame_locator(".arm-frame")
-    frame.locator(".chart").first.wait_for()
-    assert frame.locator("#play").inner_text() == "Pause"  # it moves by itself
+    frame.locator("#play:text-is('Pause')").wait_for()  # it moves by itself
     assert frame.locator(".chart .limit").count() > 0
     assert page.is_hidden("#robot-dragged")
     page.keyboard.press("3")
