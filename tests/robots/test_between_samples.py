@@ -89,6 +89,14 @@ def test_a_joint_that_jumps_between_two_samples_is_refused(step):
         move(jumping, robot, space="joints")
 
 
+def test_a_joint_that_is_too_fast_between_two_samples_at_which_it_stands_is_seen():
+    robot = _robot("panda")
+    there = robot.rest.copy()
+    there[0] += 0.8 * robot.velocity[0]  # in a second: 1.5 times the limit in the middle
+    failed = preflight(robot, sent(robot, [0.0, 1.0], np.array([robot.rest, there]))).failed
+    assert {"velocity between samples"} == {check.what for check in failed if check.what.startswith("velocity")}
+
+
 def test_a_learned_movement_begins_and_ends_at_a_stand_at_every_rate():
     robot = _robot("panda")
     primitive = kineme.DMP().learn([stroke(robot)])
