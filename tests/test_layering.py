@@ -7,8 +7,6 @@ import re
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "kineme"
 FRONT_DOOR = ("__init__", "__main__", "control", "orientation", "styles")  # they may import everything
@@ -56,28 +54,40 @@ def _chapter_of(path):
     return path.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
+def _chapter(room):
+    return room.partition("/")[0]
+
+
 def _room_of(names):
     """Of a module's names below kineme: "chapter/room", or None for a file that lies in its chapter itself."""
     room = "/".join(names[:2])
     return room if (PACKAGE / room).is_dir() and len(names) > 1 else None
 
 
-@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_from_its_own_chapter_and_from_those_below(path):
-    layers, own = _layers(), _chapter_of(path)
-    assert own in layers, f"list the chapter {own!r} in CONTRIBUTING.md"
-    for _, chapter, *_ in _imported(path):
-        assert layers[chapter] <= layers[own], f"{own} is below {chapter}"
+def test_modules_import_from_their_own_chapter_and_from_those_below():
+    layers = _layers()
+    unlisted = {_chapter_of(path) for path in _modules()} - set(layers)
+    assert not unlisted, "list these chapters in CONTRIBUTING.md"
+    upwards = [
+        f"{path.relative_to(PACKAGE)} imports {chapter}"
+        for path in _modules()
+        for _, chapter, *_ in _imported(path)
+        if layers[chapter] > layers[_chapter_of(path)]
+    ]
+    assert not upwards
 
 
-@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_from_its_own_room_and_from_those_below(path):
-    layers, own = _layers(), _room_of(path.relative_to(PACKAGE).with_suffix("").parts)
-    assert own is None or own in layers, f"list the room {own!r} in CONTRIBUTING.md"
-    for _, *names in _imported(path):
-        other = _room_of(names)
-        if own and other and own.partition("/")[0] == other.partition("/")[0]:
-            assert layers[other] <= layers[own], f"{own} is below {other}"
+def test_modules_import_from_their_own_room_and_from_those_below():
+    layers = _layers()
+    rooms = {path: _room_of(path.relative_to(PACKAGE).with_suffix("").parts) for path in _modules()}
+    assert not {room for room in rooms.values() if room} - set(layers), "list these rooms in CONTRIBUTING.md"
+    upwards = [
+        f"{path.relative_to(PACKAGE)} imports {other}"
+        for path, room in rooms.items()
+        for _, *names in _imported(path)
+        if room and (other := _room_of(names)) and _chapter(room) == _chapter(other) and layers[other] > layers[room]
+    ]
+    assert not upwards
 
 
 def test_every_chapter_and_room_that_is_listed_exists():
@@ -98,14 +108,18 @@ def _compiled_modules():
     }
 
 
-@pytest.mark.parametrize("path", _modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_numba_and_compiled_modules_are_loaded_in_one_place_only(path):
+def test_numba_and_compiled_modules_are_loaded_in_one_place_only():
     """Threads that import parts of Numba at the same time break it for the rest of the process."""
     compiled = _compiled_modules()
-    for name in _all_imports(path):
-        assert name.partition(".")[0] != "numba" or path in compiled.values(), f"load Numba by runtime.compiled: {name}"
-        asked = {name, name.rpartition(".")[0]} & set(compiled)
-        assert not asked or path in compiled.values(), f"use kineme.runtime.compiled.compiled_module: {name}"
+    imports = [
+        (path.relative_to(PACKAGE), name)
+        for path in _modules()
+        if path not in compiled.values()
+        for name in _all_imports(path)
+    ]
+    assert not [pair for pair in imports if pair[1].partition(".")[0] == "numba"], "load Numba by runtime.compiled"
+    loaded = [(path, name) for path, name in imports if {name, name.rpartition(".")[0]} & set(compiled)]
+    assert not loaded, "use kineme.runtime.compiled.compiled_module"
 
 
 def test_the_modules_that_are_asked_for_have_compiled_functions():
