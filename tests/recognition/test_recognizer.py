@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, cross_val_score
@@ -134,6 +134,20 @@ def test_prototype_is_the_demonstration_most_like_its_class():
     for rows, medoid in zip((range(5), range(5, 8), range(8, 12)), recognizer.classifier_.medoids, strict=True):
         assert medoid == max(rows, key=lambda i, rows=rows: logs[i, list(rows)].mean())
     np.testing.assert_allclose(recognizer.decision_function(demos), logs[:, recognizer.classifier_.medoids], atol=1e-4)
+
+
+@any_seed
+@settings(max_examples=20)
+def test_prototypes_are_the_same_compiled_and_plain_and_of_equal_ones_the_first(seed):
+    counts = [2, 2, 3, 2, 4]
+    demos = draw_shapes(counts, seed=seed, spread=0.5)
+    medoids = {}
+    for choice in ("always", "never"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("KINEME_COMPILED", choice)
+            medoids[choice] = Recognizer(classifier="prototype").fit(demos).classifier_.medoids
+    np.testing.assert_array_equal(medoids["always"], medoids["never"])
+    np.testing.assert_array_equal(medoids["never"].take([0, 1, 3]), np.cumsum([0, *counts])[[0, 1, 3]])
 
 
 @pytest.mark.parametrize("counts", [[1, 1], [8, 9], [30, 30]])

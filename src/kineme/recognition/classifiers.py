@@ -21,6 +21,7 @@ from kineme.validation import Array
 
 _WIDER = 2.0  # times the width: an impostor then has a similarity of exp(-0.8)
 _PENALTY = 1000.0  # similarities are at most 1, so a small penalty would hold every multiplier at its bound
+_ROUNDING = 1e-4  # of the mean of log similarities, as single precision leaves it: nearer ones are equal
 
 
 class Classifier(Protocol):
@@ -132,11 +133,15 @@ def fit_nearest_each(comparison: Comparison, references: References) -> NearestE
 
 
 def fit_prototype(comparison: Comparison, references: References) -> Prototype:
-    """Choose the medoid of each class."""
+    """Choose the medoid of each class: the largest mean log similarity to the others, of equal ones the first."""
     medoids = []
     for rows in references.slices():
         own = references.described.take(rows)
-        medoids.append(rows.start + int(comparison.similarity.log_average(own, own).mean(axis=1).argmax()))
+        logs = comparison.similarity.log_average(own, own)
+        logs = 0.5 * (logs + logs.T)  # of a pair, the two orders round differently
+        np.fill_diagonal(logs, 0.0)
+        means = logs.sum(axis=1) / max(1, len(logs) - 1)
+        medoids.append(rows.start + int(np.argmax(means >= means.max() - _ROUNDING)))
     chosen = np.array(medoids)
     return Prototype(chosen, references.described.take(chosen))
 
