@@ -1,4 +1,4 @@
-"""Table and sentences on wrong labels of docs/guide/recordings.md, from the file of results."""
+"""Table and sentences on wrong labels of docs/guide/outliers.md, from the file of results."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from measured import DOCS, rows
 
-PAGE = DOCS / "guide" / "recordings.md"
+PAGE = DOCS / "guide" / "outliers.md"
 _SETS = ("20 labels of 50", "10 labels of 50", "2 labels of 50", "10 labels of 10", "3 labels of 10")
 
 

@@ -26,7 +26,7 @@ def counts(demos, labels, planted):
 
 @pytest.mark.parametrize(("share", "least"), [(0.02, 0.85), (0.1, 0.75)])
 def test_wrong_labels_of_digits_are_found_and_few_others(digits, share, least):
-    """The rates that docs/guide/recordings.md tells of: without the contrast, or with one neighbor, fewer are found."""
+    """The rates that docs/guide/outliers.md tells of: without the contrast, or with one neighbor, fewer are found."""
     demos, _ = digits
     rng = np.random.default_rng(4)
     runs = [(*counts(demos, *wrongly_labeled(demos.labels, share, rng)), round(share * len(demos))) for _ in range(4)]

@@ -99,7 +99,7 @@ def find_outliers(
     lists: the k of smallest p where the k-th has ``p <= error_rate k / n``.
 
     Shape counts; place, size and duration do not, nor do rotations that are usual. The law is an approximation:
-    `docs/guide/recordings.md` has measured rates.
+    `docs/guide/outliers.md` has measured rates.
 
     Parameters
     ----------
