@@ -268,6 +268,8 @@ def samples():
         "numbered.json": _json(x_0=x, x_1=x2),
         "keyed.npz": _npz(wave=x, nod=x2),
         "timed.npz": _npz(t=t, q=x, gripper=t),
+        "amass.npz": _npz(poses=np.tile(x, (1, 78)), trans=np.tile(t[:, None], 3), betas=t[:5], mocap_framerate=120.0),
+        "robot.npz": _npz(qpos=np.tile(x, (1, 4)), qvel=x, joint_names=["a", "b"], fps=np.array([50])),
         "one.npy": _npy(np.stack((x, x))),
         "samples.json": json.dumps([{"t": a, "x": b} for a, b in zip(t.tolist(), t.tolist(), strict=True)]).encode(),
         "keyed.json": _json(wave=x, nod=x),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from kineme.files.arrays.arrays import POSITIONS, arrays_movements, has_known_names
+from kineme.files.arrays.bodies import body_movements
 from kineme.files.arrays.hdf5 import hdf5_movements
 from kineme.files.arrays.json_trees import json_lines_movements, json_movements
 from kineme.files.arrays.matlab import mat_movements
@@ -87,6 +88,8 @@ def _read_parquet(data: bytes, layout: Layout) -> Parsed:
 
 def _read_npz(data: bytes, layout: Layout) -> Parsed:
     arrays = Npz(data, Path("it"))
+    if (parsed := body_movements(arrays, layout, "NPZ")) is not None:
+        return parsed
     if has_known_names(arrays):
         return arrays_movements(arrays, layout, "NPZ")
     return tree_movements(nested(arrays), layout, "NPZ")

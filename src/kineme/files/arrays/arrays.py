@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.files.arrays.trees import RATE_NAMES, STAMP, STEP_NAMES, rate_of
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
@@ -37,8 +39,8 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
 
     ``x`` and ``pos`` mean positions, ``t`` and ``time`` times; ``labels`` or ``y`` (n,) names the actions; ``x``, ``y``
     and ``z`` that are all (T,) are the coordinates of one movement; ``columns`` (d,) names the coordinates.
-    Where there are no times, movements of ``positions`` (n, T, d) and ``positions_0`` are evenly sampled over one
-    second.
+    Where there are no times, a rate (``fps``, ``dt``, ...) gives them; else movements of ``positions`` (n, T, d) and
+    ``positions_0`` are evenly sampled over one second.
 
     Raises
     ------
@@ -51,7 +53,9 @@ def arrays_movements(arrays: Mapping[str, Any], layout: Layout, kind: str) -> Pa
         xs, ts, how = _of_one(arrays, numbers_of(arrays[key]), layout)
     else:
         xs, ts, how = _numbered(arrays)
-    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or "times", None, _column_names(arrays))
+    if ts is None and not isinstance(layout.units, float | int) and (rate := rate_of(arrays)) is not None:
+        ts, layout = [np.arange(len(x)) / rate.hertz for x in xs], replace(layout, units="s")
+    named = Named(_labels(arrays, len(xs)), _named(arrays, TIMES) or STAMP, None, _column_names(arrays))
     return parsed_arrays(xs, ts, named, layout, (kind, how))
 
 
@@ -116,7 +120,7 @@ def has_known_names(names: Collection[str]) -> bool:
     known = any(name in names or f"{name}_0" in names for name in POSITIONS)
     if known and not {*TIMES, "offsets"} & set(names) and any(is_time(name) or is_header_stamp(name) for name in names):
         return False
-    return known or not set(names) - {*TIMES, *LABELS, "offsets"}
+    return known or not set(names) - {*TIMES, *LABELS, "offsets", *RATE_NAMES, *STEP_NAMES}
 
 
 def _axes_stacked(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -189,7 +193,7 @@ def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[A
     x = x[:, None] if x.ndim == 1 else x
     if x.ndim != 2:
         raise DataError(f"expected positions of shape (T, d) or (n, T, d), got {x.shape}")
-    if t is None and not isinstance(layout.units, float | int):
+    if t is None and not isinstance(layout.units, float | int) and rate_of(arrays) is None:
         got = listed(arrays) if len(arrays) > 1 else f"positions of shape {x.shape} alone"
         raise DataError(
             f"expected times beside the positions, got {got}; say the seconds between two samples with units=, "

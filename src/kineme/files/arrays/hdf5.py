@@ -11,12 +11,12 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.arrays.tree_movements import tree_movements
-from kineme.files.arrays.trees import GROUPS
+from kineme.files.arrays.trees import GROUPS, RATE_NAMES, STEP_NAMES
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
-_ATTRIBUTES = frozenset({"label", "task", "fps", "rate", "frequency", "hz"})
+_ATTRIBUTES = frozenset({"label", "task"}) | RATE_NAMES | STEP_NAMES
 
 
 def hdf5_movements(path: Path, layout: Layout) -> Parsed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from kineme.errors import DataError
 from kineme.files.arrays.arrays import POSITIONS, TIMES, Named, numbers_of, parsed_arrays
-from kineme.files.arrays.trees import NAMES, Found, Style, listed_shapes, movements_in
+from kineme.files.arrays.trees import NAMES, STAMP, Found, Style, listed_shapes, movements_in
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
@@ -20,7 +21,6 @@ from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.movements.tables.time_stamps import words_of
 from kineme.movements.trajectories.movements import axis_names
 
-_STAMP = "time [s]"
 _POINTS = frozenset({"position", "positions", "pos", "translation", "xyz", "point"})
 
 
@@ -50,9 +50,10 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     first = next(one for one in found if tuple(one.entries) == reference)
     names = [name for name, entry in first.entries.items() if entry.shape[0] == first.length]
     heads, owners = _heads(first, names)
-    if first.rate is not None and not any(map(is_time, names)):
-        heads, owners = (*heads, _STAMP), (*owners, _STAMP)
-    kinds = ["text" if owner != _STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
+    if first.rate is not None and not any(map(is_time, names)) and not isinstance(layout.units, float | int):
+        layout = replace(layout, units=None)  # the rate is in Hz, whatever stamps are in
+        heads, owners = (*heads, STAMP), (*owners, STAMP)
+    kinds = ["text" if owner != STAMP and _is_text(first.entries[owner]) else "number" for owner in owners]
     wide = [name for name in names if owners.count(name) > 1]
     if many == "refuse" and layout.coordinates is None and len(wide) > 1:
         raise DataError(
@@ -62,8 +63,9 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     roles = choose_roles(heads, kinds, layout)
     others = [roles.time, roles.nanoseconds, roles.label]
     needed = {owners[k] for k in chain(roles.positions, roles.movement, others) if k is not None}
-    table = _table(found, (heads, owners), needed)
-    return table_movements(table, roles, layout, kind)
+    parsed = table_movements(_table(found, (heads, owners), needed), roles, layout, kind)
+    static = tuple(name for name in first.entries if name not in names)
+    return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
 
 
 def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
@@ -150,7 +152,7 @@ def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]],
 
 def _part(one: Found, name: str, length: int, width: int) -> tuple[Any, str]:
     """An array of a movement as columns (T, d), and what is wrong with it."""
-    if name == _STAMP:
+    if name == STAMP:
         return (np.arange(length) / (one.rate or 1.0))[:, None], "" if one.rate else "expected a rate, got none"
     entry = one.entries.get(name)
     if entry is None:

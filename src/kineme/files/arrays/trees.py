@@ -16,7 +16,16 @@ import numpy as np
 from kineme.movements.tables.columns import LABEL_WORDS, MOVEMENT_WORDS, is_time
 from kineme.movements.tables.time_stamps import words_of
 
-_RATES = frozenset({"fps", "rate", "hz", "frequency", "sampling_rate", "sample_rate", "sampling_frequency"})
+#: Names of the number of samples per second, and of the seconds between two; numbers alone, (1,) or ().
+RATE_NAMES = frozenset(
+    {
+        "fps", "rate", "hz", "frequency", "sampling_rate", "sample_rate", "sampling_frequency", "frame_rate",
+        "framerate", "mocap_framerate", "mocap_frame_rate",
+    }
+)  # fmt: skip
+STEP_NAMES = frozenset({"dt", "timestep", "time_step", "sampling_period", "frame_time"})
+#: Head of the times that follow from a rate.
+STAMP = "time [s]"
 _TIMES_OF = re.compile(r"(.+)[_./-](?:t|times?|time_?stamps?)|(?:t|times?|time_?stamps?)[_./-](.+)", re.IGNORECASE)
 _WIDEST = 1000  # numbers in a sample; images have more
 _DEEPEST = 12  # groups within groups
@@ -30,6 +39,13 @@ class Style(NamedTuple):
 
 
 NAMES, GROUPS = Style(".", False), Style("/", True)
+
+
+class Rate(NamedTuple):
+    """How often a file says that it was sampled, and the name under which it says so."""
+
+    name: str
+    hertz: float
 
 
 class Found(NamedTuple):
@@ -84,13 +100,16 @@ def _of_array(array: Any, place: str, label: str | None) -> Iterator[Found]:
 
 def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | None) -> Iterator[Found]:
     label = _own_label(tree) or label
-    arrays = {name: one for name, one in tree.items() if is_array(one) and one.dtype.kind != "O"}
+    arrays = {
+        name: one for name, one in tree.items() if is_array(one) and one.dtype.kind != "O" and not _is_rate(name, tree)
+    }
     groups = {name: one for name, one in tree.items() if isinstance(one, (Mapping, list))}
     times = {match[1] or match[2]: one for name, one in arrays.items() if (match := _TIMES_OF.fullmatch(name))}
     own_times = all(name in times or _is_stamp_of(name, arrays) for name in arrays)
-    if arrays and not own_times and (_are_columns(arrays, style) or _continues(arrays, groups)):
-        entries = dict(_flat(tree, style.separator))
-        yield Found(place, label, {name: one for name, one in entries.items() if _fits(one)}, _rate(tree))
+    rate = _rate(tree)
+    if arrays and not own_times and (_are_columns(arrays, style, rate) or _continues(arrays, groups)):
+        entries = {inner: one for inner, one in _flat(tree, style.separator) if _fits(one)}
+        yield Found(place, label, {k: one for k, one in entries.items() if not _is_rate(k, entries)}, rate)
         return
     for name, one in arrays.items():
         if _is_stamp_of(name, arrays):
@@ -98,7 +117,7 @@ def _of_group(tree: Mapping[str, Any], style: Style, place: str, label: str | No
         own = f"{place}/{name}" if place else name
         for found in _of_array(one, own, label or label_of(name)):
             stamps = {"time": times[name]} if name in times else {}
-            yield found._replace(entries=stamps | found.entries, rate=_rate(tree))
+            yield found._replace(entries=stamps | found.entries, rate=rate)
     for name, one in groups.items():
         yield from movements_in(one, style, f"{place}/{name}" if place else name, label or label_of(name))
 
@@ -109,13 +128,18 @@ def _is_stamp_of(name: str, arrays: Mapping[str, Any]) -> bool:
     return match is not None and (match[1] or match[2]) in arrays
 
 
-def _are_columns(arrays: Mapping[str, Any], style: Style) -> bool:
-    """Whether arrays are the columns of one movement: with times, or of one length but not of one width."""
+def _are_columns(arrays: Mapping[str, Any], style: Style, rate: float | None) -> bool:
+    """Whether arrays are the columns of one movement: with times, or of one length but not of one width.
+
+    Where a rate is given, most of them need to be so: the others do not change over time.
+    """
     if any(is_time(name) and len(one.shape) == 1 for name, one in arrays.items()):
         return True
     flat = [one.shape for one in arrays.values()]
-    if len({shape[0] for shape in flat}) > 1:
-        return False
+    lengths = Counter(shape[0] for shape in flat)
+    if len(lengths) > 1:
+        length, count = lengths.most_common(1)[0]
+        return rate is not None and 2 * count > len(flat) and len({shape for shape in flat if shape[0] == length}) > 1
     return len(set(flat)) > 1 or all(len(shape) == 1 for shape in flat) or (style.alike_are_columns and len(flat) > 1)
 
 
@@ -140,11 +164,25 @@ def _fits(array: Any) -> bool:
     return 0 < width <= _WIDEST and not (len(array.shape) > 2 and array.dtype == np.uint8)
 
 
-def _rate(tree: Mapping[str, Any]) -> float | None:
-    for name, one in tree.items():
-        if name.lower() in _RATES and np.ndim(one) == 0 and getattr(one, "dtype", np.dtype(type(one))).kind in "iuf":
-            return float(one) if 0 < float(one) < float("inf") else None
+def rate_of(tree: Mapping[str, Any]) -> Rate | None:
+    """The rate in a group; an array is read only if it has the name of one."""
+    for name in tree:
+        if not _is_rate(name, tree):
+            continue
+        value = np.asarray(tree[name])
+        if value.dtype.kind in "iuf" and 0 < (number := float(value.item())) < np.inf:
+            return Rate(name, 1.0 / number if name.lower() in STEP_NAMES else number)
     return None
+
+
+def _is_rate(name: str, tree: Mapping[str, Any]) -> bool:
+    """Whether an entry is one number with the name of a rate."""
+    return name.lower() in RATE_NAMES | STEP_NAMES and np.shape(tree[name]) in ((), (1,))
+
+
+def _rate(tree: Mapping[str, Any]) -> float | None:
+    rate = rate_of(tree)
+    return None if rate is None else rate.hertz
 
 
 def _own_label(tree: Mapping[str, Any]) -> str | None:
@@ -156,7 +194,7 @@ def _own_label(tree: Mapping[str, Any]) -> str | None:
 
 def has_times(names: Iterable[str]) -> bool:
     """Whether any name means times, the times of another array, or a rate."""
-    return any(is_time(name) or name.lower() in _RATES or _TIMES_OF.fullmatch(name) for name in names)
+    return any(is_time(name) or name.lower() in RATE_NAMES | STEP_NAMES or _TIMES_OF.fullmatch(name) for name in names)
 
 
 def label_of(name: str) -> str | None:
