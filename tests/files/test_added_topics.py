@@ -1,14 +1,16 @@
 """A copy of a bag with one topic more: every other message byte for byte, read by rosbags and the package mcap."""
 
+import re
 import shutil
 import sqlite3
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import kineme
-from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, store, write_bag
+from bag_files import KINDS, SECOND, START, Maker, pose_rows, stamps, store, write_bag, write_mcap
 from kineme.files.ros.add_topic import copy_with_topic
 
 pytest.importorskip("rosbags")
@@ -87,11 +89,28 @@ def test_a_bare_file_of_ros_2(tmp_path, ending):
     assert texts_of(target, kind) == sorted(TEXTS)
 
 
-def test_chunks_of_a_bag_of_ros_1_are_copied_and_not_written_anew(tmp_path):
-    source = recorded(tmp_path, "ros1", compress=True)
-    old, new = source.read_bytes(), copied(source, tmp_path / "a.bag").read_bytes()
-    index = int.from_bytes(old[old.index(b"index_pos=") + 10 :][:8], "little")
-    assert old[13 + 4096 : index] == new[13 + 4096 : index]
+def test_a_copy_is_compressed_as_its_bag(tmp_path):
+    kept = recorded(tmp_path, "ros1", compress=True, name="lz4"), recorded(tmp_path, "ros1", name="none")
+    for source in kept:
+        data = copied(source, tmp_path / f"b_{source.name}").read_bytes()
+        assert set(re.findall(rb"compression=(\w+)", data)) == {source.stem.encode()}
+
+
+def test_connections_that_are_equal_become_one(tmp_path):
+    """A node that began anew publishes under its old name: roscpp records another connection."""
+    m = Maker("ros1")
+    messages = [(topic, ns, m.string(topic)) for ns in stamps(5) for topic in ("/aa", "/ab")]
+    source = write_bag(tmp_path, "ros1", messages)
+    source.write_bytes(source.read_bytes().replace(b"topic=/ab", b"topic=/aa"))
+    with reader(source) as old, reader(copied(source, tmp_path / "b.bag")) as new:
+        assert [len(old.topics["/aa"].connections), len(new.topics["/aa"].connections)] == [2, 1]
+        assert old.topics["/aa"].msgcount == new.topics["/aa"].msgcount == 10
+    assert [one for one in raw_messages(tmp_path / "b.bag") if one[0] != TOPIC] == raw_messages(source)
+
+
+def plain(message):
+    """A message of the package mcap without the number of its channel, which is the file's own."""
+    return {name: value for name, value in vars(message).items() if name != "channel_id"}
 
 
 def test_the_package_mcap_reads_the_copy(tmp_path):
@@ -99,13 +118,13 @@ def test_the_package_mcap_reads_the_copy(tmp_path):
     source = recorded(tmp_path, "mcap") / "run.mcap"
     target = copied(source, tmp_path / "named.mcap")
     with source.open("rb") as file:
-        old = [(c.topic, m) for _, c, m in make_reader(file).iter_messages()]
+        old = [(channel.topic, plain(message)) for _, channel, message in make_reader(file).iter_messages()]
     with target.open("rb") as file:
         read = make_reader(file, validate_crcs=True)
-        new = [(channel.topic, message) for _, channel, message in read.iter_messages()]
+        new = [(channel.topic, plain(message)) for _, channel, message in read.iter_messages()]
         counts = read.get_summary().statistics
     assert [one for one in new if one[0] != TOPIC] == old
-    assert [one.log_time for name, one in new if name == TOPIC] == [t for t, _ in sorted(TEXTS)]
+    assert [one["log_time"] for name, one in new if name == TOPIC] == [t for t, _ in sorted(TEXTS)]
     assert counts.message_count == len(new)
 
 
@@ -139,21 +158,31 @@ def test_checksums_attachments_and_metadata_of_an_mcap_stay(tmp_path):
         assert len(list(StreamReader(file, validate_crcs=True).records)) > 50
 
 
-def test_an_mcap_without_chunks_or_index_is_refused_with_the_remedy(tmp_path):
+@pytest.mark.parametrize("options", [{"use_chunking": False}, {"repeat_channels": False}, {"index_types": 0}])
+def test_an_mcap_without_chunks_or_index_is_copied_with_both(tmp_path, options):
+    """As rosbag2 records in its profile "fastwrite"."""
     writer = pytest.importorskip("mcap.writer")
-    raw = bytes(store("mcap").serialize_cdr(Maker("mcap").string("x"), "std_msgs/msg/String"))
-    for k, options in enumerate(
-        [{"use_chunking": False}, {"repeat_channels": False}, {"index_types": writer.IndexType.NONE}]
-    ):
-        source = tmp_path / f"{k}.mcap"
-        with source.open("wb") as file:
-            one = writer.Writer(file, **options)
-            one.start(profile="ros2", library="test")
-            channel = one.register_channel("/s", "cdr", one.register_schema("std_msgs/msg/String", "ros2msg", b"x"))
-            one.add_message(channel, START, raw, START)
-            one.finish()
-        with pytest.raises(kineme.DataError, match="mcap recover"):
-            copied(source, tmp_path / "b.mcap")
+    if "index_types" in options:
+        options = {"index_types": writer.IndexType.NONE}
+    known = store("mcap")
+    raw = bytes(known.serialize_cdr(Maker("mcap").string("x"), "std_msgs/msg/String"))
+    messages = [("/s", "std_msgs/msg/String", ns, raw) for ns in stamps(5)]
+    write_mcap(tmp_path / "a.mcap", messages, **options)
+    target = copied(tmp_path / "a.mcap", tmp_path / "b.mcap")
+    assert texts_of(target, "mcap") == sorted(TEXTS)
+    assert [one[3:] for one in raw_messages(target) if one[0] != TOPIC] == [(ns, raw) for ns in stamps(5)]
+
+
+def test_chunks_of_a_copy_overlap_no_more_than_those_of_the_file(tmp_path):
+    """All that is of one time is read at once: texts stand among the messages of their time."""
+    m = Maker("mcap")
+    text = m.string("".join(map(chr, np.random.default_rng(0).integers(65, 90, 100_000))))
+    source = write_bag(tmp_path, "mcap", [("/s", ns, text) for ns in stamps(50)])
+    texts = [(ns + 1, "x") for ns in stamps(50)]
+    with reader(copied(source, tmp_path / "b", texts)) as new:
+        spans = [(one.message_start_time, one.message_end_time) for one in new.storage.storages[0].chunks]
+    assert len(spans) > 3
+    assert all(end <= start for (_, end), (start, _) in pairwise(spans))
 
 
 def offered():

@@ -99,6 +99,54 @@ def test_ros_1_reads_a_copy_with_a_topic_more(bag, tmp_path):
     assert all_counts == {**counts, "/kineme/annotations": 2}
 
 
+_APPEND = """
+import sys, genpy, rosbag
+from std_msgs.msg import String
+with rosbag.Bag(sys.argv[1], "a") as bag:
+    for k in range(20):
+        bag.write("/later", String(str(k)), genpy.Time(1700000100 + k))
+"""
+
+
+def in_order_of_roscpp(data):
+    """The records of a bag with the fields of their headers in alphabetic order, as those of a map in C++."""
+    parts, at = [data[:13]], 13
+    while at < len(data):
+        size = int.from_bytes(data[at : at + 4], "little")
+        end = at + 4 + size
+        fields, k = [], at + 4
+        while k < end:
+            length = 4 + int.from_bytes(data[k : k + 4], "little")
+            fields.append(data[k : k + length])
+            k += length
+        body = end + 4 + int.from_bytes(data[end : end + 4], "little")
+        parts += [data[at : at + 4], *sorted(fields, key=lambda one: one[4:]), data[end:body]]
+        at = body
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize("appended", [False, True])
+def test_a_copy_of_what_roscpp_recorded_is_read_by_all(bag, tmp_path, appended):
+    """Index records of two orders of fields in one bag, where rosbag appended to it; rosbags reads only one order."""
+    path, copy = tmp_path / "run.bag", tmp_path / "named.bag"
+    path.write_bytes(in_order_of_roscpp(bag.read_bytes()))
+    if appended:
+        ros_1(_APPEND, path)
+    texts = [(1_700_000_001 * 10**9 + 7, "a")]
+    copy_with_topic(path, copy, "/kineme/annotations", lambda first, last: texts)
+    _, before, counts = _read_by_ros(path)
+    said, after, all_counts = _read_by_ros(copy)
+    assert said == [list(one) for one in texts]
+    assert sorted(after) == sorted(before)
+    assert all_counts == {**counts, "/kineme/annotations": 1}
+    assert counts.get("/later", 0) == 20 * appended
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([copy]) as reader:
+        assert sum(1 for _ in reader.messages()) == len(before) + 1
+    assert len(read_recordings(path, topic="/joint_states").demonstrations[0].times) == 200
+
+
 def test_a_bag_of_ros_1_that_was_cut_off(bag, tmp_path):
     """As of a recorder that was killed: its index was never written."""
     data = bag.read_bytes()

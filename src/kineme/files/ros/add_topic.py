@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import shutil
-import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
 from kineme.errors import DataError
-from kineme.files.ros.add_to_bag import copy_bag
-from kineme.files.ros.add_to_mcap import copy_mcap
-from kineme.files.ros.add_to_sqlite import copy_sqlite
-from kineme.files.ros.added_topic import TEXT, AddedTopic, added_topic
+from kineme.files.ros.added_topic import TEXT, AddedTopic, added_topic, copy_bag, copy_mcap, copy_sqlite
 from kineme.files.ros.bags import Bag, open_bag, storages_of
 from kineme.files.ros.damage import refused
 from kineme.files.ros.expanded_folder import INFORMATION, METADATA
-
-_COPY: dict[str, Callable[[Path, Path, AddedTopic], None]] = {
-    ".bag": copy_bag,
-    ".mcap": copy_mcap,
-    ".db3": copy_sqlite,
-}
 
 Texts = Sequence[tuple[int, str]]  # time of recording [ns] and text of each message
 
@@ -47,15 +37,15 @@ def copy_with_topic(source: Path, target: Path, name: str, texts: Callable[[int,
     with open_bag(source) as bag:
         chosen = texts(int(bag.reader.start_time), int(bag.reader.end_time) - 1)
         added = added_topic(bag, name, chosen)
-        try:
+        with refused("expected a bag that takes a topic more", bag.remedy):
             if source.is_dir():
                 _copy_folder(bag, source, target, added)
-            elif added.messages:
-                _COPY[source.suffix.lower()](source, target, added)
-            else:
+            elif not added.messages:
                 shutil.copyfile(source, target)
-        except (struct.error, ValueError, LookupError, TypeError, AttributeError) as error:
-            raise DataError(f"expected a bag that takes a topic more, got: {error!r}; {bag.remedy}") from error
+            elif bag.version == 1:
+                copy_bag(bag, target, added)
+            else:
+                _copy_file(source, target, added, storages_of(bag)[0])
 
 
 def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> None:
@@ -83,13 +73,21 @@ def _copy_folder(bag: Bag, source: Path, target: Path, added: AddedTopic) -> Non
         source, target, dirs_exist_ok=True, ignore=lambda folder, _: changed if Path(folder) == source else ()
     )
     for one, part in changed.items():
-        copy = _COPY.get(Path(one).suffix.lower())
-        if copy is None:
-            raise DataError(f"expected files of a bag that end in .mcap or .db3, got {one}")
-        copy(source / one, target / one, part)
+        _copy_file(source / one, target / one, part, storages_of(bag)[names.index(one)])
     if changed:
         with (target / METADATA).open("w", encoding="utf-8") as file:
             yaml.dump(whole, file)
+
+
+def _copy_file(source: Path, target: Path, added: AddedTopic, storage: Any) -> None:
+    """Write a copy of a file of ROS 2, which rosbags reads with that storage."""
+    ending = source.suffix.lower()
+    if ending == ".db3":
+        copy_sqlite(source, target, added)
+    elif ending == ".mcap":
+        copy_mcap(source, target, added, storage.chunks[0].compression if storage.chunks else "zstd")
+    else:
+        raise DataError(f"expected files of a bag that end in .mcap or .db3, got {source.name}")
 
 
 def _divided(added: AddedTopic, starts: Sequence[int]) -> dict[int, AddedTopic]:

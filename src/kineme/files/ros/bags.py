@@ -81,6 +81,8 @@ def open_bag(path: Path) -> Iterator[Bag]:
         plain = stack.enter_context(plain_name(folder.path, ending))
         with refused("expected a bag of ROS that can be opened", remedy):
             reader: Any = (Reader1 if ending == ".bag" else Reader2)(plain)
+            if ending == ".bag":
+                _read_any_order(reader)
             reader.open()
         stack.callback(reader.close)
         with refused("expected the topics of a bag of ROS", remedy):
@@ -91,6 +93,20 @@ def open_bag(path: Path) -> Iterator[Bag]:
             topics = _topics(reader.connections)
         version = 1 if ending == ".bag" else 2
         yield Bag(_KINDS.get(ending, "ROS 2 bag"), topics, reader, version, remedy, folder.compression)
+
+
+def _read_any_order(reader: Any) -> None:
+    """Let rosbags look at the order of fields in each index record of a bag of ROS 1, and not in the first alone.
+
+    roscpp writes them in another order than rosbag, which may have appended to what roscpp recorded.
+    """
+    read = reader.read_index_data
+
+    def read_anew(at: int, indexes: Any) -> None:
+        reader.index_data_header_offsets = None
+        read(at, indexes)
+
+    reader.read_index_data = read_anew
 
 
 def _check_files(folder: Folder, path: Path) -> None:

@@ -26,15 +26,18 @@ def bound_chunks_of_ros_1(reader: Any) -> None:
         reader.chunks[at] = chunk._replace(decompressor=partial(_expand_of_ros_1, reader.bio, at))
 
 
-def _expand_of_ros_1(file: Any, at: int, data: bytes) -> bytes:
+def compression_of_ros_1(file: Any, at: int) -> tuple[str, int]:
+    """How the chunk at a byte of a bag of ROS 1 is compressed, and the size [bytes] that it expands to."""
     from rosbags.rosbag1.reader import Header, RecordType
 
     file.seek(at)
     header = Header.read(file, RecordType.CHUNK)
-    compression = header.get_string("compression")
-    if compression == "none":
-        return data
-    return expand(compression, data, header.get_uint32("size"), f"a chunk at byte {at:,}")
+    return header.get_string("compression"), header.get_uint32("size")
+
+
+def _expand_of_ros_1(file: Any, at: int, data: bytes) -> bytes:
+    compression, size = compression_of_ros_1(file, at)
+    return data if compression == "none" else expand(compression, data, size, f"a chunk at byte {at:,}")
 
 
 @cache
