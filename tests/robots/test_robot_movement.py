@@ -10,10 +10,13 @@ import kineme
 from arm_samples import stroke
 from kineme.errors import TrajectoryError
 from kineme.orientation import PoseDMP
+from kineme.primitives.generation.learned import learn_one
 from kineme.robots import InfeasibleError, load, move
 from kineme.robots.checks.along import along
 from kineme.robots.kinematics.inverse import InverseKinematics
 from kineme.robots.models.table import MODELS
+from kineme.robots.planning.generate_at import generate_at
+from kineme.robots.planning.request import request_of
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -122,6 +125,43 @@ def test_angles_in_degrees_as_many_as_the_joints_move_the_joints(tmp_path):
     changes = np.flatnonzero(np.diff(made.trajectory.steps["gripper"]))
     assert len(changes) == 1
     assert made.trajectory.times[changes[0] + 1] - made.begins == pytest.approx(1.2, abs=0.06)
+
+
+@pytest.mark.parametrize("unit", ["degrees", "Degree", "DEG", "°", "degs"])
+def test_every_spelling_of_degrees_moves_the_joints_alike(tmp_path, unit):
+    robot = load("panda")
+    joints = robot.rest + np.linspace(0, 0.3, 20)[:, None]
+    columns = np.column_stack((np.linspace(0, 3, 20), np.degrees(joints)))
+    asked = request_of(
+        recorded(["time [s]", *(f"{name} [{unit}]" for name in robot.joints)], columns, tmp_path), robot, "auto"
+    )
+    np.testing.assert_allclose(asked.positions, joints, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "message"),
+    [
+        ("Grad", r"expected 'panda_joint1 \[Grad\]' in a unit of angle \(rad, deg\), got 'Grad'; convert the column"),
+        ("mm", r"in a unit of angle .*, got 'mm'"),
+        ("%", r"in a unit of angle .*, got '%'"),
+        ("deg/s", r"in a unit of angle .*, got 'deg/s'"),
+    ],
+)
+def test_joints_in_what_is_no_angle_do_not_move(tmp_path, unit, message):
+    robot = load("panda")
+    columns = np.column_stack((np.linspace(0, 3, 20), robot.rest + np.linspace(0, 0.3, 20)[:, None]))
+    one = recorded(["time [s]", *(f"{name} [{unit}]" for name in robot.joints)], columns, tmp_path)
+    with pytest.raises(TrajectoryError, match=message):
+        move(one, robot, space="joints")
+
+
+def test_a_tip_in_what_is_no_length_moves_by_the_scale_alone(tmp_path):
+    u = np.linspace(0, 1, 60)[:, None]
+    one = recorded(["time", "x [px]", "y [px]", "z [px]"], np.hstack((3 * u, 100 * u, 50 * u**2, 20 * u**3)), tmp_path)
+    learned = learn_one(one, kineme.DMP())
+    with pytest.raises(TrajectoryError, match=r"expected 'x \[px\]' in a unit of length .*, got 'px'"):
+        generate_at(learned)
+    assert np.ptp(generate_at(learned, scale=0.001).movement.positions[:, 0]) == pytest.approx(0.1, rel=0.05)
 
 
 def test_positions_in_millimeters_are_meters_for_the_arm(tmp_path):

@@ -33,6 +33,8 @@ ELAN = {
 TABLES = {
     "plain.csv": ("start,end,label\n0.5,1.75,wave\n2,4,nod\n", False),
     "units.csv": ("onset [ms];offset [ms];gesture\n500;1750;wave\n2000;4000;nod\n", False),
+    "two units.csv": ("start [s],end [ms],label\n0.5,1750,wave\n2,4000,nod\n", False),
+    "minutes.csv": ("start_us,end [min],label\n500000,0.029166666666666667,wave\n2e6,0.06666666666666667,nod\n", False),
     "comma.csv": ("Start;Ende;Ende Zeit;end time;label\n0,5;;;1,75;wave\n2,0;;;4,0;nod\n", False),
     "order.tsv": ("label\tstart_time\tend_time\nwave\t0.5\t1.75\nnod\t2\t4\n", False),
     "audacity.txt": ("0.5\t1.75\twave\n\\\t100.0\t200.0\n2.000000\t4.000000\tnod\n", True),

@@ -57,7 +57,15 @@ def test_a_jump_from_one_movement_to_the_next_is_none():
 
 @pytest.mark.parametrize(
     ("largest", "unit", "period"),
-    [(3.0, None, 2 * np.pi), (90.0, None, 360.0), (3.0, "deg", 360.0), (9.0, "rad", 2 * np.pi), (90.0, "turn", 360.0)],
+    [
+        (3.0, None, 2 * np.pi),
+        (90.0, None, 360.0),
+        (3.0, "deg", 360.0),
+        (9.0, "rad", 2 * np.pi),
+        (9.0, "Degrees", 360.0),
+        (3.0, "turn", 1.0),
+        (90.0, "Grad", 360.0),
+    ],
 )
 def test_the_unit_or_the_values_tell_the_period(largest, unit, period):
     assert period_of(np.array([0.0, largest]), unit) == period

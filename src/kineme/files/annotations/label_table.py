@@ -9,11 +9,14 @@ from typing import NamedTuple
 
 from kineme.errors import DataError
 from kineme.files.annotations.audacity import UNKNOWN
+from kineme.movements.tables.time_stamps import TIME_UNITS
+from kineme.units import UNITS, converted, split_head, unit_named
 
-_UNIT = r"(\b|_(s|sec|seconds?|ms|msec|milliseconds?)$)"
+_TIMES = "|".join(sorted(map(re.escape, TIME_UNITS), key=len, reverse=True))
+_UNIT = rf"(\b|_({_TIMES})$)"
 _START = re.compile(rf"(start|begin|onset|from){_UNIT}|(start|begin)[ _]?time")
 _END = re.compile(rf"(end|stop|offset|to){_UNIT}|(end|stop)[ _]?time")
-_MILLISECONDS = re.compile(r"(?<![.a-z])(ms|msec|milliseconds?)\b\W*$")
+_LAST_WORD = re.compile(rf"(?<![.a-zµμ])({_TIMES})\W*$")  # that of hh:mm:ss.ms says how a clock is written
 _LABELS = frozenset(
     {"label", "labels", "symbol", "annotation", "annotations", "value", "text", "name", "class", "action", "gesture"}
 )
@@ -45,14 +48,14 @@ class LabelRow(NamedTuple):
 
 
 class Heads(NamedTuple):
-    """Columns of a table of labels by their roles, the units of times in seconds, and whether ELAN wrote the heads."""
+    """Columns of a table of labels by their roles, the units of start and end, and whether ELAN wrote the heads."""
 
     start: int
     end: int
     label: int
     recording: int | None
     place: int | None
-    units: tuple[float, float]
+    units: tuple[str, str]
     of_elan: bool
 
 
@@ -68,16 +71,23 @@ def heads_of(cells: Sequence[str]) -> Heads | None:
     labels = known or others[-1:]
     if not labels:
         raise DataError(f"expected a column of labels beside start and end, got {list(cells)}; call it label")
-    units = tuple(1e-3 if _MILLISECONDS.search(names[k]) else 1.0 for k in (start, end))
     return Heads(
         start,
         end,
         labels[0],
         next((k for k, one in enumerate(names) if one in _RECORDINGS), None),
         next((k for k, one in enumerate(names) if one in _PLACES), None),
-        (units[0], units[1]),
+        (_unit_of(names[start]), _unit_of(names[end])),
         "time - " in names[start],
     )
+
+
+def _unit_of(name: str) -> str:
+    """The unit of the times below a head in lower case: in brackets, or its last word; else seconds."""
+    unit, word = unit_named(split_head(name)[1] or ""), _LAST_WORD.search(name)
+    if unit is not None and unit.quantity == "time":
+        return unit.symbol
+    return word[1] if word else "s"
 
 
 def heads_of_cells(cells: Sequence[str]) -> Heads | None:
@@ -85,7 +95,7 @@ def heads_of_cells(cells: Sequence[str]) -> Heads | None:
     clocks = [k for k, cell in enumerate(cells) if ":" in cell and seconds_of(cell) is not None]
     numbers = [k for k, cell in enumerate(cells[:-1]) if ":" not in cell and seconds_of(cell) is not None]
     times = clocks if len(clocks) > 1 else numbers
-    return Heads(times[0], times[1], len(cells) - 1, None, None, (1.0, 1.0), True) if len(times) > 1 else None
+    return Heads(times[0], times[1], len(cells) - 1, None, None, ("s", "s"), True) if len(times) > 1 else None
 
 
 def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
@@ -99,7 +109,10 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
     if len(cells) <= max(heads.start, heads.end, heads.label):
         raise DataError(f"line {line}: expected start, end and label, got {list(cells)}")
     times = [seconds_of(cells[k]) for k in (heads.start, heads.end)]
-    start, end = (math.nan if one is None else one * unit for one, unit in zip(times, heads.units, strict=True))
+    start, end = (
+        math.nan if time is None else float(converted(time, UNITS[unit], UNITS["s"]))
+        for time, unit in zip(times, heads.units, strict=True)
+    )
     if not end > start:
         raise DataError(
             f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"

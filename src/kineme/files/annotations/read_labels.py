@@ -17,7 +17,7 @@ from kineme.files.limits import check_expanded, read_limited
 _SKIPPED = ("\\", '"#', "#")  # frequencies of Audacity, and what ELAN says of the media
 _CELL = 200  # bytes that a character of a table may take in Python, at most
 _EXPECTED = "expected a table with columns start, end and label"
-_MILLISECONDS = Heads(0, 1, 2, None, None, (1e-3, 1e-3), True)
+_MILLISECONDS = Heads(0, 1, 2, None, None, ("ms", "ms"), True)
 
 
 class LabelTable(NamedTuple):

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 
 from kineme.errors import DataError
 from kineme.files.motion_capture.export_heads import ExportHead, positive, without_common_subject
+from kineme.units import unit_named
 
-_LENGTHS = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
 _EXPECTED = ("rigid body marker", "bone marker", "trained markerset marker")  # computed from the pose, not measured
 
 
@@ -29,7 +29,7 @@ def optitrack_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str
     above = [row for row in rows[1:at] if any(row)]
     if len(above) < 3:
         raise DataError("expected an OptiTrack export with rows of types, names and contents above the heads")
-    length = _LENGTHS.get(said.get("length units", "").lower(), "")
+    length = unit.symbol if (unit := unit_named(said.get("length units", ""))) is not None else ""
     n = len(rows[at])
     kinds, names, contents = ((row + [""] * n)[:n] for row in (above[0], above[1], above[-1]))
     solved = any(kind.lower() in ("rigid body", "bone") for kind in kinds)

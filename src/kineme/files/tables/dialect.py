@@ -11,20 +11,10 @@ from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.time_stamps import is_date
+from kineme.units import unit_named
 
 COMMENTS = ("#", "%", "//")
-#: What may stand in a row of units, in lower case; one alone is no name of an action or a person.
-UNITS_OF_COLUMNS = frozenset(
-    {
-        "mm", "cm", "dm", "km", "in", "inch", "inches", "ft", "feet", "meter", "meters", "millimeter",
-        "millimeters", "s", "sec", "second", "seconds", "ms", "millisecond", "milliseconds", "us", "µs", "ns",
-        "min", "hz", "deg", "degree", "degrees", "°", "rad", "radian", "radians", "mrad", "deg/s", "°/s", "rad/s",
-        "m/s", "mm/s", "cm/s", "deg/s^2", "deg/s²", "rad/s^2", "rad/s²", "m/s^2", "m/s²", "m/s2", "mm/s^2",
-        "mm/s²", "kg", "mv", "%", "n.m", "nm", "n·m", "n*m", "n.mm", "nmm", "mm.n", "n/kg", "w/kg", "count",
-        "counts", "frame", "frames",
-    }
-)  # fmt: skip
-_LETTERS = frozenset("mnwvag-")  # units that may be names
+_LETTERS = frozenset("mnwvahg-")  # units that may be names
 _PEEK = 20  # samples from which the dialect is detected
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
@@ -128,8 +118,9 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
 def units_in(cells: Sequence[str]) -> tuple[str, ...]:
     """The units in a row that holds nothing but units, without brackets; empty if it is no such row."""
     plain = tuple(cell.strip("[]() ") for cell in cells)
-    known = sum(cell.lower() in UNITS_OF_COLUMNS for cell in plain)
-    others = sum(bool(cell) and cell.lower() not in UNITS_OF_COLUMNS | _LETTERS for cell in plain)
+    letters = [cell.lower() in _LETTERS for cell in plain]
+    known = sum(unit_named(cell) is not None for cell, letter in zip(plain, letters, strict=True) if not letter)
+    others = sum(unit_named(cell) is None for cell, letter in zip(plain, letters, strict=True) if cell and not letter)
     return plain if known and not others and 2 * sum(map(bool, plain)) >= len(plain) else ()
 
 

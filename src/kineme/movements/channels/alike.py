@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channel, Channels, in_words, learned_names
-from kineme.movements.channels.coordinates import units_per_meter
-from kineme.movements.channels.wraps import period_by_unit
+from kineme.units import Unit, unit_named
 
 
 def check_alike(several: Sequence[Channels | None], what: str = "part") -> None:
@@ -52,7 +51,6 @@ def _difference(ours: Channels, theirs: Channels) -> str | None:
     return None
 
 
-def _measure(channel: Channel) -> float | str:
-    """The same for units of the same size."""
-    unit = channel.unit or ""
-    return units_per_meter(unit) or period_by_unit(unit) or unit.lower()
+def _measure(channel: Channel) -> Unit | str:
+    """The same for all spellings of a unit."""
+    return unit_named(channel.unit or "") or (channel.unit or "").lower()

@@ -12,20 +12,10 @@ from kineme.movements.channels.channel import Channel, Channels, recorded_names
 from kineme.movements.channels.wraps import period_by_unit, period_of, without_wraps
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE, conjugate, product
 from kineme.movements.rotations.rotation_vectors import log
+from kineme.units import UNITS, converted, unit_named
 from kineme.validation import Array
 
 _LEVER = 0.2  # m
-_UNITS_PER_METER = (
-    (1e-3, "km kilometer"),
-    (1.0, "m meter"),
-    (1e1, "dm decimeter"),
-    (1e2, "cm centimeter"),
-    (1e3, "mm millimeter"),
-    (1e6, "um µm micrometer micron"),
-    (1 / 0.0254, "in inch inche"),
-    (1 / 0.3048, "ft foot feet"),
-)
-_PER_METER = {name: number for number, names in _UNITS_PER_METER for name in names.split()}  # singular, lower case
 _ROUNDING = 1e-15  # deviation from norm 1 that is that of the last digit
 
 
@@ -126,12 +116,10 @@ def lever_of(channels: Channels) -> float:
     It is about the length of a hand or a tool: a rotation counts as much as the way of the tip.
     """
     units = [one.unit for one in channels if one.kind == "position"]
-    return _LEVER * (units_per_meter(units[0] or "m") or 1.0) if units else 1.0
-
-
-def units_per_meter(unit: str) -> float | None:
-    """How many of a unit make a meter; None of what is no length that is known."""
-    return _PER_METER.get(unit.lower().removesuffix("s"))
+    if not units:
+        return 1.0
+    unit = unit_named(units[0] or "m")
+    return float(converted(_LEVER, UNITS["m"], unit)) if unit is not None and unit.quantity == "length" else _LEVER
 
 
 def as_wxyz(q: Array, channel: Channel) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -17,6 +16,7 @@ from kineme.movements.channels.wraps import wrap_period
 from kineme.movements.tables.columns import column_numbers
 from kineme.movements.tables.parsed import listed
 from kineme.movements.tables.time_stamps import words_of
+from kineme.units import UNITS, split_head, unit_named
 from kineme.validation import Array
 
 #: What the caller says of columns: heads separated by commas -> their kind; four of a quaternion -> its order.
@@ -42,35 +42,15 @@ _OTHER_QUANTITIES = frozenset(
         "torque", "torques", "effort", "efforts", "force", "forces", "voltage", "power", "temperature", "gyro", "omega",
     }
 )  # fmt: skip
-_OTHER_UNITS = frozenset(
-    {
-        "m",
-        "mm",
-        "cm",
-        "dm",
-        "km",
-        "um",
-        "µm",
-        "in",
-        "ft",
-        "px",
-        "n",
-        "nm",
-        "n.m",
-        "v",
-        "mv",
-        "a",
-        "ma",
-        "w",
-        "%",
-        "ticks",
-    }
-)
 _PER_TIME = frozenset({"s", "sec", "second", "seconds", "per"})
 _LEVELS = 8  # different values of a discrete channel, at most
-_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
-_UNITS_IN_WORDS = {"deg": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "radian": "rad", "radians": "rad"}
-_UNITS_IN_WORDS |= {"mm": "mm", "cm": "cm"}
+#: Words of heads that are units: ``x_mm``, ``yaw_deg``. Others, as in and turn, are too often something else there.
+_UNIT_WORDS = {
+    name: unit.symbol
+    for name, unit in UNITS.items()
+    if (unit.quantity == "angle" and unit.symbol in {"deg", "rad", "mrad"})
+    or (unit.quantity == "length" and (name in {"mm", "cm"} or (len(name) > 5 and name.endswith("s"))))
+}
 
 
 def find_channels(
@@ -121,13 +101,12 @@ def find_channels(
 
 
 def unit_of(head: str) -> str | None:
-    """The unit in the head of a column: what it ends in within brackets, or a word for degrees or radians."""
-    if (found := _UNIT.search(head)) and not found[1].strip().isdecimal():  # that of joint[0] is no unit
-        return found[1].strip() or None
+    """The unit in the head of a column: the text in brackets that it ends in, or a word for an angle or a length."""
+    _, bracketed = split_head(head)
+    if bracketed is not None:
+        return bracketed
     words = words_of(head)
-    return (
-        None if _PER_TIME & {*words} else next((_UNITS_IN_WORDS[one] for one in words if one in _UNITS_IN_WORDS), None)
-    )
+    return None if _PER_TIME & {*words} else next((_UNIT_WORDS[one] for one in words if one in _UNIT_WORDS), None)
 
 
 def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Quaternion]]:
@@ -169,10 +148,10 @@ def _kind(head: str, unit: str | None, values: Array, offsets: NDArray[np.intp],
     words = set(words_of(head))
     if words & DISCRETE_WORDS and len(np.unique(values)) <= _LEVELS:
         return "discrete"
-    measure = (unit or "").lower()
-    rate = "/" in measure or (words & _PER_TIME and words & set(_UNITS_IN_WORDS))
-    if rate or words & _OTHER_QUANTITIES or measure in _OTHER_UNITS:
+    measure = unit_named(unit or "")
+    rate = "/" in (unit or "") or (words & _PER_TIME and words & set(_UNIT_WORDS))
+    if rate or words & _OTHER_QUANTITIES or (measure is not None and measure.quantity != "angle"):
         return "position"
-    if is_joint or words & ANGLE_WORDS or measure in ("deg", "rad", "°") or wrap_period(values, offsets) is not None:
+    if is_joint or words & ANGLE_WORDS or measure is not None or wrap_period(values, offsets) is not None:
         return "angle"
     return "position"

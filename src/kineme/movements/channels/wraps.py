@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from kineme.units import unit_named
 from kineme.validation import Array
 
 _TURN = 2.0 * np.pi
@@ -34,10 +35,9 @@ def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
 
 
 def period_by_unit(unit: str | None) -> float | None:
-    """The period of an angle in degrees or radians; None where the unit does not say which."""
-    if unit is None or not unit.lower().startswith(("deg", "°", "rad")):
-        return None
-    return _TURN if unit.lower().startswith("rad") else 360.0
+    """The period of an angle in a unit; None where it is no unit of an angle."""
+    measure = unit_named(unit or "")
+    return float(_TURN / measure.size) if measure is not None and measure.quantity == "angle" else None
 
 
 def period_of(angles: Array, unit: str | None) -> float:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.tables.parsed import listed
-from kineme.movements.tables.time_stamps import PER_SECOND, words_of
+from kineme.movements.tables.time_stamps import TIME_UNITS, words_of
+from kineme.units import UNITS, is_unit_of, split_head
 
 #: Words of heads. A head has a role if all its words are in the role's lists and at least one is in the first list.
 TIME_WORDS = frozenset({"t", "time", "times", "timestamp", "timestamps", "stamp", "stamps", "elapsed", "epoch"})
@@ -20,7 +21,7 @@ MOVEMENT_WORDS = frozenset(
     }
 )  # fmt: skip
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
-_BESIDE_TIME = frozenset(PER_SECOND) | {"unix", "utc", "since", "start", "relative", "system"}
+_BESIDE_TIME = TIME_UNITS | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
 _BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count", "counter"})
@@ -180,7 +181,7 @@ def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
         match = _WHOLE_SECONDS.fullmatch(head) if kinds[k] == "number" else None
         if match is None or match[1][-1:].isalpha():
             continue
-        names = [f"{match[1]}{name}".lower() for name, unit in PER_SECOND.items() if unit == PER_SECOND["ns"]]
+        names = [f"{match[1]}{name}".lower() for name in TIME_UNITS if UNITS[name].symbol == "ns"]
         beside = [plain[name] for name in names if name in plain and kinds[plain[name]] == "number"]
         if len(beside) == 1:
             found[k] = beside[0]
@@ -189,8 +190,9 @@ def _nanoseconds(heads: Sequence[str], kinds: Sequence[str]) -> dict[int, int]:
 
 def is_time(head: str) -> bool:
     """Whether a head names time: ``t``, ``Time [ms]``, ``timestamp_ns``, ``sec``."""
-    words = words_of(head)
-    if len(words) <= 1 and words != ("s",) and set(words) & set(PER_SECOND):
+    stem, unit = split_head(head)
+    words = words_of(stem if stem and is_unit_of(unit, "time") else head)
+    if len(words) <= 1 and words != ("s",) and set(words) & TIME_UNITS:
         return True
     return set(words) <= TIME_WORDS | _BESIDE_TIME and bool(set(words) & TIME_WORDS)
 

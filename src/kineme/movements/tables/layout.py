@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from numbers import Real
 
 from kineme.errors import SpecificationError
-from kineme.movements.tables.time_stamps import PER_SECOND, UNITS
+from kineme.movements.tables.time_stamps import PER_SECOND
+from kineme.units import is_unit_of
 from kineme.validation import check_choice, check_number
 
 Column = str | int  # head, or number counted from 0
@@ -52,8 +53,8 @@ class Layout:
     label : str or int, optional
         Column that names the action.
     units : str or float, optional
-        Unit of the time stamps: one of `kineme.movements.tables.time_stamps.UNITS`, or the number of seconds in one
-        unit. As a number, it is the step between samples of a file that has no time stamps at all.
+        Unit of the time stamps, of time in `kineme.units.UNITS`, or the number of seconds in one unit. As a number, it
+        is the step between samples of a file that has no time stamps at all.
     skip : {"movement", "sample"}
         What is dropped for a missing or repeated sample: its whole movement, or the sample alone.
     kinds : mapping, optional
@@ -91,9 +92,9 @@ class Layout:
         check_choice("skip", self.skip, SKIP)
         if isinstance(self.units, Real) and not isinstance(self.units, bool):
             check_number("units", self.units, above=0)
-        elif self.units is not None and self.units not in PER_SECOND:
+        elif self.units is not None and not (isinstance(self.units, str) and is_unit_of(self.units, "time")):
             raise SpecificationError(
-                f"expected units to be one of {', '.join(UNITS)} or a number of seconds, got {self.units!r}"
+                f"expected units to be one of {', '.join(PER_SECOND)} or a number of seconds, got {self.units!r}"
             )
 
     @property

@@ -12,21 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.units import UNITS, converted, split_head, unit_named
 from kineme.validation import Array
 
-#: Unit -> number per second.
-UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+#: Units of stamps whose unit nobody says -> number per second.
+PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
-_ALSO = {
-    "s": "sec secs second seconds",
-    "ms": "msec msecs millis millisecond milliseconds",
-    "us": "µs μs usec usecs micros microsecond microseconds",
-    "ns": "nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
-}
-_NAMES = {name: unit for unit, names in _ALSO.items() for name in (unit, *names.split())}
-
-#: Every name of a unit -> number per second.
-PER_SECOND = {name: UNITS[unit] for name, unit in _NAMES.items()}
+#: Names of units of time within words, as in ``elapsed_ms``; these are too often something else there: t_min, h.
+TIME_UNITS = frozenset(name for name, unit in UNITS.items() if unit.quantity == "time") - {"min", "h"}
 
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ]+|\d+|[^\W\d_]+")  # camelCase, snake_case, [units] apart
 
@@ -49,9 +42,11 @@ def words_of(head: str) -> tuple[str, ...]:
 
 
 def unit_in_head(head: str) -> str | None:
-    """The unit of time that a column's head ends in, if it names one."""
-    words = words_of(head)
-    return _NAMES.get(words[-1]) if words else None
+    """The unit of time that a column's head ends in, in brackets or as a word, if it names one."""
+    (_, bracketed), words = split_head(head), words_of(head)
+    if (unit := unit_named(bracketed or "")) is not None and unit.quantity == "time":
+        return unit.symbol
+    return UNITS[words[-1]].symbol if words and words[-1] in TIME_UNITS else None
 
 
 def unit_by_size(stamps: Array) -> tuple[str, str]:
@@ -63,7 +58,7 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
         return "s", "assumed"
-    for unit, per_second in UNITS.items():
+    for unit, per_second in PER_SECOND.items():
         if _UNIX[0] <= finite[0] / per_second <= _UNIX[1]:
             return unit, "since 1970"
     steps = np.abs(np.diff(finite))
@@ -75,7 +70,9 @@ def unit_by_size(stamps: Array) -> tuple[str, str]:
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
     """Stamps (total,) of a unit in seconds; by division, so that 100 ms are exactly the float 0.1."""
-    return stamps / PER_SECOND[units] if isinstance(units, str) else stamps * float(units)
+    if isinstance(units, str):
+        return np.asarray(converted(stamps, UNITS[units], UNITS["s"]))
+    return stamps * float(units)
 
 
 def is_date(cell: str) -> bool:

@@ -13,7 +13,7 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
 from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.planning.roles import Roles, roles_of
+from kineme.robots.planning.roles import Roles, roles_of, sizes_of
 from kineme.validation import Array, as_numbers
 
 
@@ -86,7 +86,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
-    units = roles.units if scale is None else np.full(n, scale)
+    quantities = ("angle", "length") if joints else ("length",)
+    units = sizes_of(roles, [quantities] * n) if scale is None else np.full(n, scale)
     frame = _Frame(start, units, start * units if begin is None else begin[axes])
     target = None if end is None else _goal_as_recorded(shown[-1], roles, frame.to_recording(end[axes]))
     if (way := _point(displacement, "displacement", n)) is not None:

@@ -13,7 +13,7 @@ from kineme.movements.segmentation.segment import as_recording
 from kineme.primitives.discrete.dmp import Primitives
 from kineme.primitives.pose.pose_primitives import PosePrimitives
 from kineme.robots.models.robot import Robot
-from kineme.robots.planning.roles import roles_of, space_of
+from kineme.robots.planning.roles import roles_of, sizes_of, space_of
 from kineme.validation import Array, as_numbers
 
 
@@ -48,6 +48,8 @@ def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Re
             f"expected a movement of the {robot.n_joints} joints of {robot.name}, got {len(roles.positions)} columns; "
             "choose them with columns=, in the shell --columns, or say which are no joints, --kind gripper=discrete"
         )
+    moved = [("angle",) if unit == "rad" else ("length",) for unit in robot.units]
+    quantities = moved if space == "joints" else [("length",)] * len(roles.positions)
     turned = None if roles.orientation is None else as_wxyz(columns[:, roles.orientation[1]], roles.orientation[0])
     known = sorted({*roles.discrete, *_given(steps)} & set(robot.joints))
     if known:
@@ -56,7 +58,7 @@ def request_of(movement: Any, robot: Robot, space: str, steps: Any = None) -> Re
     return Request(
         one.times - one.times[0],
         space,
-        columns[:, roles.positions] * roles.units,
+        columns[:, roles.positions] * sizes_of(roles, quantities),
         turned,
         {name: _one_for_each(one.times, values, name) for name, values in {**recorded, **_given(steps)}.items()},
     )
