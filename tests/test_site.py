@@ -88,6 +88,13 @@ def test_examples_of_a_help_stand_under_their_heading():
     assert "**As in**\n\n.. code-block:: bash\n\n   kineme learn recordings/ --library actions/\n" in page
 
 
+def test_options_for_reading_are_explained_on_one_page():
+    pages = dict(commands.pages())
+    assert [name for name, page in pages.items() if ".. option:: --follow-links" in page] == ["kineme-inspect.rst"]
+    assert ":option:`--trim <kineme inspect --trim>`" in pages["kineme-learn.rst"]
+    assert ".. rubric:: Arm" in pages["kineme-move.rst"]
+
+
 @pytest.mark.parametrize("line", [line for lines in commands.EXAMPLES.values() for line in lines])
 def test_examples_of_commands_parse(line):
     command, context, words = main, click.Context(main), shlex.split(line.partition(" > ")[0])[1:]

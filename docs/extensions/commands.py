@@ -9,6 +9,7 @@ import click
 from walk_through import pages as written_pages
 
 from kineme.cli import main
+from kineme.cli.options import READING, headings
 
 #: Of commands that no page shows.
 EXAMPLES = {
@@ -74,10 +75,16 @@ def _sentence(text: str) -> str:
 
 def _options(command: click.Command, context: click.Context) -> list[str]:
     lines: list[str] = []
-    for option in command.get_params(context):
-        record = option.get_help_record(context)
-        if record is not None and record[1]:
-            lines += [f".. option:: {record[0]}", "", f"   {_sentence(record[1])}", ""]
+    for words, options in headings(command, context).items():
+        lines += [f".. rubric:: {words}", ""] if words != "Options" else []
+        if words == READING and not getattr(command, "explains_reading", False):
+            names = ", ".join(f":option:`{option.opts[0]} <kineme inspect {option.opts[0]}>`" for option in options)
+            lines += [f"{names}: as of :doc:`kineme inspect <kineme-inspect>`.", ""]
+            continue
+        for option in options:
+            record = option.get_help_record(context)
+            if record is not None and record[1]:
+                lines += [f".. option:: {record[0]}", "", f"   {_sentence(record[1])}", ""]
     return lines
 
 

@@ -3,13 +3,18 @@
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 
+import click
 import pytest
+from click.testing import CliRunner
 
 import kineme
 from kineme.cli.main import main
+from kineme.cli.options import GroupedCommand, heading, headings, under
+from kineme.cli.reading import LAYOUT_OPTIONS
 from kineme.runtime import compiled
 
 
@@ -86,3 +91,64 @@ def test_what_only_prints_loads_nothing_heavy(arguments):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def options_by_heading(arguments):
+    """Heading -> the flags that the help lists below it, each as often as it stands there."""
+    text = CliRunner().invoke(main, [*arguments, "--help"]).output
+    flags, words = {}, None
+    for line in text.splitlines():
+        if line.endswith(":") and not line.startswith(" "):
+            flags[words := line[:-1]] = []
+        elif words and line.startswith("  -"):
+            flags[words] += re.findall(r"--[a-z0-9-]+", line if words == "Reading" else line.partition("   ")[0])
+    return flags
+
+
+READERS = [name for name, command in main.commands.items() if {one.name for one in command.params} >= {*LAYOUT_OPTIONS}]
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_every_option_stands_under_one_heading_and_those_for_reading_last(name):
+    headed = options_by_heading([name])
+    shown = [flag for flags in headed.values() for flag in flags if flag not in ("--help", "--no-outliers")]
+    options = [one for one in main.commands[name].params if isinstance(one, click.Option)]
+    inside = {one.opts[0] for one in options if one.name in LAYOUT_OPTIONS}
+    assert list(headed)[-1] == "Reading"
+    assert {*headed["Reading"]} - {"--help"} == inside
+    assert sorted(shown) == sorted(next(flag for flag in one.opts if flag.startswith("--")) for one in options)
+
+
+def test_options_for_reading_are_explained_once():
+    explained = [name for name in READERS if "Pose of one frame" in CliRunner().invoke(main, [name, "--help"]).output]
+    assert explained == ["inspect"]
+
+
+def test_arm_movement_and_output_are_apart():
+    headed = options_by_heading(["move"])
+    assert list(headed) == ["Options", "Arm", "Movement", "Output", "Reading"]
+    for words, flag in (("Arm", "--tip"), ("Movement", "--n-basis"), ("Output", "--view"), ("Output", "--json")):
+        assert flag in headed[words]
+
+
+def test_an_option_lands_where_it_is_written():
+    """Below the next heading above it; one that is added with its own heading keeps that."""
+
+    @click.command(cls=GroupedCommand)
+    @click.option("--first")
+    @heading("Arm")
+    @click.option("--new")
+    @under("Output", click.option("--sent"))
+    @click.option("--newer")
+    @heading("Movement")
+    @click.option("--newest")
+    def command(**options):
+        pass
+
+    groups = {
+        words: [one.name for one in options if "--help" not in one.opts]
+        for words, options in headings(command, click.Context(command)).items()
+    }
+    assert groups == {
+        "Options": ["first"], "Arm": ["new", "newer"], "Output": ["sent"], "Movement": ["newest"],
+    }  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from kineme.cli.channels import differences
-from kineme.cli.options import Finite, force_option, json_option, library_option
+from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say, write
 from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
@@ -31,20 +31,21 @@ class Format(click.ParamType):  # type: ignore[type-arg]
         return str(value)
 
 
-@click.command(short_help="Find the symbols of a library in long recordings.")
+@click.command(cls=GroupedCommand, short_help="Find the symbols of a library in long recordings.")
 @recordings_argument
 @library_option
+@click.option(
+    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
+    help="The smaller, the more a movement may differ from those of its symbol.",
+)  # fmt: skip
+@layout_options
+@heading("Output")
 @click.option(
     "--output", "-o", type=click.Path(path_type=Path),
     help="What to write: a .csv, .json, .eaf (ELAN) or .txt (Audacity) file, a folder, or a copy of a bag or of a "
     "LeRobot data set.  [default: show a table]",
 )  # fmt: skip
 @click.option("--format", "form", type=Format(), help="Format, where the ending does not say it: csv, elan, ...")
-@click.option(
-    "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
-    help="The smaller, the more a movement may differ from those of its symbol.",
-)  # fmt: skip
-@layout_options
 @json_option
 @click.option("--csv", "as_csv", is_flag=True, help="Answer in CSV.")
 @force_option

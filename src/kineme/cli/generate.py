@@ -9,9 +9,11 @@ import click
 
 from kineme.cli.options import (
     Finite,
+    GroupedCommand,
     Numbers,
     SymbolName,
     force_option,
+    heading,
     json_option,
     library_option_of,
     specification_options,
@@ -25,9 +27,11 @@ from kineme.output.text import printable
 _BAD_FIT = 0.05  # of the extent of the recording
 
 
-@click.command(short_help="Generate a movement from a symbol or a recording.")
+@click.command(cls=GroupedCommand, short_help="Generate a movement from a symbol or a recording.")
 @click.argument("source", type=SymbolName())
 @library_option_of(required=False, words="Folder of the action library that SOURCE is a symbol of.")
+@click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
+@heading("Movement")
 @click.option(
     "--start",
     type=Numbers(),
@@ -38,9 +42,9 @@ _BAD_FIT = 0.05  # of the extent of the recording
 @click.option("--rate", type=Finite(), default=100.0, show_default=True, help="Samples per second at least.")
 @click.option("--settle", type=Finite(), help="Continue past the duration until this close to the goal.")
 @click.option("--obstacle", "obstacles", type=Numbers(), multiple=True, help="Point to avoid; may be repeated.")
-@click.option("--index", type=whole(0), help="Number of the movement in a file with several, from 0.")
 @specification_options
 @layout_options
+@heading("Output")
 @click.option(
     "--save", type=click.Path(dir_okay=False, path_type=Path), help="Save the primitive to this .kineme file."
 )

@@ -7,15 +7,14 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, json_option
+from kineme.cli.options import Finite, GroupedCommand, heading, json_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read, recordings_argument
 
 
-@click.command(short_help="Summarize a set of recordings.")
+@click.command(cls=GroupedCommand, explains_reading=True, short_help="Summarize a set of recordings.")
 @recordings_argument
 @layout_options
-@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
 @click.option(
     "--outliers/--no-outliers", default=True, show_default=True, help="Look for movements unlike others of their label."
 )
@@ -23,6 +22,8 @@ from kineme.cli.reading import layout_options, read, recordings_argument
     "--error-rate", type=Finite(0, 1, min_open=True, max_open=True), default=0.05, show_default=True,
     help="Share of false alarms among the outliers.",
 )  # fmt: skip
+@heading("Output")
+@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
 @json_option
 def inspect(
     recordings: tuple[Path, ...], plot: Path | None, outliers: bool, error_rate: float, as_json: bool, **options: Any

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import json_option, library_option
+from kineme.cli.options import GroupedCommand, json_option, library_option
 from kineme.cli.output import say
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
@@ -18,7 +18,7 @@ from kineme.output.text import counted, printable
 _SHOWN = 10  # problems that are listed
 
 
-@click.command(short_help="Store recordings in an action library.")
+@click.command(cls=GroupedCommand, short_help="Store recordings in an action library.")
 @recordings_argument
 @library_option
 @click.option("--label", help="Name of the symbol of all movements.  [default: the label in the file, or its folder]")

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kineme.cli.options import under
 from kineme.cli.output import check_new, write_bytes
 from kineme.cli.source import name_of_source
 from kineme.output.text import printable
@@ -28,12 +29,14 @@ _FILES = {
 }
 
 
-def file_options(command: Any) -> Any:
-    """An option for each file that is written."""
-    for name, (short, _, words) in reversed(_FILES.items()):
-        names = [f"--{name.replace('_', '-')}", *([short] if short else [])]
-        command = click.option(*names, type=_NEW_FILE, help=words)(command)
-    return command
+def _file_option(name: str) -> Any:
+    short, _, words = _FILES[name]
+    names = [f"--{name.replace('_', '-')}", *([short] if short else [])]
+    return click.option(*names, type=_NEW_FILE, help=words)
+
+
+#: Add an option for each file that is written.
+file_options = under("Output", *map(_file_option, _FILES))
 
 
 def check_files(options: dict[str, Any]) -> None:

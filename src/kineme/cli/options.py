@@ -27,6 +27,62 @@ def whole(least: int, most: int = _MOST) -> click.IntRange:
 ID = whole(0, _LARGEST_ID)
 
 
+#: Heading of the options that say how recordings are read, the same in every command.
+READING = "Reading"
+_HEADINGS: dict[click.Parameter, str] = {}  # of options; those without stand below the first
+
+
+def heading(words: str) -> Callable[[Any], Any]:
+    """Put the options below it that have no heading yet under one in the help of a `GroupedCommand`."""
+
+    def name(command: Any) -> Any:
+        for option in getattr(command, "__click_params__", ()):
+            _HEADINGS.setdefault(option, words)
+        return command
+
+    return name
+
+
+def under(words: str, *options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Add options that stand under a heading, wherever they are added."""
+
+    def add(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+            _HEADINGS[command.__click_params__[-1]] = words
+        return command
+
+    return add
+
+
+def headings(command: click.Command, ctx: click.Context) -> dict[str, list[click.Parameter]]:
+    """List the options of a command under their headings, in its order, those for reading last."""
+    groups: dict[str, list[click.Parameter]] = {"Options": []}
+    for option in command.get_params(ctx):
+        if isinstance(option, click.Option) and not option.hidden:
+            groups.setdefault(_HEADINGS.get(option, "Options"), []).append(option)
+    reading = groups.pop(READING, [])
+    return {words: options for words, options in {**groups, READING: reading}.items() if options}
+
+
+class GroupedCommand(click.Command):
+    """A command whose help has headings. Options for reading are named; `explains_reading` says what they do."""
+
+    def __init__(self, *arguments: Any, explains_reading: bool = False, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.explains_reading = explains_reading
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, heading by heading."""
+        for words, options in headings(self, ctx).items():
+            with formatter.section(words):
+                if words == READING and not self.explains_reading:
+                    names = ", ".join(option.opts[0] for option in options)
+                    formatter.write_text(f"{names}: kineme inspect --help says what they do.")
+                else:
+                    formatter.write_dl([record for option in options if (record := option.get_help_record(ctx))])
+
+
 class Finite(click.FloatRange):
     """A number in a range, neither NaN nor infinite."""
 
@@ -93,8 +149,10 @@ def library_option_of(*, required: bool, words: str) -> Callable[[Any], Any]:
 
 
 library_option = library_option_of(required=True, words="Folder of the action library.")
-force_option = click.option("--force", is_flag=True, help="Write over files that are there; never over the input.")
-json_option = click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")
+force_option = under(
+    "Output", click.option("--force", is_flag=True, help="Write over files that are there; never over the input.")
+)
+json_option = under("Output", click.option("--json", "as_json", is_flag=True, help="Answer in JSON."))
 
 
 class SpecificationOption(click.Option):
@@ -117,9 +175,11 @@ SPECIFICATION: dict[str, tuple[type, str]] = {
 }
 
 
-def specification_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add an option for each field of `SPECIFICATION`."""
-    for name, (kind, words) in reversed(SPECIFICATION.items()):
-        flag, text = f"--{name.replace('_', '-')}", f"{words} for a recording."
-        command = click.option(flag, type=kind, cls=SpecificationOption, show_default=True, help=text)(command)
-    return command
+def _specification_option(name: str) -> Callable[[Any], Any]:
+    kind, words = SPECIFICATION[name]
+    flag, text = f"--{name.replace('_', '-')}", f"{words} for a recording."
+    return click.option(flag, type=kind, cls=SpecificationOption, show_default=True, help=text)
+
+
+#: Add an option for each field of `SPECIFICATION`.
+specification_options = under("Movement", *map(_specification_option, SPECIFICATION))

@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from kineme.cli.options import READING, under
+
 STANDARD_INPUT = "standard input.csv"
 
 
@@ -82,7 +84,9 @@ def _or_none(ctx: Any, param: Any, value: tuple[Any, ...]) -> tuple[Any, ...] | 
     return value or None
 
 
-_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+#: Add the options for what is read of a file; by default that is detected. They stand in the help of `kineme inspect`.
+layout_options = under(
+    READING,
     click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
     click.option("--columns", type=Heads(), help="Columns of the coordinates."),
     click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
@@ -113,14 +117,6 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
-
-
-def layout_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options for the roles of a table's columns; by default the roles are detected."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
 
 #: Names of the parameters that `layout_options` adds.
 LAYOUT_OPTIONS: tuple[str, ...] = tuple(one.name for one in click.command()(layout_options(lambda: None)).params)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kineme.cli.channels import differences
-from kineme.cli.options import Finite, json_option, library_option, whole
+from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
 from kineme.cli.output import say
 from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
 from kineme.output.text import printable
@@ -18,7 +18,7 @@ _SMALLEST = 0.001  # p-value that is shown; JSON has all digits
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
-@click.command(short_help="Recognize recordings with the symbols of a library.")
+@click.command(cls=GroupedCommand, short_help="Recognize recordings with the symbols of a library.")
 @recordings_argument
 @library_option
 @click.option(

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import Finite, force_option, json_option, whole
+from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, whole
 from kineme.cli.output import check_new, say
 from kineme.cli.reading import layout_options, read, recordings_argument
 from kineme.output.text import counted, printable
@@ -31,15 +31,16 @@ def _parameters(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@click.command(short_help="Cut long recordings into movements.")
+@click.command(cls=GroupedCommand, short_help="Cut long recordings into movements.")
 @recordings_argument
+@click.option("--by", type=click.Choice(["rest", "speed", "change-points"]), default="rest", show_default=True,
+              help="Cut at rests, at minima of speed, or at change points of the velocity.")  # fmt: skip
+@_parameters
+@heading("Output")
 @click.option(
     "--output", "-o", type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the pieces, a file for each; it is created.  [default: show the table alone]",
 )  # fmt: skip
-@click.option("--by", type=click.Choice(["rest", "speed", "change-points"]), default="rest", show_default=True,
-              help="Cut at rests, at minima of speed, or at change points of the velocity.")  # fmt: skip
-@_parameters
 @click.option("--format", "form", type=click.Choice(["csv", "npz", "json"]), default="csv", show_default=True,
               help="Format of the pieces.")  # fmt: skip
 @click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw them: a .png, .svg or .pdf file.")
