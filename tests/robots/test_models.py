@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,44 +16,119 @@ from kineme.robots.models.table import MODELS
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
-# Standard Denavit-Hartenberg parameters (a, alpha, d) of the makers.
-WAM = [
-    (0, -np.pi / 2, 0),
-    (0, np.pi / 2, 0),
-    (0.045, -np.pi / 2, 0.55),
-    (-0.045, np.pi / 2, 0),
-    (0, -np.pi / 2, 0.3),
-    (0, np.pi / 2, 0),
-    (0, 0, 0.06),
-]
-UR5E = [
-    (0, np.pi / 2, 0.1625),
-    (-0.425, 0, 0),
-    (-0.3922, 0, 0),
-    (0, np.pi / 2, 0.1333),
-    (0, -np.pi / 2, 0.0997),
-    (0, 0, 0.0996),
-]
+H, PI = np.pi / 2, np.pi
+
+# Denavit-Hartenberg parameters (a, alpha, d) of the makers: Barrett (WAM); Universal Robots, "DH Parameters
+# for calculations of kinematics and dynamics"; Franka's documentation of its control interface, after Craig, with the
+# flange at 0.107 m, the hand turned by -45 degrees, and its tip 0.1034 m before it.
+WAM = [(0, -H, 0), (0, H, 0), (0.045, -H, 0.55), (-0.045, H, 0), (0, -H, 0.3), (0, H, 0), (0, 0, 0.06)]
+UR5E = [(0, H, 0.1625), (-0.425, 0, 0), (-0.3922, 0, 0), (0, H, 0.1333), (0, -H, 0.0997), (0, 0, 0.0996)]
+PANDA = [(0, 0, 0.333), (0, -H, 0), (0, H, 0.316), (0.0825, H, 0), (-0.0825, -H, 0.384), (0, H, 0), (0.088, H, 0)]
+
+# Frames of links, each in the one before it (x, y, z, roll, pitch, yaw), as the makers' descriptions for ROS have them:
+# ur_description, franka_description with the hand, SO-ARM100 (so101_new_calib.urdf). Barrett publishes none of the WAM.
+OFFICIAL = {
+    "ur5e": [
+        ("base_link_inertia", (0, 0, 0, 0, 0, PI)),
+        ("shoulder_link", (0, 0, 0.1625, 0, 0, 0)),
+        ("upper_arm_link", (0, 0, 0, H, 0, 0)),
+        ("forearm_link", (-0.425, 0, 0, 0, 0, 0)),
+        ("wrist_1_link", (-0.3922, 0, 0.1333, 0, 0, 0)),
+        ("wrist_2_link", (0, -0.0997, 0, H, 0, 0)),
+        ("wrist_3_link", (0, 0.0996, 0, H, PI, PI)),
+        ("flange", (0, 0, 0, 0, -H, -H)),
+        ("tool0", (0, 0, 0, H, 0, H)),
+    ],
+    "panda": [
+        ("panda_link1", (0, 0, 0.333, 0, 0, 0)),
+        ("panda_link2", (0, 0, 0, -H, 0, 0)),
+        ("panda_link3", (0, -0.316, 0, H, 0, 0)),
+        ("panda_link4", (0.0825, 0, 0, H, 0, 0)),
+        ("panda_link5", (-0.0825, 0.384, 0, -H, 0, 0)),
+        ("panda_link6", (0, 0, 0, H, 0, 0)),
+        ("panda_link7", (0.088, 0, 0, H, 0, 0)),
+        ("panda_hand", (0, 0, 0.107, 0, 0, -PI / 4)),
+        ("panda_hand_tcp", (0, 0, 0.1034, 0, 0, 0)),
+    ],
+    "so101": [
+        ("shoulder_link", (0.0388353, 0, 0.0624, PI, 0, -PI)),
+        ("upper_arm_link", (-0.0303992, -0.0182778, -0.0542, -H, -H, 0)),
+        ("lower_arm_link", (-0.11257, -0.028, 0, 0, 0, H)),
+        ("wrist_link", (-0.1349, 0.0052, 0, 0, 0, -H)),
+        ("gripper_link", (0, -0.0611, 0.0181, H, 0.0486795, PI)),
+        ("gripper_frame_link", (-0.0079, -0.000218121, -0.0981274, 0, PI, 0)),
+    ],
+}
 
 
 def random_postures(robot, n=50):
     return np.random.default_rng(1).uniform(robot.lower, robot.upper, (n, robot.n_joints))
 
 
-@pytest.mark.parametrize(("name", "rows"), [("wam", WAM), ("ur5e", UR5E)])
-def test_kinematics_are_those_of_the_published_parameters(name, rows):
+def turned(angles, axes="xyz"):
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler(axes, angles).as_matrix()
+    return pose
+
+
+def shifted(*position):
+    pose = np.eye(4)
+    pose[:3, 3] = position
+    return pose
+
+
+def distal(angle, a, alpha, d):
+    return turned(angle, "z") @ shifted(a, 0, d) @ turned(alpha, "x")
+
+
+def proximal(angle, a, alpha, d):
+    return turned(alpha, "x") @ shifted(a, 0, 0) @ turned(angle, "z") @ shifted(0, 0, d)
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "link", "base", "tool"),
+    [
+        ("wam", WAM, distal, np.eye(4), np.eye(4)),
+        ("ur5e", UR5E, distal, turned(PI, "z"), np.eye(4)),  # the base of the controller, seen from base_link of ROS
+        ("panda", PANDA, proximal, np.eye(4), shifted(0, 0, 0.107) @ turned(-PI / 4, "z") @ shifted(0, 0, 0.1034)),
+    ],
+)
+def test_kinematics_are_those_of_the_published_parameters(name, rows, link, base, tool):
     robot = load(name)
     postures = random_postures(robot)
     state = standing(robot, postures)
     for q, position, rotation in zip(postures, state.tip_positions, state.tip_rotations, strict=True):
-        pose = np.eye(4)
-        for angle, (a, alpha, d) in zip(q, rows, strict=True):
-            link = np.eye(4)
-            link[:3, :3] = (Rotation.from_euler("z", angle) * Rotation.from_euler("x", alpha)).as_matrix()
-            link[:3, 3] = [a * np.cos(angle), a * np.sin(angle), d]
-            pose = pose @ link
+        pose = reduce(np.matmul, [link(angle, *row) for angle, row in zip(q, rows, strict=True)], base) @ tool
         np.testing.assert_allclose(position, pose[:3, 3], atol=1e-9)
         np.testing.assert_allclose(rotation, pose[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", OFFICIAL)
+def test_every_link_is_where_the_makers_description_has_it(name):
+    pinocchio = pytest.importorskip("pinocchio")
+    robot = load(name)
+    data = robot.model.createData()
+    links = _moving_links(robot)
+    for q in random_postures(robot, 5):
+        angles_of = dict(zip(links, q, strict=True))
+        pinocchio.framesForwardKinematics(robot.model, data, q)
+        pose = np.eye(4)
+        for link, (x, y, z, *angles) in OFFICIAL[name]:
+            pose = pose @ shifted(x, y, z) @ turned(angles) @ turned(angles_of.get(link, 0.0), "z")
+            here = data.oMf[robot.model.getFrameId(link)].homogeneous
+            np.testing.assert_allclose(here, pose, atol=2e-6, err_msg=link)  # angles of five digits
+
+
+def _moving_links(robot):
+    """The links that the joints move, by the XML itself."""
+    root = ElementTree.parse(robot.source).getroot()
+    return [joint.find("child").get("link") for joint in root.iter("joint") if joint.get("type") == "revolute"]
+
+
+def test_the_ur5e_stands_as_in_ros_and_not_as_in_its_controller():
+    robot = load("ur5e")  # at zero it lies along x of base_link: 0.425 + 0.3922 m, and -x of the controller's base
+    state = standing(robot, np.zeros(6))
+    np.testing.assert_allclose(state.tip_positions[0], [0.8172, 0.2329, 0.0628], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", MODELS)
