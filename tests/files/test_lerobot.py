@@ -1,6 +1,7 @@
 """Data sets of LeRobot: episodes are movements, tasks are labels; what is wrong is said episode by episode."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,10 @@ import pytest
 import kineme
 from kineme.errors import DataError
 from kineme.files.inspection.inspect import inspect
+from kineme.files.lerobot.episodes import read_tasks
+from kineme.files.limits import VARIABLE
 from lerobot_sets import NAMES, TASKS, write_v2, write_v3
+from limited_child import MIB, LimitedChild
 
 
 @pytest.fixture(params=["v2", "v3", "v3 lists"])
@@ -158,6 +162,15 @@ def test_stamps_that_do_not_follow_the_rate_are_kept(tmp_path):
     change(folder, lambda frames: frames.assign(timestamp=frames["timestamp"] * 1.5))
     times = kineme.read_recordings(folder).demonstrations[0].times
     np.testing.assert_allclose(times, 1.5 * np.arange(20) / 50, atol=1e-6)
+
+
+@pytest.mark.parametrize(("shift", "kept"), [(5e-5, False), (5e-4, True), (5e-3, True)])
+def test_stamps_within_a_tenth_of_a_millisecond_are_those_of_the_rate(tmp_path, shift, kept):
+    """LeRobot stores them in single precision, and refuses data sets that differ by more."""
+    folder = write_v3(tmp_path / "set")
+    change(folder, lambda frames: frames.assign(timestamp=frames["timestamp"] + shift * (frames["frame_index"] == 7)))
+    times = kineme.read_recordings(folder).demonstrations[0].times
+    assert abs(times[7] - (7 / 50 + shift * kept)) < 1e-6
 
 
 def test_an_episode_of_several_tasks_has_the_most_frequent_one(tmp_path):
@@ -309,3 +322,50 @@ def test_pictures_alone_are_refused_by_their_names(folder):
     path.write_text(json.dumps(info | {"features": kept}))
     with pytest.raises(DataError, match=r"expected features of numbers .* got only .*'observation.images.top'"):
         kineme.read_recordings(folder)
+
+
+@pytest.fixture(scope="module")
+def child():
+    modules = ("kineme.files.recordings", "kineme.files.lerobot.read", "pyarrow.parquet")
+    with pytest.MonkeyPatch.context() as patch, LimitedChild(modules, memory=150 * MIB) as child:
+        patch.setenv(VARIABLE, str(16 * MIB))
+        yield child
+
+
+def refusal(child, folder):
+    outcome = child.call("kineme.files.recordings:read_recordings", folder)
+    assert outcome.how == "refused", outcome
+    return outcome.what
+
+
+def test_a_long_data_path_is_refused_before_it_is_repeated(child, tmp_path):
+    folder = write_v2(tmp_path / "set")
+    rows = [{"episode_index": k, "length": 20} for k in range(4000)]
+    (folder / "meta" / "episodes.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    for data_path in ("x" * 100_000 + "{episode_index}", "{episode_index:99}" * 55):
+        path.write_text(json.dumps(info | {"data_path": data_path}))
+        assert re.search(r"at most 1000 characters|names of shards that takes", refusal(child, folder))
+
+
+def test_episodes_that_take_little_in_the_file_and_much_in_memory_are_refused(child, tmp_path):
+    folder = write_v3(tmp_path / "set")
+    pd.DataFrame(
+        {
+            name: np.zeros(2_000_000, np.int64)
+            for name in ("episode_index", "length", "data/chunk_index", "data/file_index")
+        }
+    ).to_parquet(path := next(folder.glob("meta/episodes/*/*")))
+    assert path.stat().st_size < 100_000
+    assert "file-000.parquet that takes at most" in refusal(child, folder)
+
+
+@pytest.mark.parametrize("kind", ["object", "category"])
+def test_a_text_that_stands_in_many_rows_of_the_tasks_is_held_once(tmp_path, kind):
+    folder = write_v3(tmp_path / "set")
+    texts = pd.Series(["x" * 1000] * 300, dtype=kind)
+    pd.DataFrame({"task_index": np.arange(300), "task": texts}).to_parquet(folder / "meta" / "tasks.parquet")
+    tasks, problems = read_tasks(folder)
+    assert (len(tasks), problems) == (300, [])
+    assert len({id(text) for text in tasks.values()}) == 1

@@ -17,6 +17,7 @@ COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index") 
 _NUMBERS = ("float", "int", "uint", "bool")
 _WIDEST = 1000  # numbers in a frame; images have more
 _MOST_BYTES = 100_000_000
+_LONGEST_PATH = 1000  # characters
 _WIDE_FIELD = re.compile(r"\{[^}]*(\d{3}|\{)")  # in a data_path: {chunk_index:300000000} would be a text of 300 MB
 
 
@@ -82,7 +83,9 @@ def read_info(folder: Path) -> Info:
     fps, path = known.get("fps"), known.get("data_path")
     if isinstance(fps, bool) or not isinstance(fps, (int, float)) or not 0 < fps < math.inf:
         raise DataError(f"expected fps above 0 in {MARKER}, got {fps!r}")
-    if not isinstance(path, str) or Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
+    if not isinstance(path, str) or len(path) > _LONGEST_PATH:
+        raise DataError(f"expected a data_path of at most {_LONGEST_PATH} characters in {MARKER}, got {path!r:.80}")
+    if Path(path).is_absolute() or ".." in Path(path).parts or _WIDE_FIELD.search(path):
         raise DataError(f"expected a data_path within the data set in {MARKER}, got {path!r}")
     total, chunk = known.get("total_episodes"), known.get("chunks_size")
     heads = {name: entries for name, one in features.items() if (entries := _entries(name, one))}
