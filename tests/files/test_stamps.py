@@ -5,8 +5,11 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import kineme
+from kineme.movements.tables.time_stamps import unit_by_size
 
 STAMPS = [1_700_000_000 + k // 2 for k in range(20)], [500_000_000 * (k % 2) for k in range(20)]
 
@@ -52,6 +55,33 @@ def test_a_stamp_in_a_header_is_the_time_if_no_other_column_is(tmp_path):
     assert a.demonstrations.dimensions == b.demonstrations.dimensions == ("x", "y")
 
 
+def test_columns_of_one_clock_are_one_time_in_the_unit_that_one_of_them_says(tmp_path):
+    """As loggers of phones write it: time in nanoseconds since 1970, and the seconds that elapsed."""
+    start = 1_700_000_000_000_000_000
+    rows = [f"{start + 10_000_000 * k},{k / 100 + 0.001 * (k % 2)},{k},{k * k}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,seconds_elapsed,x,y", *rows]))
+    boot = [f"{1_200_000_000 + 1000 * k},{k / 1000},{k},{k * k}" for k in range(20)]
+    (tmp_path / "b.csv").write_text("\n".join(["time,seconds_elapsed,x,y", *boot]))
+    dated = [f"2026-01-02T03:04:05.{10 * k:03d}Z,{k / 100},{k},{k * k}" for k in range(20)]
+    (tmp_path / "c.csv").write_text("\n".join(["time,seconds_elapsed,x,y", *dated]))
+    for name, step, units in (("a", 0.01, "ns"), ("b", 0.001, "us"), ("c", 0.01, "s")):
+        read = kineme.read_recordings(tmp_path / f"{name}.csv")
+        how = read.detected[0][0]
+        assert (how.time, how.units, how.ignored) == ("time", units, ("seconds_elapsed",))
+        assert read.demonstrations.dimensions == ("x", "y")
+        np.testing.assert_allclose(np.diff(read.demonstrations[0].times), step, rtol=1e-3)
+        demos = kineme.Demonstrations.of(pd.read_csv(tmp_path / f"{name}.csv"))
+        np.testing.assert_allclose(np.diff(demos[0].times), step, rtol=1e-3)
+
+
+@pytest.mark.parametrize("other", [lambda k: k / 50, lambda k: k / 100 + 0.006 * (k == 7), lambda k: 0.0])
+def test_two_clocks_are_not_one(tmp_path, other):
+    rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{other(k)},{k}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,seconds_elapsed,x", *rows]))
+    with pytest.raises(kineme.DataError, match=r"say which of \['time', 'seconds_elapsed'\] with time="):
+        kineme.read_recordings(tmp_path / "a.csv")
+
+
 def test_a_second_clock_is_left_aside_where_the_time_is_said(tmp_path):
     """As loggers of phones write it: time in nanoseconds since 1970, and the seconds that elapsed."""
     rows = [f"{1_700_000_000_000_000_000 + 10_000_000 * k},{k / 100},{k},{k * k},{k % 3}" for k in range(20)]
@@ -76,3 +106,77 @@ def test_what_rostopic_echo_p_writes(tmp_path):
     read = kineme.read_recordings(tmp_path / "a.csv")
     assert read.demonstrations.dimensions == ("field.pose.position.x", "field.pose.position.y")
     np.testing.assert_allclose(np.diff(read.demonstrations[0].times), 0.02, atol=1e-6)
+
+
+#: Unit -> number per second, and the seconds since 1970 at the beginning of the years 2000 and 2100.
+PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+Y2000, Y2100 = 946_684_800, 4_102_444_800
+
+
+@given(
+    unit=st.sampled_from(["ms", "us", "ns"]),
+    # of a machine that was switched on between never and a hundred days ago, and what it counts looks like a date
+    magnitude=st.floats(0, 1),
+    rate=st.floats(1.01, 199.0),
+    days=st.booleans(),
+)
+def test_time_since_boot_is_in_the_unit_that_makes_its_steps_plausible(unit, magnitude, rate, days):
+    first = magnitude * 100 * 86400 * PER_SECOND[unit] if days else Y2000 + magnitude * (Y2100 - Y2000)
+    stamps = np.round(first + np.arange(50) * PER_SECOND[unit] / rate)
+    assert unit_by_size(stamps)[0] == unit
+
+
+@given(
+    unit=st.sampled_from([*PER_SECOND]),
+    since=st.floats(Y2000, Y2100 - 100),
+    rate=st.floats(1.001, 1000.0),
+    jitter=st.floats(0, 0.3),
+)
+def test_stamps_since_1970_are_told_in_every_unit_at_every_rate(unit, since, rate, jitter):
+    spread = np.random.default_rng(0).uniform(-jitter, jitter, 50)
+    stamps = (since + (np.arange(50) + spread) / rate) * PER_SECOND[unit]
+    assert unit_by_size(stamps)[0] == unit
+
+
+@pytest.mark.parametrize("step", [1, 2, 4.9])
+@pytest.mark.parametrize(("unit", "finer"), [("s", "ms"), ("ms", "us"), ("us", "ns")])
+def test_stamps_that_may_be_two_units_are_refused_until_one_is_said(tmp_path, unit, finer, step):
+    stamps = PER_SECOND[unit] * (1_200_000_000 + step * np.arange(20))
+    with pytest.raises(
+        kineme.DataError, match=rf"since 1970 or {finer} since another time; say units='{unit}' or '{finer}'"
+    ):
+        unit_by_size(stamps, "time")
+    assert unit_by_size(stamps, "unix time") == (unit, "since 1970")
+    frame = pd.DataFrame({"time": stamps, "x": np.arange(20.0)})
+    frame.to_csv(tmp_path / "a.csv", index=False, float_format="%.17g")
+    read = kineme.read_recordings(tmp_path / "a.csv", units=finer)
+    np.testing.assert_allclose(np.diff(read.demonstrations[0].times), step / 1000, rtol=1e-3)
+
+
+def test_the_name_of_stamps_in_arrays_says_their_unit_too(tmp_path):
+    x = np.column_stack((np.arange(20.0), np.arange(20.0) ** 2))
+    (tmp_path / "a.json").write_text(json.dumps({"time_us": (10 * np.arange(20)).tolist(), "positions": x.tolist()}))
+    read = kineme.read_recordings(tmp_path / "a.json")
+    np.testing.assert_allclose(np.diff(read.demonstrations[0].times), 1e-5)
+
+
+def test_the_state_of_joints_as_rostopic_writes_it_has_the_columns_of_the_bag(tmp_path):
+    joints = [f"arm_{k}_joint" for k in range(6)]
+    parts = [f"field.{what}{k}" for what in ("name", "position", "velocity", "effort") for k in range(6)]
+    heads = ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id", *parts]
+    rows = []
+    for k in range(20):
+        t = 1_700_000_000_000_000_000 + 20_000_000 * k
+        q = [0.1 * j + np.sin(0.1 * k) for j in range(6)]
+        rows.append(",".join(map(str, [t, k, t, "", *joints, *q, *[np.cos(0.1 * k)] * 6, *[7.0 + k] * 6])))
+    (tmp_path / "a.csv").write_text("\n".join([",".join(heads), *rows]))
+    read = kineme.read_recordings(tmp_path / "a.csv")
+    assert read.demonstrations.dimensions == tuple(joints)
+    assert {one.kind for one in read.demonstrations.channels} == {"angle"}
+    np.testing.assert_allclose(read.demonstrations[0].positions[5], [0.1 * j + np.sin(0.5) for j in range(6)])
+
+
+def test_velocities_and_efforts_without_positions_are_what_moves(tmp_path):
+    rows = [f"{k / 50},{np.sin(k)},{k}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,field.velocity0,field.effort0", *rows]))
+    assert kineme.read_recordings(tmp_path / "a.csv").demonstrations.dimensions == ("field.velocity0", "field.effort0")

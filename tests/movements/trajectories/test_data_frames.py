@@ -114,7 +114,7 @@ def test_what_names_do_not_tell_is_said():
 REFUSED = {
     "no time": (pd.DataFrame({"a": X, "b": Y}), r"data frame 0: expected one column of times, named as one of elapsed, epoch, .*, got the columns \['a', 'b'\]; say which with time=, .* \(of Demonstrations.from_dataframe\)"),
     "no names": (pd.DataFrame(np.column_stack((T, X))), r"expected one column of times, .*, got the columns \['0', '1'\]"),
-    "two times": (_frame(timestamp=T), r"expected one column of times, .* got the columns \['time', 'x', 'y', 'timestamp'\]"),
+    "two times": (_frame(timestamp=T**2), r"expected one column of times, .* got the columns \['time', 'x', 'y', 'timestamp'\]"),
     "no coordinates": (_frame()[["time"]], r"expected a column of times and at least one of positions, got one column"),
     "missing numbers": (_frame(x=[np.nan, *X[1:]]), r"trajectory 0: expected finite positions, got \[nan, 1.0\] at sample 0"),
     "no rows": (_frame()[:0], "expected samples, got a data frame without rows"),

@@ -14,7 +14,7 @@ from kineme.files.arrays.trees import RATE_NAMES, STAMP, STEP_NAMES, rate_of
 from kineme.movements.tables.columns import column_numbers, is_header_stamp, is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
-from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size
+from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import Array
 
@@ -85,7 +85,8 @@ def parsed_arrays(
     if ts is not None:
         stamps = np.concatenate(ts)
         if units is None:
-            units, known = unit_by_size(stamps)
+            named_in = unit_in_head(time)
+            units, known = (named_in, "head") if named_in else unit_by_size(stamps, time)
         stamps = in_seconds(stamps, units)
     elif isinstance(units, float | int):
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])

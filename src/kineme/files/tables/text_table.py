@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from codecs import BOM_UTF8
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import chain, islice
 from typing import Any
@@ -22,6 +23,7 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
 
+_POSITION = re.compile(r"(.*)position(\d+)")  # of a joint
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 
@@ -55,7 +57,23 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         } | faults
     line_of = _line_numbers(data, encoding, dialect)
     dates_in = "s" if dated else None
-    return Table(dialect.heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+    heads = _with_names_of_joints(dialect.heads, columns)
+    return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+
+
+def _with_names_of_joints(heads: tuple[str, ...], columns: Sequence[Any]) -> tuple[str, ...]:
+    """Heads with the names of joints in place of ``field.position0`` where the column ``field.name0`` says one name.
+
+    So rostopic writes the state of joints; a bag has them under their names too.
+    """
+    renamed = list(heads)
+    place = {head: k for k, head in enumerate(heads)}
+    for head, k in place.items():
+        match = _POSITION.fullmatch(head)
+        beside = None if match is None else place.get(f"{match[1]}name{match[2]}")
+        if beside is not None and columns[beside].dtype.kind == "O" and len(names := {*columns[beside].tolist()}) == 1:
+            renamed[k] = next(iter(names)) or head
+    return tuple(renamed) if len({*renamed}) == len(renamed) else heads
 
 
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:

@@ -29,6 +29,7 @@ _ROS_HEADER = re.compile(r"(.*[./_])?header[./_](seq|stamp|frame_id)(?![^\W_]).*
 _ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
 _TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
+_JOINT_STATE = re.compile(r"(?<![a-z])(velocit(?:y|ies)|efforts?|accelerations?)(?![a-z])", re.IGNORECASE)
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
@@ -36,7 +37,7 @@ class Roles(NamedTuple):
     """Column numbers by role, and the columns that are ignored.
 
     `nanoseconds` is the column that is added to whole seconds in `time`, as ``stamp.nanosec`` to ``stamp.sec``.
-    `person` is one of those in `movement`.
+    `person` is one of those in `movement`. `clocks` are other columns of times, which have to show the same clock.
     """
 
     time: int | None
@@ -46,6 +47,7 @@ class Roles(NamedTuple):
     ignored: tuple[int, ...]
     nanoseconds: int | None = None
     person: int | None = None
+    clocks: tuple[int, ...] = ()
 
 
 def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool = True) -> Roles:
@@ -72,10 +74,10 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     taken = {*movement, label}
     person = None if layout.person is None else _number(heads, layout.person)
     movement = movement if person is None or person in movement else (*movement, person)
-    time = _time(heads, kinds, layout, named, taken)
+    time, *others = _times(heads, kinds, layout, named, taken)
     beside = _nanoseconds(heads, kinds) if named else {}
     nanoseconds = None if time is None else beside.get(time)
-    taken |= {time, *beside, *beside.values()}
+    taken |= {time, *others, *beside, *beside.values()}
     if layout.coordinates is not None:
         positions = column_numbers(heads, layout.coordinates)
     else:
@@ -87,9 +89,10 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}{of_text}")
-    used = {time, nanoseconds, label, *movement, *positions}
+    used = {time, nanoseconds, label, *others, *movement, *positions}
     ignored = tuple(k for k in range(len(heads)) if k not in used)
-    return Roles(time, positions, movement, label, ignored, nanoseconds, person)
+    beside_time = tuple(k for k in others if k is not None and k not in positions)
+    return Roles(time, positions, movement, label, ignored, nanoseconds, person, beside_time)
 
 
 def _number(heads: Sequence[str], column: Column) -> int:
@@ -142,21 +145,28 @@ def _listed(heads: Sequence[str]) -> str:
     return "one column" if len(heads) == 1 else f"the columns {listed(heads)}"
 
 
-def _time(
+def _times(
     heads: Sequence[str], kinds: Sequence[str], layout: Layout, named: bool, taken: set[int | None]
-) -> int | None:
+) -> list[int | None]:
+    """The column of times, None where there is none, and others that may show the same clock."""
     if layout.time is not None:
-        return _number(heads, layout.time)
+        return [_number(heads, layout.time)]
     free = [k for k in range(len(heads)) if k not in taken]
     of_time = _of_time(heads, kinds, free) if named else [k for k in free if kinds[k] != "text"][:1]
-    if len(of_time) == 1:
-        return of_time[0]
+    dates = [k for k in of_time if kinds[k] == "date"]
+    if of_time and len(dates) <= 1 and (len(of_time) == 1 or all(kinds[k] != "text" for k in of_time)):
+        return [*dates, *(k for k in of_time if k not in dates)]
     if isinstance(layout.units, float | int) and not of_time:
-        return None
+        return [None]
     if not named:
         raise DataError(f"expected a column of times and at least one of positions, got {_listed(heads)}")
+    raise no_time(heads, of_time)
+
+
+def no_time(heads: Sequence[str], of_time: Sequence[int]) -> DataError:
+    """The error of a table without times, or with columns of several clocks."""
     of_several = f" of {listed([heads[k] for k in of_time])}" if of_time else ""
-    raise DataError(
+    return DataError(
         f"expected one column of times, named as one of {', '.join(sorted(TIME_WORDS))}, got {_listed(heads)}; "
         f"say which{of_several} with time=, or the step between samples with units= where there is none, "
         "in the shell with --time, --units"
@@ -241,8 +251,9 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
     if not head.strip() or _ROS_HEADER.fullmatch(head) or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
-    if derived is None:
-        return False
+    if derived is None:  # of the state of a joint: field.velocity0 beside field.position0
+        states = {_JOINT_STATE.sub(what, _plain(head)) for what in ("position", "positions")}
+        return not states.isdisjoint(plain - {_plain(head)})
     quantity = derived[1] or derived[2]
     turned = _TURNED.fullmatch(quantity)  # of a quaternion
     return quantity in plain or (

@@ -113,7 +113,7 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
     columns: list[Any] = list(arrays)
     for k in (*roles.movement, *(() if roles.label is None else (roles.label,))):
         columns[k] = _texts(arrays[k].tolist())
-    for k in (*roles.positions, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
+    for k in (*roles.positions, *roles.clocks, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
         columns[k] = _numbers(heads[k], arrays[k])
     dates_in, k = None, roles.time
     if k is not None and arrays[k].dtype.kind in "Mm":

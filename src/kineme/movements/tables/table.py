@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.movements.tables.columns import Roles
+from kineme.movements.tables.columns import Roles, no_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct
-from kineme.movements.tables.time_stamps import PER_SECOND, in_seconds, unit_by_size, unit_in_head
+from kineme.movements.tables.time_stamps import PER_SECOND, in_seconds, same_clock, unit_by_size, unit_in_head
 from kineme.validation import Array
 
 
@@ -77,6 +77,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     """
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
+    _check_clocks(table, roles, times)
     codes, keys, labels = _split(table, roles, times)
     n = len(keys)
     people = None if roles.person is None else _people(table.columns[roles.person], codes)
@@ -96,7 +97,7 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
         units_from,
         tuple(heads[k] for k in roles.movement),
         () if roles.label is None else (heads[roles.label],),
-        tuple(heads[k] for k in roles.ignored),
+        tuple(heads[k] for k in sorted((*roles.ignored, *roles.clocks))),
         tuple(table.measured_in[k] for k in roles.positions) if any(table.measured_in) else (),
         () if roles.person is None else (heads[roles.person],),
     )
@@ -121,9 +122,33 @@ def _times(table: Table, roles: Roles, layout: Layout) -> tuple[Any, str | float
         return in_seconds(stamps, table.dates_in), table.dates_in, "dates"
     if layout.units is not None:
         return in_seconds(stamps, layout.units), layout.units, "given"
-    named = unit_in_head(head) or (unit_in_head(table.measured_in[roles.time]) if table.measured_in else None)
-    units, known = (named, "head") if named else unit_by_size(stamps)
+    named = _unit_of_times(table, roles.time)
+    units, known = (named, "head") if named else _unit_by_clocks(table, roles) or unit_by_size(stamps, head)
     return in_seconds(stamps, units), units, known
+
+
+def _unit_of_times(table: Table, k: int) -> str | None:
+    """The unit of a column of times as its head, or a row of units, says it."""
+    return unit_in_head(table.heads[k]) or (unit_in_head(table.measured_in[k]) if table.measured_in else None)
+
+
+def _unit_by_clocks(table: Table, roles: Roles) -> tuple[str, str] | None:
+    """The unit in which stamps run as another column does that says its unit, and the head of that."""
+    assert roles.time is not None
+    for k in roles.clocks:
+        named = _unit_of_times(table, k)
+        for units in PER_SECOND if named else ():
+            if same_clock(in_seconds(table.columns[roles.time], units), in_seconds(table.columns[k], named or "s")):
+                return units, f"as {table.heads[k]!r}"
+    return None
+
+
+def _check_clocks(table: Table, roles: Roles, times: Array) -> None:
+    """Refuse several columns of times that do not show the same clock."""
+    for k in roles.clocks:
+        named = _unit_of_times(table, k)
+        if not any(same_clock(times, in_seconds(table.columns[k], one)) for one in ([named] if named else PER_SECOND)):
+            raise no_time(table.heads, [one for one in (roles.time, *roles.clocks) if one is not None])
 
 
 def _in_turns(roles: Roles) -> bool:

@@ -28,6 +28,9 @@ _UNIX = (946_684_800.0, 4_102_444_800.0)  # the years 2000 to 2100, in seconds s
 #: Shortest step between samples, in units of the stamps, at which they are taken to be in that unit. Movements are not
 #: sampled every 5 s or more slowly; steps of 5 ms to 1 s, 1 ms to 1 s, and from 1 ms on are usual.
 _STEPS = (("ns", 1e6), ("us", 1e3), ("ms", 5.0))
+_LONGEST = 5.0  # s between samples
+_DATE_WORDS = frozenset({"unix", "epoch", "utc"})
+_DRIFT = 1e-4  # of the time that passed, between two clocks of one device
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
 
@@ -49,23 +52,46 @@ def unit_in_head(head: str) -> str | None:
     return UNITS[words[-1]].symbol if words and words[-1] in TIME_UNITS else None
 
 
-def unit_by_size(stamps: Array) -> tuple[str, str]:
-    """The unit of stamps (total,), and the source of that knowledge.
+def unit_by_size(stamps: Array, head: str = "") -> tuple[str, str]:
+    """The unit of stamps (total,) below a head that does not say it, and the source of that knowledge.
 
-    Stamps that are dates between 2000 and 2100 in some unit are seconds since 1970 in that unit. Otherwise the median
-    step decides, because people and robots are sampled between once and some thousand times a second.
+    The median step decides, because people and robots are sampled between once and some thousand times a second.
+    Stamps between the years 2000 and 2100 are seconds since 1970 in the unit of which that is so, unless it makes the
+    step longer than 5 s: then they count from elsewhere, as a machine that was switched on weeks ago counts.
+
+    Raises
+    ------
+    DataError
+        Such stamps with a step of 1 to 5 s, which may as well be 1 to 5 thousandths of it; a head with a word as unix
+        decides.
     """
     finite = stamps[np.isfinite(stamps)]
     if len(finite) == 0:
         return "s", "assumed"
-    for unit, per_second in PER_SECOND.items():
-        if _UNIX[0] <= finite[0] / per_second <= _UNIX[1]:
-            return unit, "since 1970"
     steps = np.abs(np.diff(finite))
     steps = steps[steps > 0]
     step = float(np.median(steps)) if len(steps) else 0.0
+    of_date = {*words_of(head)} & _DATE_WORDS
+    for (unit, per_second), finer in zip(PER_SECOND.items(), [*PER_SECOND, ""][1:], strict=True):
+        if not _UNIX[0] <= finite[0] / per_second <= _UNIX[1] or (step / per_second >= _LONGEST and not of_date):
+            continue
+        if finer and step / per_second >= 1.0 and not of_date:
+            raise DataError(
+                f"expected times whose unit can be told, got {finite[0]:.10g} and so on in steps of {step:.6g}, which "
+                f"are {unit} since 1970 or {finer} since another time; say units='{unit}' or '{finer}', "
+                "in the shell --units"
+            )
+        return unit, "since 1970"
     by_step = next((unit for unit, least in _STEPS if step >= least), None)
     return (by_step, "by its steps") if by_step else ("s", "assumed")
+
+
+def same_clock(times: Array, others: Array) -> bool:
+    """Whether two columns of times [s] (total,) show the same clock: they run alike but for half a step."""
+    both = np.isfinite(times) & np.isfinite(others)
+    a, b = (each[both] - each[both][:1] for each in (times, others))
+    step = float(np.median(np.abs(np.diff(a)))) if len(a) > 1 else 0.0
+    return bool((np.abs(a - b) <= 0.5 * step + _DRIFT * np.abs(a)).all())
 
 
 def in_seconds(stamps: Array, units: str | float) -> Array:
