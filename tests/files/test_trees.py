@@ -182,3 +182,33 @@ def test_one_file_that_cannot_be_read_is_named_once(tmp_path):
         read_recordings(tmp_path / "a.npy")
     assert str(caught.value).count("a.npy") == 1
     assert "got positions of shape (20, 3) alone" in str(caught.value)
+
+
+def test_columns_that_are_always_null_are_left_aside_and_named():
+    nulls = [one | {"effort": None, "label": None, "force": [None, None]} for one in SAMPLES]
+    for found in (read_json(nulls), read("\n".join(map(json.dumps, nulls)), "a.jsonl")):
+        assert found.demonstrations.dimensions == ("x", "y")
+        assert found.detected[0][0].ignored == ("effort", "force")
+        assert where(found) == [("", None)]
+    with pytest.raises(DataError, match=r"got the columns .* there are no numbers in"):
+        read_json([{"t": one["t"], "x": None} for one in SAMPLES])
+
+
+def test_a_movement_with_nulls_where_others_have_numbers_costs_itself_alone():
+    with_effort = [[one | {"effort": 1.0} for one in SAMPLES]] * 2
+    found = read_json([*with_effort, [one | {"effort": None} for one in SAMPLES]])
+    assert len(found) == 2
+    assert "expected numbers in 'effort', got none" in str(found.problems[0])
+
+
+def test_columns_without_any_number_are_left_aside_in_tables_too():
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"time": T, "x": X[:, 0], "effort": np.nan, "y": X[:, 1]})
+    buffer = io.BytesIO()
+    frame.to_parquet(buffer)
+    for data, name in ((frame.to_csv(index=False), "a.csv"), (buffer.getvalue(), "a.parquet")):
+        found = read(data, name)
+        assert found.demonstrations.dimensions == ("x", "y")
+        assert found.detected[0][0].ignored == ("effort",)
+        with pytest.raises(DataError, match=r"expected (a number|finite)"):
+            read(data, name, columns=["x", "effort"])

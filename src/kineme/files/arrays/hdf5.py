@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +16,8 @@ from kineme.files.arrays.trees import GROUPS, RATE_NAMES, STEP_NAMES
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 
+_SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
+_EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
 _ATTRIBUTES = frozenset({"label", "task"}) | RATE_NAMES | STEP_NAMES
 
@@ -63,8 +66,39 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0) -> dict[str
             if one.shape == ():
                 tree[name] = _single(one[()])
             elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = one
+                tree[name] = _Stored(one)
     return tree
+
+
+class _Stored:
+    """A data set that is read when it is needed, if its samples are in the file.
+
+    What was never written takes no room there, however much it is said to be, and takes minutes to fill.
+
+    Raises
+    ------
+    DataError
+        On reading: samples that were never written, or that expand by more than gzip can.
+    """
+
+    def __init__(self, stored: Any) -> None:
+        self._stored, self.shape, self.dtype = stored, stored.shape, stored.dtype
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        return np.asarray(self[()], dtype)
+
+    def __getitem__(self, rows: Any) -> Any:
+        n_bytes, n_stored = math.prod(self.shape) * self.dtype.itemsize, self._stored.id.get_storage_size()
+        chunks, n_missing = self._stored.chunks, 0
+        if chunks is not None:
+            n_chunks = math.prod(-(-n // width) for n, width in zip(self.shape, chunks, strict=True))
+            n_missing = n_chunks - self._stored.id.get_num_chunks()
+        if n_missing > _CHUNKS or (n_bytes > _SMALL and (n_missing or n_bytes > _EXPANDED * n_stored)):
+            raise DataError(
+                f"expected {n_bytes:,} bytes of samples in the data set {self._stored.name}, got {n_stored:,} in the "
+                "file: the others were never written; write a data set of what was recorded"
+            )
+        return self._stored[rows]
 
 
 def _single(value: Any) -> str | float | None:

@@ -110,10 +110,14 @@ def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _array(values: list[Any]) -> Any:
-    """Numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length."""
-    if any(isinstance(one, str) for one in values):
+    """Numbers as an array, NaN for null; texts as objects; a `DataError` for rows that differ in length.
+
+    Nulls alone say nothing of numbers: they are empty texts, which are left aside.
+    """
+    nothing = all(one is None or (isinstance(one, list) and all(cell is None for cell in one)) for one in values)
+    if nothing or any(isinstance(one, str) for one in values):
         texts = np.empty(len(values), dtype=object)
-        texts[:] = ["" if one is None else str(one) for one in values]
+        texts[:] = ["" if nothing or one is None else str(one) for one in values]
         return texts
     width = max((len(one) for one in values if isinstance(one, list)), default=0)
     if width:

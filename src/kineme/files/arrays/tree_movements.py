@@ -63,7 +63,7 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
     roles = choose_roles(heads, kinds, layout)
     others = [roles.time, roles.nanoseconds, roles.label]
     needed = {owners[k] for k in chain(roles.positions, roles.movement, others) if k is not None}
-    parsed = table_movements(_table(found, (heads, owners), needed), roles, layout, kind)
+    parsed = table_movements(_table(found, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
 
@@ -123,7 +123,9 @@ def _is_text(entry: Any) -> bool:
     return entry.dtype.kind in "OU"
 
 
-def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]], needed: set[str]) -> Table:
+def _table(
+    found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: set[str]
+) -> Table:
     """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row."""
     heads, owners = columns
     lengths = [one.length for one in found]
@@ -134,8 +136,9 @@ def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]],
     arrays: dict[str, Any] = {}
     for name in needed:
         parts = []
+        of_texts = name in first.entries and _is_text(first.entries[name])
         for one, length, start in zip(found, lengths, offsets, strict=False):
-            part, fault = _part(one, name, length, widths[name])
+            part, fault = _part(one, name, length, (widths[name], of_texts))
             parts.append(part)
             if fault:
                 faults[int(start)] = fault
@@ -150,13 +153,16 @@ def _table(found: Sequence[Found], columns: tuple[Sequence[str], Sequence[str]],
     return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, segments=whole)
 
 
-def _part(one: Found, name: str, length: int, width: int) -> tuple[Any, str]:
-    """An array of a movement as columns (T, d), and what is wrong with it."""
+def _part(one: Found, name: str, length: int, kind: tuple[int, bool]) -> tuple[Any, str]:
+    """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
+    width, of_texts = kind
     if name == STAMP:
         return (np.arange(length) / (one.rate or 1.0))[:, None], "" if one.rate else "expected a rate, got none"
     entry = one.entries.get(name)
     if entry is None:
         return np.full((length, width), np.nan), f"expected an array {name!r} as others have, got none"
+    if _is_text(entry) and not of_texts:  # of nulls alone
+        return np.full((length, width), np.nan), f"expected numbers in {name!r}, got none"
     if _is_text(entry):
         return np.asarray(entry, dtype=object).reshape(-1, 1), ""
     if entry.shape[0] != length or int(np.prod(entry.shape[1:])) != width:

@@ -14,8 +14,12 @@ from kineme.movements.tables.time_stamps import is_date
 from kineme.units import unit_named
 
 COMMENTS = ("#", "%", "//")
+LONGEST = 2**22  # characters of a line, at most
+_SEPARATORS = (";", "\t", ",")
 _LETTERS = frozenset("mnwvahg-")  # units that may be names
 _PEEK = 20  # samples from which the dialect is detected
+_HEAD = 100_000  # lines among which they are
+_WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
@@ -58,6 +62,27 @@ def is_skipped(line: str) -> bool:
     return not stripped or stripped.startswith(COMMENTS)
 
 
+def check_line(line: str) -> None:
+    """Refuse a line that is too long to be one of a table, before it is split.
+
+    Raises
+    ------
+    DataError
+        More than 4 MiB, or more than 100,000 columns.
+    """
+    if len(line) <= _SHORT:
+        return
+    check_expanded(_CELL * len(line), "lines")
+    if len(line) <= _WIDEST:
+        return
+    n_columns = 1 + max(map(line.count, _SEPARATORS))
+    if len(line) > LONGEST or n_columns > _WIDEST:
+        raise DataError(
+            f"expected lines of at most {LONGEST:,} characters and {_WIDEST:,} columns, got one of {len(line):,} "
+            f"characters and {n_columns:,} columns"
+        )
+
+
 def split(line: str, separator: str | None) -> list[str]:
     """The cells of a line."""
     plain = line.rstrip("\r\n")
@@ -85,18 +110,17 @@ def _quoted_cells(line: str, separator: str | None) -> list[str]:
 
 def detect_dialect(text: Iterable[str]) -> Dialect:
     """The dialect of a table, from its first lines; no more lines are read than needed."""
-    lines, kept, longest = [], [], 0
-    for line in text:
-        if len(line) > longest:
-            longest = len(line)
-            check_expanded(_CELL * longest, "lines")
+    lines, kept = [], []
+    for line in islice(text, _HEAD):
+        check_line(line)
         lines.append(line)
         if not is_skipped(line):
             kept.append(len(lines) - 1)
         if len(kept) == _PEEK:
             break
     if not kept:
-        raise DataError("expected samples, got an empty file")
+        more = len(lines) == _HEAD
+        raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
     kept = _with_names_like_comments(lines, kept)
     separator = _separator([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
@@ -145,7 +169,7 @@ def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
 
 
 def _separator(lines: Sequence[str]) -> str | None:
-    for mark in (";", "\t", ","):
+    for mark in _SEPARATORS:
         if all(mark in line for line in lines):
             return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark
     return None

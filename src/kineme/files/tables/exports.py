@@ -15,7 +15,7 @@ from kineme.files.motion_capture.optitrack import optitrack_head
 from kineme.files.motion_capture.qualisys import qualisys_head
 from kineme.files.motion_capture.trc import trc_head
 from kineme.files.motion_capture.vicon import vicon_head
-from kineme.files.tables.dialect import COMMA_NUMBER, Dialect, split
+from kineme.files.tables.dialect import COMMA_NUMBER, Dialect, check_line, split
 from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.table import Table
 
@@ -31,6 +31,8 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
     """The head of an export of `_MAKERS` and how its samples are written; None for other tables."""
     lines = iter(lines)
     some = list(islice(lines, _FIRST))
+    for line in some:
+        check_line(line)
     if (known := _head(some, probe=True)) is None:
         return None
     if known == "Vicon":  # the section that is read may stand anywhere

@@ -15,7 +15,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.files.motion_capture.export_heads import ExportHead
-from kineme.files.tables.dialect import COMMENTS, Dialect, detect_dialect
+from kineme.files.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect
 from kineme.files.tables.exports import export_head, export_table, with_times
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
 from kineme.movements.tables.columns import Roles, choose_roles
@@ -39,6 +39,7 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     DataError
         Not text, no samples, or no columns of numbers.
     """
+    _check_lines(data)
     encoding = _encoding(data)
     if (export := export_head(_lines(data, encoding), len(data))) is not None:
         return _read_export(data, encoding, export, layout)
@@ -105,6 +106,13 @@ def _line_numbers(data: bytes, encoding: str, dialect: Dialect) -> Callable[[int
         return int(lines()[row])
 
     return line_of
+
+
+def _check_lines(data: bytes) -> None:
+    """Refuse bytes with a stretch so long that no table has such lines, before anything is made of them."""
+    for at in range(0, len(data) - LONGEST, LONGEST):
+        if data.find(b"\n", at, at + LONGEST) < 0 and data.find(b"\r", at, at + LONGEST) < 0:
+            raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
 
 
 def _encoding(data: bytes) -> str:

@@ -9,22 +9,31 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.tables.dialect import Dialect, split
+from kineme.files.tables.dialect import Dialect, check_line, split
 
 _STRETCH = 1000  # lines that are parsed at a time
+_FAULTS = 2_000_000  # lines with faults, at most: each takes a while and some memory
+_EMPTY = 20_000  # lines without any number, after which none is expected
 
 
 def read_slowly(
     samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
 ) -> tuple[Any, dict[int, str]]:
     """All samples, NaN for missing numbers, and row -> what is wrong there."""
-    stretches, faults, n_rows = [], {}, 0
+    stretches, faults, n_rows, has_numbers = [], dict[int, str](), 0, False
+    numeric = [name for name in dtype.names or () if dtype[name].kind == "f"]
     samples = iter(samples)
     while lines := [line for _, line in islice(samples, _STRETCH)]:
         rows, wrong = _read_stretch(lines, dialect, dtype)
         faults.update({n_rows + row: reason for row, reason in wrong.items()})
         stretches.append(rows)
         n_rows += len(rows)
+        has_numbers = has_numbers or any(np.isfinite(rows[name]).any() for name in numeric)
+        if len(faults) > _FAULTS or (n_rows >= _EMPTY and not has_numbers):
+            raise DataError(
+                f"expected samples, got {len(faults):,} lines with faults among the first {n_rows:,}; the first: "
+                f"{next(iter(faults.values()), 'no number')}"
+            )
     if not stretches:
         raise DataError("expected samples, got none below the heads")
     return np.concatenate(stretches), faults
@@ -39,9 +48,9 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
         if known and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
         if not quoted and not any(texts) and dialect.separator:  # an empty cell is the usual fault
-            filled = [_filled(line, dialect.separator) for line in plain]
-            if (read := try_rows(filled, dialect, dtype)) is not None:
-                return read, _empty_cells(lines, dialect)
+            text = "\n".join(line.rstrip("\r\n") for line in plain)
+            if (read := try_rows(_filled(text, dialect.separator).split("\n"), dialect, dtype)) is not None:
+                return read, _empty_cells(lines, dialect) if "nan" in text.lower() else _missing(read, dialect)
     rows = np.empty(len(lines), dtype)
     faults = {}
     for k, line in enumerate(lines):
@@ -77,13 +86,21 @@ def quotes_are_plain(text: bytes, dialect: Dialect) -> bool:
     return bool(np.isin(beside, [*b"\r\n", ord(dialect.separator)]).all() and in_one_line.all())
 
 
-def _filled(line: str, separator: str) -> str:
-    """A line with nan in its empty cells."""
-    line, empty = line.rstrip("\r\n"), separator + separator
-    if empty in line:  # twice: of three separators in a row, the first replacement finds one empty cell
-        line = line.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
-    line = f"nan{line}" if line.startswith(separator) else line
-    return f"{line}nan" if line.endswith(separator) else line
+def _filled(text: str, separator: str) -> str:
+    """Lines with nan in their empty cells."""
+    empty = separator + separator
+    if empty in text:  # twice: of three separators in a row, the first replacement finds one empty cell
+        text = text.replace(empty, f"{separator}nan{separator}").replace(empty, f"{separator}nan{separator}")
+    text = f"\n{text}\n".replace(f"\n{separator}", f"\nnan{separator}").replace(f"{separator}\n", f"{separator}nan\n")
+    return text[1:-1]
+
+
+def _missing(rows: Any, dialect: Dialect) -> dict[int, str]:
+    """Row -> the first column without a number, where nothing but an empty cell reads as none."""
+    missing = np.column_stack([np.isnan(rows[name]) for name in rows.dtype.names])
+    reasons = [f"expected a number in {head!r}, got nothing" for head in dialect.heads]
+    where = np.flatnonzero(missing.any(axis=1))
+    return {k: reasons[first] for k, first in zip(where.tolist(), missing[where].argmax(axis=1).tolist(), strict=True)}
 
 
 def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
@@ -93,6 +110,7 @@ def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
 
 
 def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
+    check_line(line)
     cells, wrong = split(line, dialect.separator), ""
     if len(cells) != len(texts):
         wrong = f"expected {len(texts)} columns, got {len(cells)}"
