@@ -63,6 +63,10 @@ def test_samples_may_be_left_out_alone_and_units_be_a_number():
     rows = "".join(f"{k},{'' if k == 3 else k},{k}\n" for k in range(9))
     done = run("-", "--skip", "sample", "--units", "0.01", "--json", input=f"time,x,y\n{rows}")
     data = json.loads(done.stdout)
+    assert data["labels"][0]["samples"]["median"] == 9
+    assert any("gaps of up to 0.02 s were filled in 1 movement" in note for note in data["notes"])
+    done = run("-", "--skip", "sample", "--units", "0.01", "--fill-gaps", "0", "--json", input=f"time,x,y\n{rows}")
+    data = json.loads(done.stdout)
     assert data["labels"][0]["samples"]["median"] == 8
     assert data["labels"][0]["rate"]["median"] == pytest.approx(100)
     assert data["problems"][0]["line"] == 5
@@ -74,7 +78,7 @@ def test_samples_may_be_left_out_alone_and_units_be_a_number():
         (["nowhere"], "", "kineme: expected a file or folder of recordings, found nothing at 'nowhere'"),
         (["-"], "", "kineme: standard input.csv: expected samples, got an empty file"),
         (["-", "--columns", "z"], "time,x\n0,1\n", r"expected a column 'z', got the columns ['time', 'x']"),
-        (["-", "--units", "h"], "time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
+        (["-", "--units", "week"], "time,x\n0,1\n", "kineme: expected units to be one of s, ms, us, ns"),
         (["-", "--plot", "a.gif"], "0 1\n1 2\n2 3\n3 4\n", "kineme: expected a picture ending in one of png"),
     ],
 )

@@ -238,14 +238,13 @@ def test_names_are_text_whatever_they_look_like():
 
 FAULTS = [
     ("oops", "expected a number in 'x', got 'oops'"),
-    ("", "expected a number in 'x', got nothing"),
     ("NA", "expected a number in 'x', got 'NA'"),
     ("1_0", "expected a number in 'x', got '1_0'"),
     ("0x10", "expected a number in 'x', got '0x10'"),
     ("1,2", "expected 4 columns, got 5"),
     ("inf", r"expected finite positions, got [inf, 18.0] at sample 2"),
-    ("nan", r"expected finite positions, got [nan, 18.0] at sample 2"),
 ]
+GAP = "expected a number in 'x', got nothing in 17 % of the samples, for up to 2 s; say --exclude x or --fill-gaps 2"
 
 
 @pytest.mark.parametrize(("cell", "reason"), FAULTS)
@@ -260,6 +259,24 @@ def test_a_bad_cell_costs_its_movement_and_is_found_by_its_line(cell, reason, go
     kept = read("# a comment\n\n" + lines(rows, "demo,time,x,y"), skip="sample")
     assert kept.demonstrations.lengths.tolist() == [good, 5]
     assert kept.problems[0].reason == f"movement b: {reason}; this sample left out"
+
+
+@pytest.mark.parametrize("cell", ["", "nan"])
+@pytest.mark.parametrize("good", [6, 3000])
+def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled(cell, good):
+    rows = [("a", k, 10 + k, 20 - k) for k in range(good)] + [("b", k, 10 + k, 20 - k) for k in range(6)]
+    rows[good + 2] = ("b", 2, cell, 18.0)
+    text = "# a comment\n\n" + lines(rows, "demo,time,x,y")
+    (problem,) = read(text).problems
+    assert (problem.line, problem.missing, problem.samples) == (3 + good + 3, ("x",), 0)
+    said = f"movement b: {GAP} or --skip sample, in Python exclude= or fill_gaps= or skip="
+    assert problem.reason == said
+    kept = read(text, skip="sample")
+    assert kept.demonstrations.lengths.tolist() == [good, 5]
+    assert kept.problems[0].reason.endswith("1 sample like this left out")
+    assert (kept.problems[0].missing, kept.problems[0].samples) == ((), 1)
+    filled = read(text, fill_gaps=2.0)
+    np.testing.assert_allclose(filled.demonstrations[1].positions[2], [12, 18])
 
 
 @pytest.mark.parametrize(
@@ -291,11 +308,12 @@ def test_a_separator_at_the_end_of_every_line_is_no_column(text):
 
 def test_many_faults_are_told_once_per_movement():
     rows = [(k, "" if k % 3 == 0 else k, k) for k in range(30)]
-    with pytest.raises(kineme.DataError, match=r"line 2: expected a number in 'x', got nothing; 9 more like this"):
+    rows[0], rows[3] = (0, 0, 0), (3, "oops", 3)
+    with pytest.raises(kineme.DataError, match=r"line 5: expected a number in 'x', got 'oops'"):
         read(lines(rows))
     kept = read(lines(rows), skip="sample")
-    assert kept.problems[0].reason.endswith("; 10 samples like this left out")
-    assert kept.demonstrations.lengths.tolist() == [20]
+    assert kept.problems[1].reason.endswith("; 8 samples like this left out")
+    assert kept.demonstrations.lengths.tolist() == [21]
 
 
 @pytest.mark.parametrize(

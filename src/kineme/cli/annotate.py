@@ -13,7 +13,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say, write
-from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
+from kineme.cli.reading import chosen_topics, layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import counted, printable
 
 
@@ -61,6 +61,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
     from kineme.files.annotations.tables import as_row, to_csv
     from kineme.files.annotations.writers import targets_of, write_annotations
     from kineme.files.entries import expanded, paths_of
+    from kineme.files.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
     from kineme.library.recognition.annotate import annotate as find
 
@@ -79,7 +80,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
                 _check_folder(target, force)
         with _progress(parsed) as progress:
             found = find(library.store, parsed, error_rate, progress)
-        notes = chosen_topics(parsed) + differences(library.channels, parsed.demonstrations.channels)
+        notes = chosen_topics(parsed) + notes_on_gaps(parsed)
+        notes += differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {
         "annotations": [as_row(one) for one in found.annotations],
@@ -89,12 +91,13 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         "notes": notes,
         "problems": [str(one) for one in (*parsed.problems, *found.problems)],
     }
+    problems = problem_lines((*parsed.problems, *found.problems), "not annotated: ")
     if as_csv:
         write(to_csv(found.annotations).decode().removesuffix("\n"))
-        for line in _remarks(data):
+        for line in _remarks(data, problems):
             write(line, err=True)
     else:
-        say(as_json, data, lambda: _text(data))
+        say(as_json, data, lambda: _text(data, problems))
 
 
 def _check_folder(target: Path, force: bool) -> None:
@@ -119,7 +122,7 @@ def _progress(parsed: Any) -> Iterator[Callable[[float], None]]:
         yield tell
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text(data: dict[str, Any], problems: list[str]) -> str:
     from kineme.output.table import to_text
 
     rows, written = data["annotations"], data["written"]
@@ -128,16 +131,15 @@ def _text(data: dict[str, Any]) -> str:
     lines = [f"{said}, {len(rows) - len(known):,} unknown, in {data['seconds']:,.1f} s"]
     if rows:
         lines.append(to_text(_totals(rows) if written else _each(rows)))
-    return "\n".join([*lines, *_remarks(data), *(f"written to {printable(one)}" for one in written)])
+    return "\n".join([*lines, *_remarks(data, problems), *(f"written to {printable(one)}" for one in written)])
 
 
-def _remarks(data: dict[str, Any]) -> list[str]:
+def _remarks(data: dict[str, Any], problems: list[str]) -> list[str]:
     """What to know of the annotations, and what has none."""
     guess = (
         "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
         "differ; learn more of each"
     )
-    problems = [f"not annotated: {printable(problem)}" for problem in data["problems"]]
     return [*([] if data["calibrated"] else [guess]), *map(printable, data["notes"]), *problems]
 
 

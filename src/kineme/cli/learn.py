@@ -12,7 +12,7 @@ import click
 
 from kineme.cli.options import GroupedCommand, json_option, library_option
 from kineme.cli.output import say
-from kineme.cli.reading import layout_options, read, recordings_argument
+from kineme.cli.reading import layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import counted, printable
 
 _SHOWN = 10  # problems that are listed
@@ -53,6 +53,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     """
     from kineme.files.entries import root_of
     from kineme.files.inspection.extents import notes_on_extents
+    from kineme.files.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -79,9 +80,9 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "people": sorted({one for one in people or () if one is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
-            "notes": notes_on_extents(parsed.demonstrations),
+            "notes": notes_on_gaps(parsed) + notes_on_extents(parsed.demonstrations),
         }
-    say(as_json, data, lambda: _text(data))
+    say(as_json, data, lambda: _text(data, problem_lines(parsed.problems, "left out ")))
 
 
 def _labeled(recordings: Any, table: Path | None) -> Any:
@@ -151,12 +152,12 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, _: bar.update(done - bar.n)
 
 
-def _text(data: dict[str, Any]) -> str:
+def _text(data: dict[str, Any], problems: list[str]) -> str:
     new = f", {counted(len(data['symbols']), 'new symbol')}" if data["symbols"] else ""
     joined = f" ({data['joined']:,} joined the symbol of its label)" if data["joined"] else ""
     stored = f", {data['known']:,} stored already{joined}" if data["known"] else ""
     held = f"{printable(data['library'])} holds {counted(data['movements'], 'movement')}"
-    problems, people = data["problems"], data["people"]
+    people = data["people"]
     by = f", by {counted(len(people), 'person', 'people')}" if people else ""
     lines = [f"learned {counted(data['added'], 'movement')}{stored}{new}{by}; {held}"]
     for kept in data["kept"]:
@@ -169,8 +170,8 @@ def _text(data: dict[str, Any]) -> str:
         lines.append(
             f"{counted(n, 'movement')} {verb} no symbol: say it with --label NAME, or find groups with kineme anchor"
         )
-    lines += [f"left out {printable(problem)}" for problem in problems[:_SHOWN]]
+    lines += problems[:_SHOWN]
     if len(problems) > _SHOWN:
-        lines.append(f"left out {len(problems) - _SHOWN} more; kineme inspect lists them all")
+        lines.append(f"and {len(problems) - _SHOWN} more; kineme inspect lists them all")
     lines += [f"note: {printable(note)}" for note in data["notes"]]
     return "\n".join(lines)

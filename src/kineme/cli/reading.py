@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any
 
 import click
 
-from kineme.cli.options import READING, under
+from kineme.cli.options import READING, Finite, under
+from kineme.output.text import printable
 
 STANDARD_INPUT = "standard input.csv"
 
@@ -55,13 +57,15 @@ class Level(click.ParamType):  # type: ignore[type-arg]
 
 
 class Heads(click.ParamType):  # type: ignore[type-arg]
-    """Columns separated by commas, as heads or as numbers counted from 0."""
+    """Columns separated by commas, as heads or as numbers counted from 0; a head with a comma stands in quotes."""
 
     name = "a,b,..."
 
     def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
         """The columns."""
-        return value if isinstance(value, tuple) else tuple(part.strip() for part in value.split(","))
+        if isinstance(value, tuple):
+            return value
+        return tuple(part.strip() for row in csv.reader([value], skipinitialspace=True) for part in row)
 
 
 class Kind(click.ParamType):  # type: ignore[type-arg]
@@ -88,14 +92,21 @@ def _or_none(ctx: Any, param: Any, value: tuple[Any, ...]) -> tuple[Any, ...] | 
 layout_options = under(
     READING,
     click.option("--time", metavar="COLUMN", help="Column of the time stamps."),
-    click.option("--columns", type=Heads(), help="Columns of the coordinates."),
+    click.option(
+        "--columns", type=Heads(), help="Columns of the coordinates; * and ? stand for any text and any character."
+    ),
+    click.option("--exclude", type=Heads(), help="Columns that are left aside, named as for --columns."),
     click.option("--movement", type=Heads(), help="Columns that distinguish the movements of a table."),
     click.option("--label-column", metavar="COLUMN", help="Column of the labels."),
     click.option("--person-column", metavar="COLUMN", help="Column of who showed the movements of a table."),
     click.option("--units", type=Unit(), help="Unit of the time stamps, by name or in seconds."),
     click.option(
         "--skip", type=click.Choice(["movement", "sample"]), default="movement", show_default=True,
-        help="What is dropped for a missing or repeated sample.",
+        help="What is dropped for a repeated sample, or for missing values that are not filled.",
+    ),
+    click.option(
+        "--fill-gaps", type=Finite(0), metavar="SECONDS",
+        help="Longest gap of a column that is filled, 0 for none.  [default: 0.2]",
     ),
     click.option(
         "--kind", "kinds", type=Kind(), multiple=True, callback=_or_none,
@@ -130,7 +141,8 @@ def recordings_argument(command: Callable[..., Any]) -> Callable[..., Any]:
 def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = None) -> Any:
     """Read recordings from files, folders, patterns of them, and - the standard input, with the `layout_options`.
 
-    Where a bag has several topics and none is asked for, it is read as the movements of `library` were.
+    Where a bag has several topics and none is asked for, it is read as the movements of `library` were; and where no
+    columns are asked for, a file that has the columns of `library` is read without others.
     """
     from kineme.files.limits import read_limited
     from kineme.files.name_rule import NameRule
@@ -140,7 +152,9 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     known = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
     how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
-    if library is not None and not (known.get("topic") or known.get("frame")):
+    if known.get("fill_gaps") is None:
+        known.pop("fill_gaps", None)
+    if library is not None:
         from kineme.library.recognition.known_sources import known_sources
 
         known["known"] = known_sources(library.store)
@@ -160,6 +174,11 @@ def chosen_topics(parsed: Any) -> list[str]:
         for one in dict(parsed.detected)
         if one.layout.endswith(AS_KNOWN)
     ]
+
+
+def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:
+    """A line for each problem: what was lost, or that samples alone were."""
+    return [f"{'read but for samples: ' if one.samples else lost}{printable(one)}" for one in problems]
 
 
 def _watched(files: Any) -> Any:

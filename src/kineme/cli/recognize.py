@@ -11,7 +11,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
 from kineme.cli.output import say
-from kineme.cli.reading import chosen_topics, layout_options, read, recordings_argument
+from kineme.cli.reading import chosen_topics, layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import printable
 
 _SMALLEST = 0.001  # p-value that is shown; JSON has all digits
@@ -42,19 +42,21 @@ def recognize(
 
     Example: kineme recognize *.csv --library actions/
     """
+    from kineme.files.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         answers = _recognized(library, parsed.demonstrations, error_rate)
-        notes = chosen_topics(parsed) + differences(library.channels, parsed.demonstrations.channels)
+        notes = chosen_topics(parsed) + notes_on_gaps(parsed)
+        notes += differences(library.channels, parsed.demonstrations.channels)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
         "movements": [_as_data(source, one, stored, top) for source, one in zip(parsed.sources, answers, strict=True)],
         "notes": notes,
         "problems": [str(problem) for problem in parsed.problems],
     }
-    say(as_json, data, lambda: _text(data, error_rate))
+    say(as_json, data, lambda: _text(data, error_rate, problem_lines(parsed.problems)))
 
 
 def _recognized(library: Any, movements: Any, error_rate: float) -> list[Any]:
@@ -94,7 +96,7 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
     }
 
 
-def _text(data: dict[str, Any], error_rate: float) -> str:
+def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     from kineme.output.table import Table, to_text
 
     rows = []
@@ -115,7 +117,7 @@ def _text(data: dict[str, Any], error_rate: float) -> str:
             "much movements of one symbol differ; learn two or more of each symbol, "
             f"{needed} in all, to keep --error-rate {error_rate:g}"
         )
-    return "\n".join(lines + [f"not read: {printable(problem)}" for problem in data["problems"]])
+    return "\n".join(lines + problems)
 
 
 def _relative(transform: dict[str, Any]) -> str:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError, TrajectoryError
+from kineme.files.gaps import fill_gaps, in_words, missing_values
 from kineme.files.problem import Problem
+from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block
+from kineme.output.text import counted
 from kineme.validation import (
     LARGEST_POSITION,
     LARGEST_STAMP,
@@ -23,20 +27,23 @@ from kineme.validation import (
 Flags = NDArray[np.bool_]
 
 
-def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block, list[Problem]]:
-    """The valid movements, and one problem for each invalid movement.
+def check_block(block: Block, file: str, layout: Layout, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
+    """The valid movements, gaps filled and ends cropped, and one problem for each invalid movement.
 
     Parameters
     ----------
     block : Block
     file : str
         Name of the file in the problems.
-    skip : {"movement", "sample"}
-        What is dropped for a sample that is missing, infinite, out of range, or not later than the one before: its
-        movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent out of range,
-        are always dropped; the ranges are those of `kineme.validation`.
+    layout : Layout
+        `skip`: what is dropped for a sample that is missing, infinite, out of range, or not later than the one before:
+        its movement, or the sample alone. Movements of fewer than `MIN_SAMPLES` samples, or with an extent out of
+        range, are always dropped; the ranges are those of `kineme.validation`. `fill_gaps`: see
+        `kineme.files.gaps.fill_gaps`.
+    columns : sequence of d str
+        Names of the columns.
     """
-    problems: list[Problem] = []
+    skip, problems = layout.skip, list[Problem]()
     odd = _unusable(block, skip)
     if odd.any():
         starts = block.offsets[:-1]
@@ -45,6 +52,9 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
             first = int(starts[i] + np.argmax(odd[starts[i] : block.offsets[i + 1]]))
             problems.append(_problem(block, file, i, first, (int(n_odd[i]), skip)))
         block = _keep(block, ~odd) if skip == "sample" else take_movements(block, n_odd == 0)
+    if np.isnan(block.positions).any():
+        block, lacking = _without_missing(fill_gaps(block, columns, layout), file, skip, columns)
+        problems += lacking
     lengths = np.diff(block.offsets)
     for i in np.flatnonzero(lengths < MIN_SAMPLES).tolist():
         reason = f"expected at least {MIN_SAMPLES} samples, got {lengths[i]}"
@@ -59,10 +69,30 @@ def check_block(block: Block, file: str, skip: str = "movement") -> tuple[Block,
     return take_movements(block, good), sorted(problems, key=lambda problem: problem.line or 0)
 
 
+def _without_missing(block: Block, file: str, skip: str, columns: Sequence[str]) -> tuple[Block, list[Problem]]:
+    """A block without the movements, or with `skip` the samples alone, that lack values; a problem for each."""
+    lacking: Flags = np.asarray(np.isnan(block.positions).any(axis=1))
+    counts = np.diff(np.concatenate(([0], np.cumsum(lacking)))[block.offsets])
+    readable: Flags = np.asarray(
+        np.diff(block.offsets) - counts >= MIN_SAMPLES if skip == "sample" else counts == 0, dtype=np.bool_
+    )
+    problems = []
+    for i in np.flatnonzero(counts).tolist():
+        first = int(block.offsets[i] + np.argmax(lacking[block.offsets[i] :]))
+        left_out = int(counts[i]) if readable[i] else 0
+        effect = f"; {counted(left_out, 'sample')} like this left out" if left_out else ""
+        missing = missing_values(block, columns, i)
+        reason = movement_of(block, i) + in_words(missing, skip) + effect
+        line = block.line_of(block.row(first))
+        problems.append(Problem(file, line, reason, DataError, left_out, () if left_out else missing.names))
+    block = take_movements(block, readable)
+    return _keep(block, ~np.asarray(np.isnan(block.positions).any(axis=1))), problems
+
+
 def _unusable(block: Block, skip: str) -> Flags:
     """Per sample: out of range, or not later than the sample before; if samples are dropped, than all kept before."""
     total = len(block.positions)
-    odd: Flags = np.asarray(~(np.abs(block.positions) <= LARGEST_POSITION).all(axis=1))
+    odd: Flags = np.asarray((np.abs(block.positions) > LARGEST_POSITION).any(axis=1))  # what is missing comes later
     if block.faults:
         odd |= np.isin(np.arange(total) if block.rows is None else block.rows, list(block.faults))
     if block.times is None or not total:
@@ -95,7 +125,8 @@ def _problem(block: Block, file: str, i: int, k: int, odd: tuple[int, str]) -> P
     effect = f"; {samples} left out" if skip == "sample" else f"; {n_odd - 1} more like this" if n_odd > 1 else ""
     known = (block.faults or {}).get(row)
     reason = movement_of(block, i) + (known or _reason(block, i, k)) + effect
-    return Problem(file, block.line_of(row), reason, DataError if known else TrajectoryError)
+    left_out = n_odd if skip == "sample" and block.offsets[i + 1] - block.offsets[i] - n_odd >= MIN_SAMPLES else 0
+    return Problem(file, block.line_of(row), reason, DataError if known else TrajectoryError, left_out)
 
 
 def movement_of(block: Block, i: int) -> str:
@@ -105,9 +136,9 @@ def movement_of(block: Block, i: int) -> str:
 
 def _reason(block: Block, i: int, k: int) -> str:
     at = f" at sample {k - block.offsets[i]}"
-    if not np.isfinite(block.positions[k]).all():
+    if np.isinf(block.positions[k]).any():
         return f"expected finite positions, got {block.positions[k].tolist()}{at}"
-    if np.abs(block.positions[k]).max() > LARGEST_POSITION:
+    if np.nanmax(np.abs(block.positions[k]), initial=0.0) > LARGEST_POSITION:
         return (
             f"expected positions up to {LARGEST_POSITION:g}, got {block.positions[k].tolist()}{at}; choose another unit"
         )
@@ -141,4 +172,5 @@ def take_movements(block: Block, chosen: Flags) -> Block:
     labels = [label for label, one in zip(block.labels, chosen, strict=True) if one]
     places = [place for place, one in zip(block.places, chosen, strict=True) if one]
     people = block.people and [person for person, one in zip(block.people, chosen, strict=True) if one]
-    return replace(kept, offsets=ends, labels=labels, places=places, people=people)
+    repairs = block.repairs and [repair for repair, one in zip(block.repairs, chosen, strict=True) if one]
+    return replace(kept, offsets=ends, labels=labels, places=places, people=people, repairs=repairs)

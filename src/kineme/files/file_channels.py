@@ -15,6 +15,7 @@ from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels, is_plain
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
+from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block
 
 _HINT = "check the order of the columns, or divide the quaternions by their norms"
@@ -108,7 +109,7 @@ def _check_orientations(one: FileRead, channels: Channels, skip: str) -> tuple[F
             problems.append(Problem(one.path, line, movement_of(block, i) + reasons[first], TrajectoryError))
         good[owners] = False
     if faults and skip == "sample":
-        block, problems = check_block(replace(block, faults=faults), one.path, skip)
+        block, problems = check_block(replace(block, faults=faults), one.path, Layout(skip=skip), ())
         return one._replace(block=block), problems
     return one._replace(block=take_movements(block, good)), problems
 

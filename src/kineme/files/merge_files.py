@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from kineme.errors import DataError
 from kineme.files.column_order import in_one_order
 from kineme.files.file_channels import with_channels
-from kineme.files.problem import Problem
+from kineme.files.problem import Problem, note_on_missing
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.detect import Given
-from kineme.movements.tables.parsed import Block, Detected
+from kineme.movements.tables.parsed import Block, Detected, Repair
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -46,6 +46,12 @@ class Source(NamedTuple):
     label : str or None
     person : str or None
         Who showed it, where a column or ``label_pattern`` says it.
+    filled : int
+        Number of samples of which missing values are interpolated.
+    longest_gap : float
+        Longest gap that was filled, from the sample before to the sample after [s].
+    cropped : float
+        Time at both ends that was left out, since columns have no values there [s].
     """
 
     path: str
@@ -55,6 +61,9 @@ class Source(NamedTuple):
     place: str
     label: str | None
     person: str | None = None
+    filled: int = 0
+    longest_gap: float = 0.0
+    cropped: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +163,7 @@ def merge_files(
         if len(listed) == 1 and listed[0].file == Path(where).name:  # one file alone: it is named once
             raise DataError(str(listed[0]._replace(file=where)))
         first = f"; {len(listed)} could not be read, the first {listed[0]}" if listed else ""
-        raise DataError(f"expected recordings in {where}, found none{first}")
+        raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(listed)]))
     dims: Counter[int] = Counter()
     for one in full:
         dims[_block(one).positions.shape[1]] += len(_block(one).labels)
@@ -170,9 +179,11 @@ def merge_files(
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
     sources = tuple(
-        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person)
+        Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
         for one in full
-        for place, label, person in zip(_block(one).places, _block(one).labels, _people(one), strict=True)
+        for place, label, person, repair in zip(
+            _block(one).places, _block(one).labels, _people(one), _repairs(one), strict=True
+        )
     )
     detected = Counter(how for one in full if (how := understood[one.path]))
     return Recordings(_demonstrations(full, sources, channels), sources, tuple(listed), tuple(detected.most_common()))
@@ -181,6 +192,11 @@ def merge_files(
 def _people(one: FileRead) -> Sequence[str | None]:
     """Who showed each movement, as the file says it."""
     return _block(one).people or [None] * len(_block(one).labels)
+
+
+def _repairs(one: FileRead) -> Sequence[Repair]:
+    """What was done about missing values of each movement."""
+    return _block(one).repairs or [Repair()] * len(_block(one).labels)
 
 
 def _block(one: FileRead) -> Block:

@@ -19,6 +19,7 @@ from kineme.files.folders import OUTSIDE, as_text, leads_out
 from kineme.files.formats import FORMATS, Format, data_set_of
 from kineme.files.limits import check_expanded
 from kineme.files.problem import Problem
+from kineme.files.select_columns import select_columns
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed
 
@@ -79,7 +80,7 @@ def read_file(path: Path, relative: Path, layout: Layout, follow_links: bool = F
     if form.read_path is None:
         return read_bytes(data, relative, layout, known[0].st_mtime)
     size, mtime = sum(one.st_size for one in known), max(one.st_mtime for one in known)
-    read = _parsed(partial(form.read_path, path, layout), form, relative, layout)
+    read = _parsed(partial(form.read_path, path), form, relative, layout)
     if read.block is None:
         return read._replace(size=size, mtime=mtime)
     try:
@@ -96,7 +97,7 @@ def read_bytes(data: bytes, relative: Path, layout: Layout, mtime: float = 0.0) 
         reason = f"expected the path of a {relative.suffix} file, got its bytes alone; write them to a file"
         read = FileRead(as_text(relative), "", 0, 0.0, None, None, [Problem(as_text(relative), None, reason)])
     else:
-        read = _parsed(partial(_expanded, form.read_bytes, data, layout), form, relative, layout)
+        read = _parsed(partial(_expanded, form.read_bytes, data), form, relative, layout)
     return read._replace(sha256=sha256, size=len(data), mtime=mtime)
 
 
@@ -105,20 +106,20 @@ def _expanded(read: Callable[[bytes, Layout], Parsed], data: bytes, layout: Layo
     return read(data, layout)
 
 
-def _parsed(parse: Callable[[], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
+def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, layout: Layout) -> FileRead:
     """What a reader returns, checked, or the problem with it."""
     name = as_text(relative)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
-            detected, block, left_out = parse()
-            block, problems = check_block(block, name, layout.skip)
+            detected, block, left_out = select_columns(parse, layout)
+            block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])
     label = as_text(relative.stem) if form.label_is_stem else as_text(relative.parent.name) or None
     labels = [label if one is None else _storable(one) for one in block.labels]
     people = block.people and [None if one is None else _storable(one) for one in block.people]
     bare = Block(block.positions, block.times, block.offsets, labels, block.places)  # releases the bytes of the file
-    block = replace(bare, people=people)
+    block = replace(bare, people=people, repairs=block.repairs)
     problems += [Problem(name, None, _storable(" ".join(reason.splitlines()))) for reason in left_out]
     return FileRead(name, "", 0, 0.0, detected, block, problems)
 

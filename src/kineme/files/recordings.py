@@ -6,15 +6,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kineme.errors import DataError, SpecificationError
+from kineme.errors import DataError, SpecificationError, warn
 from kineme.files.entries import entries_of, in_words, name_of
 from kineme.files.formats import data_set_of
+from kineme.files.inspection.gaps import notes_on_gaps
 from kineme.files.limits import max_file_bytes
 from kineme.files.merge_files import Recordings, merge_files
 from kineme.files.name_rule import TASK, NameRule
 from kineme.files.read_file import format_of, read_bytes, read_file
 from kineme.movements.preparation.trim import TrimRest
-from kineme.movements.tables.layout import Column, Layout
+from kineme.movements.tables.columns import excluded_numbers
+from kineme.movements.tables.layout import FILL_GAPS, Column, Layout
+from kineme.movements.tables.parsed import listed
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 
@@ -38,6 +41,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     label_by: str | int | None = None,
     trim: bool = False,
     follow_links: bool = False,
+    exclude: Column | Sequence[Column] | None = None,
+    fill_gaps: float = FILL_GAPS,
     progress: Progress | None = None,
 ) -> Recordings:
     """Read all movements of a folder, a file, a data set that is a folder, or of several of them.
@@ -56,12 +61,14 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         Columns of a table, by head or counted from 0. By default they are found by their heads.
     columns, movement : str or int or sequence of them, optional
         Columns of the coordinates, and of what tells movements apart. What several heads begin with, before a dot,
-        stands for all of them: ``"wrist"`` for ``wrist.x`` and ``wrist.y``.
+        stands for all of them: ``"wrist"`` for ``wrist.x`` and ``wrist.y``; where no head has the name, ``*`` stands
+        for any text and ``?`` for any character, in all columns but times: ``"LASI*"``, ``"*_x"``.
     units : {"s", "ms", "us", "ns"} or float, optional
         Unit of the time stamps, or its length in seconds. By default told by the head or by the stamps' size. As a
         number it is also the step between samples of files without time stamps.
     skip : {"movement", "sample"}, default "movement"
-        Whether a missing or repeated sample costs its whole movement or is left out alone. Both are reported.
+        Whether a repeated sample, or one with missing values that are not filled, costs its whole movement or is left
+        out alone. Both are reported.
     kinds : mapping, optional
         What columns are, where their heads and values do not say it: ``{"gripper": "discrete", "q1": "angle",
         "a,b,c,d": "xyzw"}``, the last one a quaternion in that order; also ``"position"``; see
@@ -87,17 +94,28 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         told by what is learned: a gripper that closes at rest is left out with it.
     follow_links : bool, default False
         Whether links that lead out of the folder are read; else they are problems. Links within it always are read.
+    exclude : str or int or sequence of them, optional
+        Columns that are left aside, named as in `columns`; files that do not have them are read nevertheless.
+    fill_gaps : float, default 0.2
+        Longest gap of a column that is filled, from the value before to the value after it [s]; 0 fills none. Values
+        are interpolated by Akima's cubic polynomials, orientations by turning evenly, and discrete channels keep the
+        value before. At its ends a movement is cropped to where all columns have values, unless that would cost half
+        of it. `Source` says of each movement what was filled and cropped.
     progress : callable, optional
         Wraps the list of files, to show how far the reading is.
 
     Raises
     ------
     DataError
-        Nothing there, or nothing in it that can be read; the message gives the first problem.
+        Nothing there, or nothing in it that can be read, the message gives the first problem; or a column to exclude
+        that no file has.
     SpecificationError
-        An unknown unit or choice, a label pattern that cannot be understood, or a limit of memory that is no number.
+        An unknown unit or choice, a gap that is no number of seconds, a label pattern that cannot be understood, or a
+        limit of memory that is no number.
     """
-    layout = Layout(time, columns, movement, label, units, skip, kinds, topic, frame, person)
+    layout = Layout(
+        time, columns, movement, label, units, skip, kinds, topic, frame, person, exclude=exclude, fill_gaps=fill_gaps
+    )
     rule = NameRule(label_pattern, label_by)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
     return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, progress=progress)
@@ -133,12 +151,22 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
         read.append(rule.apply(one, path))
     recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip)
+    _check_excluded(recordings, layout)
     if layout.person is not None and recordings.people is None:
         raise DataError(
             f"expected a column {layout.person!r} of a table that names people, found none in {in_words(where)}; "
             "say who showed them with label_pattern=, in the shell also with --by-person or --person"
         )
     return trimmed(recordings) if trim else recordings
+
+
+def _check_excluded(recordings: Recordings, layout: Layout) -> None:
+    """Refuse a column to exclude that no file has: it is most likely misspelled."""
+    left_aside = sorted({name for how, _ in recordings.detected for name in how.ignored})
+    for column in layout.excluded:
+        if not isinstance(column, int) and not column.isdecimal() and not excluded_numbers(left_aside, [column]):
+            others = sorted({name for how, _ in recordings.detected for name in how.columns})
+            raise DataError(f"expected columns like {column!r} to exclude, got none but {listed(others)}")
 
 
 def read_recordings_from_bytes(data: bytes, name: str, layout: Layout) -> Recordings:
@@ -176,5 +204,7 @@ def read_recording(path: str | Path) -> Trajectory:
         raise problem.error(str(problem._replace(file=str(path))))
     if len(one) > 1:
         raise DataError(f"expected one movement in {path}, got {len(one)}; read them with read_recordings")
+    for note in notes_on_gaps(one):
+        warn(f"{path}: {note}", UserWarning, 2)
     named = replace(one.demonstrations.movements, names=(str(name_of(path)),), labels=None)
     return Demonstrations.of_movements(named)[0]

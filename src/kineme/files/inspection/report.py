@@ -45,7 +45,8 @@ def as_words(inspection: Inspection) -> str:
     channels = inspection.channels or ()
     parts += _listed("kinds", [_kind(one, lever_of(channels)) for one in channels if one.kind != "position"])
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
-    parts += _listed("not read", list(map(str, inspection.problems)))
+    parts += _listed("not read", [str(one) for one in inspection.problems if not one.samples])
+    parts += _listed("read but for samples", [str(one) for one in inspection.problems if one.samples])
     parts += _listed("note", list(inspection.notes))
     return "\n\n".join(parts)
 

@@ -20,7 +20,7 @@ _STAMP = "time [s]"
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The positions of all points over time; a sample without its point is a gap, a point without samples is left out.
+    """The positions of all points over time; a sample without its point is NaN.
 
     Raises
     ------
@@ -46,15 +46,8 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     heads = (_STAMP, *(f"{name}.{axis}" for name in without_common_subject(names) for axis in "xyz"))
     roles = choose_roles(heads, ("number",) * len(heads), layout)
     columns = [np.arange(len(points)) / rate, *points.reshape(len(points), -1).T]
-    missing = {k: np.isnan(columns[k]) for k in roles.positions}
-    if layout.coordinates is None:
-        roles = roles._replace(positions=tuple(k for k in roles.positions if not missing[k].all()))
-    faults: dict[int, str] = {}
-    for k in reversed(roles.positions):
-        reason = f"expected a point for {heads[k]!r}, got none; choose other columns, or drop such samples alone"
-        faults |= dict.fromkeys(np.flatnonzero(missing[k]).tolist(), reason)
     units = ("s", *(unit for _ in heads[1:]))
-    return Table(heads, columns, len(points), no_lines, faults, measured_in=units), roles
+    return Table(heads, columns, len(points), no_lines, measured_in=units), roles
 
 
 def _content(reader: Any, data: bytes) -> tuple[Any, list[str], str, float]:

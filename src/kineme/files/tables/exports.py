@@ -16,7 +16,6 @@ from kineme.files.motion_capture.qualisys import qualisys_head
 from kineme.files.motion_capture.trc import trc_head
 from kineme.files.motion_capture.vicon import vicon_head
 from kineme.files.tables.dialect import COMMA_NUMBER, Dialect, check_line, split
-from kineme.movements.tables.columns import Roles
 from kineme.movements.tables.table import Table
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
@@ -76,8 +75,8 @@ def with_times(head: ExportHead, dialect: Dialect) -> tuple[tuple[str, ...], tup
     )
 
 
-def export_table(head: ExportHead, table: Table, roles: Roles, chosen: bool) -> tuple[Table, Roles]:
-    """A table with times, gaps as faults, and without the columns that hold nothing, unless they were `chosen`."""
+def export_table(head: ExportHead, table: Table) -> Table:
+    """A table with times, and NaN for markers that were not found."""
     columns = list(table.columns)
     if head.rate is not None and not head.is_timed:
         columns.append(_stamps(table, columns, head.rate))
@@ -87,21 +86,9 @@ def export_table(head: ExportHead, table: Table, roles: Roles, chosen: bool) -> 
         columns[k] = np.where(np.abs(columns[k] - even) <= _ROUNDED, even, columns[k])
     if head.zeros_are_gaps:
         _mark_zeros(table.heads, columns)
-    missing = {k: np.isnan(columns[k]) for k in roles.positions}
-    empty = () if chosen else tuple(k for k, rows in missing.items() if rows.all())
-    positions = tuple(k for k in roles.positions if k not in empty)
-    if not positions:
-        raise DataError(f"expected coordinates in a {head.maker} export, got columns without any number")
-    faults = {row: text for row, text in table.faults.items() if "columns" in text}
-    for k in reversed(positions):  # the first gap of a row is named
-        faults |= dict.fromkeys(
-            np.flatnonzero(missing[k]).tolist(),
-            f"expected a number in {table.heads[k]!r}, got nothing; choose other columns, or drop such samples alone",
-        )
-    roles = roles._replace(positions=positions, ignored=tuple(sorted({*roles.ignored, *empty})))
     return Table(
-        table.heads, columns, table.n_rows, table.line_of, faults, None, table.measured_in, None, head.maker
-    ), roles
+        table.heads, columns, table.n_rows, table.line_of, table.faults, None, table.measured_in, None, head.maker
+    )
 
 
 def _stamps(table: Table, columns: Sequence[Any], rate: float) -> Any:

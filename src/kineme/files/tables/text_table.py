@@ -84,10 +84,11 @@ def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect],
     heads, kinds, measured_in = with_times(head, dialect)
     roles = choose_roles(heads, kinds, layout)
     rows, faults = _rows(data, encoding, dialect, {k for k in (*roles.movement, roles.label) if k is not None})
+    faults = {row: text for row, text in faults.items() if "columns" in text}  # other cells are taken for gaps
     columns = [rows[name] for name in rows.dtype.names or ()]
     line_of = _line_numbers(data, encoding, dialect)
     table = Table(heads, columns, len(rows), line_of, faults, None, measured_in)
-    return export_table(head, table, roles, layout.coordinates is not None)
+    return export_table(head, table), roles
 
 
 def _rows(data: bytes, encoding: str, dialect: Dialect, texts: set[int]) -> tuple[Any, dict[int, str]]:

@@ -19,7 +19,7 @@ _EMPTY = 20_000  # lines without any number, after which none is expected
 def read_slowly(
     samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
 ) -> tuple[Any, dict[int, str]]:
-    """All samples, NaN for missing numbers, and row -> what is wrong there."""
+    """All samples, NaN for missing numbers, and row -> what is wrong there; an empty cell is a gap, and no fault."""
     stretches, faults, n_rows, has_numbers = [], dict[int, str](), 0, False
     numeric = [name for name in dtype.names or () if dtype[name].kind == "f"]
     samples = iter(samples)
@@ -47,10 +47,10 @@ def _read_stretch(lines: list[str], dialect: Dialect, dtype: np.dtype[Any]) -> t
         known = not quoted or quotes_are_plain("".join(plain).encode(), dialect)
         if known and (read := try_rows(plain, dialect, dtype)) is not None:
             return read, {}
-        if not quoted and not any(texts) and dialect.separator:  # an empty cell is the usual fault
+        if not quoted and not any(texts) and dialect.separator:  # an empty cell is usual
             text = "\n".join(line.rstrip("\r\n") for line in plain)
             if (read := try_rows(_filled(text, dialect.separator).split("\n"), dialect, dtype)) is not None:
-                return read, _empty_cells(lines, dialect) if "nan" in text.lower() else _missing(read, dialect)
+                return read, {}
     rows = np.empty(len(lines), dtype)
     faults = {}
     for k, line in enumerate(lines):
@@ -95,20 +95,6 @@ def _filled(text: str, separator: str) -> str:
     return text[1:-1]
 
 
-def _missing(rows: Any, dialect: Dialect) -> dict[int, str]:
-    """Row -> the first column without a number, where nothing but an empty cell reads as none."""
-    missing = np.column_stack([np.isnan(rows[name]) for name in rows.dtype.names])
-    reasons = [f"expected a number in {head!r}, got nothing" for head in dialect.heads]
-    where = np.flatnonzero(missing.any(axis=1))
-    return {k: reasons[first] for k, first in zip(where.tolist(), missing[where].argmax(axis=1).tolist(), strict=True)}
-
-
-def _empty_cells(lines: list[str], dialect: Dialect) -> dict[int, str]:
-    """Row -> the column whose number is missing."""
-    cells = ((k, [cell.strip() for cell in line.split(dialect.separator)]) for k, line in enumerate(lines))
-    return {k: f"expected a number in {dialect.heads[row.index('')]!r}, got nothing" for k, row in cells if "" in row}
-
-
 def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[Any, ...], str]:
     check_line(line)
     cells, wrong = split(line, dialect.separator), ""
@@ -120,7 +106,7 @@ def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[An
         row.append(cell if text else _number(cell, dialect.decimal_comma))
         if row[-1] is None:
             row[-1] = np.nan
-            wrong = wrong or f"expected a number in {head!r}, got {repr(cell) if cell else 'nothing'}"
+            wrong = wrong or (f"expected a number in {head!r}, got {cell!r}" if cell else "")
     return tuple(row), wrong
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from contextlib import suppress
+from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from kineme.errors import DataError
@@ -30,6 +32,8 @@ _ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECAS
 _WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
 _TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
 _JOINT_STATE = re.compile(r"(?<![a-z])(velocit(?:y|ies)|efforts?|accelerations?)(?![a-z])", re.IGNORECASE)
+_BRACKETS = re.compile(r"[\[(].*?[\])]")  # around units
+_UNNAMED = re.compile(r"([^:]*:)?(\*|unlabell?ed|unidentified)[ _-]?\d*(\.position)?\.[xyz]", re.IGNORECASE)  # markers
 _DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
 
 
@@ -69,6 +73,9 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     DataError
         No or several columns of times, no coordinates, or a column that is not there; the message lists what is.
     """
+    if layout.excluded and (excluded := excluded_numbers(heads, layout.excluded)):
+        heads = ["" if k in excluded else head for k, head in enumerate(heads)]
+        kinds = ["text" if k in excluded else kind for k, kind in enumerate(kinds)]
     label = _label(heads, layout, named)
     movement = _movement(heads, layout, named, label)
     taken = {*movement, label}
@@ -78,10 +85,10 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
     beside = _nanoseconds(heads, kinds) if named else {}
     nanoseconds = None if time is None else beside.get(time)
     taken |= {time, *others, *beside, *beside.values()}
+    free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
     if layout.coordinates is not None:
-        positions = column_numbers(heads, layout.coordinates)
+        positions = column_numbers(heads, layout.coordinates, free)
     else:
-        free = [k for k in range(len(heads)) if k not in taken and kinds[k] == "number"]
         plain = set(map(_plain, heads))
         clocks = {k for k in free if _is_stamp(heads[k])} if time is not None and is_time(heads[time]) else set()
         positions = tuple(k for k in free if not (named and (k in clocks or _says_nothing_new(heads[k], plain))))
@@ -99,18 +106,61 @@ def _number(heads: Sequence[str], column: Column) -> int:
     return _place(heads, column, _places(heads), _places(map(_plain, heads)))
 
 
-def column_numbers(heads: Sequence[str], columns: Sequence[Column]) -> tuple[int, ...]:
+def column_numbers(
+    heads: Sequence[str], columns: Sequence[Column], among: Collection[int] | None = None
+) -> tuple[int, ...]:
     """Column numbers from heads or numbers; a string of digits is a number if no head equals it.
 
-    What several heads begin with, before a dot, stands for all of them: ``wrist`` for ``wrist.x``, ``wrist.y``.
+    What several heads begin with, before a dot, stands for all of them: ``wrist`` for ``wrist.x``, ``wrist.y``. Where
+    no head has the name, ``*`` in it stands for any text and ``?`` for any character: ``LASI*``, ``*_x``. Of patterns
+    only columns `among` these are taken, by default all but times, and none twice.
     """
     exact, plain = _places(heads), _places(map(_plain, heads))
-    found: list[int] = []
-    for one in columns:
-        known = isinstance(one, int) or one in exact or _plain(one) in plain
-        group = [] if known else [k for k, head in enumerate(heads) if head.startswith(f"{one}.")]
-        found += group or [_place(heads, one, exact, plain)]
-    return tuple(found)
+    numbers: list[int] = []
+    for column in columns:
+        if isinstance(column, int) or column in exact or _plain(column) in plain:
+            numbers.append(_place(heads, column, exact, plain))
+        elif group := [k for k, head in enumerate(heads) if head.startswith(f"{column}.")]:
+            numbers += group
+        elif {"*", "?"} & {*column}:
+            matching = _matching(heads, column)
+            free = matching if among is None else [k for k in matching if k in among]
+            if not free:
+                raise DataError(f"expected columns like {column!r}, got {_listed(heads)}")
+            numbers += [k for k in free if k not in numbers and (among is not None or not is_time(heads[k]))]
+        else:
+            numbers.append(_place(heads, column, exact, plain))
+    return tuple(numbers)
+
+
+def excluded_numbers(heads: Sequence[str], columns: Sequence[Column]) -> set[int]:
+    """The columns that are meant, as by `column_numbers`; what is not there is passed over, and twins go together."""
+    numbers: set[int] = set()
+    for column in columns:
+        if isinstance(column, str) and (same := [k for k, head in enumerate(heads) if head == column]):
+            numbers |= {*same}
+            continue
+        with suppress(DataError):
+            numbers |= {*column_numbers(heads, [column])}
+    return numbers
+
+
+def numbers_by_name(heads: Sequence[str], names: Sequence[str]) -> list[int | None]:
+    """The column of each name, with or without its unit; None where none or several have it."""
+    exact, plain = _places(heads), _places(map(_plain, heads))
+    same = [exact.get(name) or plain.get(_plain(name), []) for name in names]
+    return [places[0] if len(places) == 1 else None for places in same]
+
+
+def _matching(heads: Sequence[str], pattern: str) -> list[int]:
+    """The columns whose heads match, with or without their units; brackets stand for themselves."""
+    literal = pattern.replace("[", "[[]")
+    bare = (_BRACKETS.sub("", head).strip() for head in heads)
+    return [
+        k
+        for k, (head, name) in enumerate(zip(heads, bare, strict=True))
+        if head and (fnmatchcase(head, literal) or fnmatchcase(name, literal))
+    ]
 
 
 def _places(heads: Iterable[str]) -> dict[str, list[int]]:
@@ -138,11 +188,12 @@ def _place(heads: Sequence[str], column: Column, exact: dict[str, list[int]], pl
 
 
 def _plain(head: str) -> str:
-    return re.sub(r"[\[(].*?[\])]", "", head).strip().lower()
+    return _BRACKETS.sub("", head).strip().lower()
 
 
 def _listed(heads: Sequence[str]) -> str:
-    return "one column" if len(heads) == 1 else f"the columns {listed(heads)}"
+    named = [head for head in heads if head]
+    return "one column" if len(named) == 1 else f"the columns {listed(named)}"
 
 
 def _times(
@@ -246,9 +297,10 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
 
 
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """Whether a column is redundant: a counter of samples, a stamp beside the times, or another column's derivative."""
+    """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a derivative."""
     words = {word for word in words_of(head) if not word.isdecimal()}
-    if not head.strip() or _ROS_HEADER.fullmatch(head) or (words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS):
+    counts = words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS
+    if counts or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
         return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
     if derived is None:  # of the state of a joint: field.velocity0 beside field.position0

@@ -15,6 +15,9 @@ Column = str | int  # head, or number counted from 0
 
 SKIP = ("movement", "sample")
 
+#: Longest gap [s] that is filled unless the caller says otherwise.
+FILL_GAPS = 0.2
+
 #: What the layout of a file ends with if nobody asked for its topic or frame, see `Layout.known`.
 AS_KNOWN = ", as the movements to compare with"
 
@@ -69,11 +72,15 @@ class Layout:
 
     known : Known, optional
         What the movements to compare with were read from: the default of topic and frame where a bag has several.
+    exclude : str or int or sequence of them, optional
+        Columns that are left aside, whatever else chooses them; one that a file does not have is no matter to it.
+    fill_gaps : float
+        Longest gap [s] that is filled, from the value before it to the value after it; 0 fills none.
 
     Raises
     ------
     SpecificationError
-        An unknown unit or choice.
+        An unknown unit or choice, or a gap that is no number of seconds from 0.
     """
 
     time: Column | None = None
@@ -87,9 +94,12 @@ class Layout:
     frame: str | Sequence[str] | None = None
     person: Column | None = None
     known: Known | None = None
+    exclude: Column | Sequence[Column] | None = None
+    fill_gaps: float = FILL_GAPS
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
+        check_number("fill_gaps", self.fill_gaps, least=0)
         if isinstance(self.units, Real) and not isinstance(self.units, bool):
             check_number("units", self.units, above=0)
         elif self.units is not None and not (isinstance(self.units, str) and is_unit_of(self.units, "time")):
@@ -101,6 +111,11 @@ class Layout:
     def coordinates(self) -> tuple[Column, ...] | None:
         """The columns of the coordinates."""
         return _several(self.columns)
+
+    @property
+    def excluded(self) -> tuple[Column, ...]:
+        """The columns that are left aside."""
+        return _several(self.exclude) or ()
 
     @property
     def keys(self) -> tuple[Column, ...] | None:

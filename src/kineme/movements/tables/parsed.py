@@ -53,6 +53,24 @@ class Detected(NamedTuple):
     person: tuple[str, ...] = ()
 
 
+class Repair(NamedTuple):
+    """What was done about values that one movement lacks.
+
+    Attributes
+    ----------
+    filled : int
+        Number of samples of which values are interpolated.
+    longest : float
+        Longest gap that was filled, from the sample before to the sample after [s].
+    cropped : float
+        Time at both ends that was left out, since columns have no values there [s].
+    """
+
+    filled: int = 0
+    longest: float = 0.0
+    cropped: float = 0.0
+
+
 def no_lines(row: int) -> None:
     """The line of every row of a file that has no lines: None."""
 
@@ -78,6 +96,8 @@ class Block:
         Row of the file -> what is wrong there.
     people : list of n str or None, optional
         Who showed each movement.
+    repairs : list of n Repair, optional
+        What was done about missing values.
     """
 
     positions: Array
@@ -89,6 +109,7 @@ class Block:
     line_of: Callable[[int], int | None] = no_lines
     faults: dict[int, str] | None = None
     people: list[str | None] | None = None
+    repairs: list[Repair] | None = None
 
     def row(self, k: int) -> int:
         """Row of the file that sample k comes from."""
