@@ -90,7 +90,7 @@ def test_another_number_of_joints_or_dimensions_is_said(panda):
     [
         ("<robot", "text that is no XML"),
         ("<sdf/>", "whose root is <robot>, got <sdf>"),
-        ("<robot name='r'/>", "expected a tip"),
+        ("<robot name='r'/>", "at least one joint that moves, found none"),
         ('<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa">' + "".join(
             f'<!ENTITY {c} "{("&" + b + ";") * 10}">' for b, c in zip("abcdefgh", "bcdefghi", strict=True)
         ) + "]><robot name='&i;'/>", "no XML"),

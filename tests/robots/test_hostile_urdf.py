@@ -15,6 +15,7 @@ JOINT = (
     '<limit lower="-1" upper="1" velocity="{velocity}" effort="1"/></joint>'
 )
 INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+BALL = '<collision>{}<geometry><sphere radius="0.1"/></geometry></collision>'
 
 
 def urdf(folder, inside="", before="", name="j", axis="0 0 1", velocity="1"):
@@ -37,6 +38,16 @@ def urdf(folder, inside="", before="", name="j", axis="0 0 1", velocity="1"):
         ({"inside": '<collision><geometry><sphere radius="-1"/></geometry></collision>'}, "sizes above 0"),
         ({"inside": '<collision><geometry><box size="nan 1 1"/></geometry></collision>'}, "sizes above 0"),
         ({"inside": '<collision><geometry><torus radius="1"/></geometry></collision>'}, "to be a mesh, or a"),
+        ({"inside": BALL.format('<origin xyz="0,0,1"/>')}, "expected <origin xyz=/> as 3 numbers .* got '0,0,1'"),
+        ({"inside": BALL.format('<origin rpy="0 0 1_0"/>')}, "link 'b': expected <origin rpy=/> as 3 numbers"),
+        ({"inside": BALL.format('<origin xyz="0 0"/>')}, "link 'b': expected <origin xyz=/> as 3 numbers"),
+        ({"inside": BALL.format("<geometry><box size='1 1 1'/></geometry>")}, "got <box>, <sphere>"),
+        ({"inside": BALL.replace("0.1", "0x1").format("")}, "sizes above 0"),
+        ({"inside": '<collision><geometry><mesh filename="a" scale="1,1,1"/></geometry></collision>'}, "to be a mesh"),
+        ({"inside": f'<inertial><mass value="1"/>{INERTIA.replace("ixy", "xy")}</inertial>'}, "; ixy cannot be read"),
+        ({"inside": f'<inertial><origin xyz="a b c"/><mass value="1"/>{INERTIA}</inertial>'}, "'b': expected <origin"),
+        ({"axis": '0 0 1"/><origin xyz="0;0;1'}, "joint 'j': expected <origin xyz=/>"),
+        ({"velocity": "1_0"}, "joint 'j': expected a number for velocity, got '1_0'"),
         ({"inside": "<x>" * 50_000 + "</x>" * 50_000}, "elements within one another"),
         ({"before": '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>'}, "declares a document type"),
         ({"axis": "0 0 0"}, "joint 'j': expected <axis xyz=/> as three numbers that are not all 0, got '0 0 0'"),
@@ -49,6 +60,29 @@ def test_what_would_be_left_out_without_a_word_is_refused_by_name(tmp_path, chan
     path = urdf(tmp_path, **changed)
     with pytest.raises(DataError, match=words):
         load(path, tip="b")
+
+
+def test_what_a_reader_leaves_out_all_the_same_is_refused(tmp_path, monkeypatch):
+    """As if the library for kinematics read less than we looked at."""
+    import pinocchio
+
+    path = urdf(tmp_path, BALL.format(""))
+    read = pinocchio.buildGeomFromUrdfString
+
+    def nothing(*arguments, **options):
+        shapes = read(*arguments, **options)
+        shapes.removeGeometryObject("b_0")
+        return shapes
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pinocchio, "buildGeomFromUrdfString", nothing)
+        with pytest.raises(DataError, match="link 'b': expected 1 collision shapes, but 0 can be read"):
+            load(path)
+    path = urdf(tmp_path, f'<inertial><mass value="2"/>{INERTIA}</inertial>')
+    build = pinocchio.buildModelFromXML
+    monkeypatch.setattr(pinocchio, "buildModelFromXML", lambda text: build(text.replace('value="2"', 'value="1"')))
+    with pytest.raises(DataError, match="joint 'j': expected it to move links of 2 kg together, but 1 kg can be read"):
+        load(path)
 
 
 def test_a_mesh_whose_name_no_file_can_have_is_not_there(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from functools import reduce
 from xml.etree import ElementTree
 
@@ -179,6 +181,132 @@ def test_a_mimic_joint_is_refused_by_name(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(ONE_JOINT.format(kind="revolute", more='<mimic joint="j"/><limit lower="-1" upper="1"/>'))
     with pytest.raises(DataError, match=r"joint 'j' mimics another one, .* choose a tip before it, as 'a'"):
+        load(path)
+
+
+def link_of(name, inside=""):
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint_of(name, parent, child, kind="revolute", more=""):
+    return (
+        f'<joint name="{name}" type="{kind}"><origin xyz="0.02 0 0.2"/><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{"0 1 0" if name[-1] in "246" else "0 0 1"}"/>'
+        f'<limit lower="-2" upper="2" velocity="1" effort="9" acceleration="5"/>{more}</joint>'
+    )
+
+
+def chain_of(n, prefix="", root="base"):
+    """Joints and links of an arm of n joints, which ends in prefix + link + n."""
+    names = [root, *(f"{prefix}link{i}" for i in range(1, n + 1))]
+    return [joint_of(f"{prefix}joint{i}", names[i - 1], names[i]) for i in range(1, n + 1)]
+
+
+def tree(folder, joints, name="arm.urdf"):
+    """A URDF of these joints and of the links that they name."""
+    text = "".join(joints)
+    links = dict.fromkeys(re.findall(r'<(?:parent|child) link="([^"]+)"', text))
+    path = folder / name
+    path.write_text(f'<robot name="r">{"".join(map(link_of, links))}{text}</robot>')
+    return path
+
+
+PARALLEL = [joint_of("slide1", "link6", "left", "prismatic"), joint_of("slide2", "link6", "right", "prismatic")]
+GRIPPERS = {
+    "two that slide": PARALLEL,
+    "two that turn": [joint_of("a", "link6", "left"), joint_of("b", "link6", "right")],
+    "one that mimics": [joint_of("a", "link6", "left", more='<mimic joint="joint6"/>')],
+    "a jaw by its name": [joint_of("gripper", "link6", "moving")],
+    "a finger by its link": [joint_of("a", "link6", "finger_link"), joint_of("b", "finger_link", "end")],
+}
+
+
+@pytest.mark.parametrize("kind", GRIPPERS)
+def test_grippers_are_found_locked_and_said(tmp_path, kind):
+    robot = load(tree(tmp_path, [*chain_of(6), *GRIPPERS[kind]]))
+    assert robot.joints == tuple(f"joint{i}" for i in range(1, 7))
+    assert robot.tip == "link6"
+    gripper = [re.search(r'name="([^"]+)"', joint)[1] for joint in GRIPPERS[kind]]
+    belong = "belong" if len(gripper) > 1 else "belongs"
+    assert f"{', '.join(gripper)} {belong} to a gripper or a hand: locked, no part of the arm" in robot.assumed
+
+
+def test_a_tip_that_is_asked_for_behind_a_gripper_moves_with_the_arm_alone(tmp_path):
+    robot = load(tree(tmp_path, [*chain_of(6), *PARALLEL]), tip="left")
+    assert robot.joints == tuple(f"joint{i}" for i in range(1, 7))
+
+
+def test_a_joint_that_turns_the_gripper_is_one_of_the_arm(tmp_path):
+    turning = joint_of("gripper_roll", "link5", "link6")
+    assert load(tree(tmp_path, [*chain_of(5), turning, *PARALLEL])).joints[-1] == "gripper_roll"
+
+
+@pytest.mark.parametrize(
+    ("names", "tip"),
+    [
+        (("flange", "tool0"), "tool0"),
+        (("ee_link", "tool0", "camera_link"), "tool0"),
+        (("hand", "hand_tcp"), "hand_tcp"),
+        (("camera_optical_frame", "plate"), "plate"),
+        (("plate", "adapter"), "link6"),  # neither is an end by its name: what the last joint moves
+    ],
+)
+def test_the_tip_is_the_end_of_the_chain_by_its_name(tmp_path, names, tip):
+    fixed = [joint_of(f"fixed{i}", "link6", name, "fixed") for i, name in enumerate(names)]
+    base = joint_of("b", "base", "base_tcp", "fixed")
+    robot = load(tree(tmp_path, [*chain_of(6), base, *fixed]))
+    assert robot.tip == tip
+    assert not robot.assumed or "singular" in robot.assumed[0]
+
+
+def test_the_longest_of_several_chains_is_the_arm_and_the_others_are_said(tmp_path):
+    legs = [joint for side in "lr" for joint in chain_of(3, side, "base")]
+    robot = load(tree(tmp_path, [*legs, *chain_of(6)]))
+    assert robot.tip == "link6"
+    assert robot.assumed[0] == (
+        "the tip is 'link6' (6 joints), of the longest chain; others are 'llink3' (3 joints), 'rlink3' (3 joints) "
+        "(choose with tip=, --tip)"
+    )
+
+
+def test_two_arms_are_asked_about_with_the_ends_of_their_chains(tmp_path):
+    arms = [joint for side in ("left_", "right_") for joint in chain_of(5, side, "body")]
+    path = tree(tmp_path, [joint_of("lift", "base", "body", "prismatic"), *arms, *chain_of(2, "head_", "body")])
+    words = r"3 links: 'left_link5' \(6 joints\), 'right_link5' \(6 joints\), 'head_link2' \(3 joints\); say which"
+    with pytest.raises(DataError, match=words):
+        load(path)
+    with pytest.raises(DataError, match=r"no link 'x' to be the tip; there are 'left_link5' \(6 joints\)"):
+        load(path, tip="x")
+
+
+def test_a_wrist_beside_a_camera_that_turns_is_no_gripper(tmp_path):
+    camera = joint_of("pan", "link4", "eye")
+    robot = load(tree(tmp_path, [*chain_of(6), camera]))
+    assert robot.n_joints == 6
+
+
+XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="most" value="1.5"/>
+<link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+<limit lower="${-most}" upper="${most}" velocity="1" effort="1"/></joint></robot>"""
+
+
+def test_a_xacro_file_is_converted_by_its_package(tmp_path):
+    pytest.importorskip("xacro", reason="xacro is not installed")
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text(XACRO)
+    np.testing.assert_allclose([*load(path).lower, *load(path).upper], [-1.5, 1.5])
+    path.write_text(XACRO.replace("value=", "value='' other="))
+    with pytest.raises(
+        DataError, match=r"xacro cannot convert this file: .*; convert it .*: xacro arm\.urdf\.xacro > arm"
+    ):
+        load(path)
+
+
+def test_without_its_package_the_command_that_converts_xacro_is_said(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    path = tmp_path / "arm.urdf"  # also under the name of a URDF
+    path.write_text(XACRO)
+    with pytest.raises(DataError, match=r"pip install xacro, or .*: xacro arm\.urdf > arm_converted\.urdf"):
         load(path)
 
 

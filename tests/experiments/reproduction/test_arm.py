@@ -1,6 +1,9 @@
 """What the paper's robot executes: where its joints bring the tip, and what is said of it."""
 
+import re
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -105,3 +108,13 @@ def test_what_is_said_of_the_arm_follows_from_its_draws():
     assert "the plane is ahead of the arm in weights, original (0.800 against 0.700)" in behind
     assert f"On the arm, {CLOSEST}, TrE is ahead of RBF" in read_svm(draws((0.5, 0.6)))
     assert f"On the arm, {CLOSEST}, RBF is ahead of TrE" in read_svm(draws((0.6, 0.5)))
+
+
+def test_the_lock_of_the_demonstration_holds_what_moves_the_arm():
+    root = Path(__file__).parents[3]
+    extra = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    needed = {re.match(r"[\w-]+", requirement)[0] for requirement in extra["robot"]}
+    locked = set(
+        re.findall(r"^([\w-]+)==", (root / "requirements" / "run.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    assert needed <= locked

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.errors import DataError, SpecificationError
+from kineme.robots.models.ends import Candidate, in_words
 from kineme.robots.models.rest import bent_in_words, checked_rest, rest_posture
 from kineme.robots.models.robot import Robot
 from kineme.robots.models.table import MODELS, Model
@@ -33,9 +36,11 @@ def load(
     Parameters
     ----------
     robot : str or Path
-        "panda", "ur5e", "wam", "so101", or the path of a URDF file. A path ends in ``.urdf`` or ``.xml``.
+        "panda", "ur5e", "wam", "so101", or the path of a URDF file. A path ends in ``.urdf`` or ``.xml``; one in
+        ``.xacro`` is converted where the package ``xacro`` is installed.
     tip : str, optional
-        The link that follows the movement; by default that of the model, of a file the end of its only chain.
+        The link that follows the movement; by default that of the model, of a file the end of its longest chain: by
+        its name (``tcp``, ``tool0``, ``ee`` ...), else the last link. Joints of grippers and hands are locked.
     rest : array_like of shape (n,), optional
         Posture from which movements are approached; by default that of the model, of a file the middle of the limits
         (0 of joints that turn several times), with up to three joints bent if that is a singular posture.
@@ -99,7 +104,7 @@ def _find(robot: str | Path, tip: str | None) -> tuple[Path, str | None, ArrayLi
     if text in MODELS:
         return _FOLDER / f"{text}.urdf", MODELS[text].tip, MODELS[text].rest, text
     path = Path(text)
-    if path.suffix.lower() not in (".urdf", ".xml"):
+    if path.suffix.lower() not in (".urdf", ".xml", ".xacro"):
         raise SpecificationError(f"expected one of {', '.join(MODELS)} or the path of a .urdf file, got {text!r}")
     return path, None, None, path.stem
 
@@ -110,13 +115,44 @@ def _build(pinocchio: Any, path: Path, chain: Chain) -> tuple[Any, Any]:
         whole = pinocchio.buildModelFromXML(chain.text)
         shapes = pinocchio.buildGeomFromUrdfString(whole, chain.text, pinocchio.GeometryType.COLLISION, package_dirs=[])
         locked = [whole.getJointId(name) for name in list(whole.names)[1:] if name not in chain.joints]
-        model, geometry = pinocchio.buildReducedModel(whole, shapes, locked, pinocchio.neutral(whole))
+        _check_read(chain.text, whole, shapes, path)
+        still = np.clip(pinocchio.neutral(whole), whole.lowerPositionLimit, whole.upperPositionLimit)
+        model, geometry = pinocchio.buildReducedModel(whole, shapes, locked, still)
     except (ValueError, RuntimeError) as error:
         raise DataError(f"{path}: pinocchio cannot read this URDF: {error}") from error
     order = [str(name) for name in list(model.names)[1:]]
     if order != list(chain.joints):
         raise DataError(f"{path}: expected the joints in the order {list(chain.joints)}, got {order}")
     return model, geometry
+
+
+def _check_read(text: str, model: Any, shapes: Any, path: Path) -> None:
+    """Refuse a model with other numbers of collision shapes, or other masses that move, than its XML says.
+
+    Raises
+    ------
+    DataError
+        The first such link or joint, with what its XML says and what was read.
+    """
+    frames = {str(frame.name): frame.parentJoint for frame in model.frames if frame.type.name == "BODY"}
+    n_read = Counter(str(model.frames[shape.parentFrame].name) for shape in shapes.geometryObjects)
+    masses = np.zeros(model.njoints)
+    for link in ElementTree.fromstring(text).findall("link"):
+        name, mass, expected = str(link.get("name")), link.find("inertial/mass"), len(link.findall("collision"))
+        masses[frames[name]] += 0.0 if mass is None else float(mass.get("value", "0"))
+        if expected != n_read[name]:
+            raise DataError(
+                f"{path}: link {name!r}: expected {expected} collision shapes, but {n_read[name]} can be read"
+            )
+    read = np.array([inertia.mass for inertia in model.inertias])
+    wrong = ~np.isclose(masses, read)
+    wrong[0] = False  # what does not move
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise DataError(
+            f"{path}: joint {str(model.names[i])!r}: expected it to move links of {masses[i]:g} kg together, but "
+            f"{read[i]:g} kg can be read"
+        )
 
 
 def _limit(what: str, values: Array, largest: float | None, default: float, unit: str, chain: Chain) -> list[str]:
@@ -135,6 +171,17 @@ def _limit(what: str, values: Array, largest: float | None, default: float, unit
 def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
     """What is said about a model that comes with kineme, and about joints and links of which a file says too little."""
     assumed = [known.assumed] if known is not None and known.assumed else []
+    if chain.others:
+        assumed.append(
+            f"the tip is {Candidate(chain.tip, len(chain.joints))}, of the longest chain; others are "
+            f"{in_words(list(chain.others))} (choose with tip=, --tip)"
+        )
+    if chain.gripper:
+        several = len(chain.gripper) > 1
+        named = _named(chain.gripper)
+        assumed.append(
+            f"{named} {'belong' if several else 'belongs'} to a gripper or a hand: locked, no part of the arm"
+        )
     if chain.without_stops:
         assumed.append(f"{_have(chain.without_stops)} no stops: it is kept within one turn to each side")
     if chain.without_shape:
@@ -144,5 +191,8 @@ def _assumed_of(chain: Chain, known: Model | None) -> list[str]:
 
 def _have(names: tuple[str, ...]) -> str:
     """Up to three names, and that each has what follows."""
-    named = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-    return f"{named} {'each have' if len(names) > 1 else 'has'}"
+    return f"{_named(names)} {'each have' if len(names) > 1 else 'has'}"
+
+
+def _named(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -8,11 +8,12 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from kineme.errors import DataError
+from kineme.robots.models.ends import MOVING, Candidate, Ends, in_words
 from kineme.robots.models.meshes import resolve_meshes
-from kineme.robots.models.numbers import check_axis, check_masses, check_shapes
+from kineme.robots.models.numbers import check_axis, check_masses, check_origins, check_shapes, finite_number
+from kineme.robots.models.xacro import has_macros, without_macros
 
 _LARGEST = 20_000_000  # bytes
-_MOVING = ("revolute", "continuous", "prismatic")
 _TWIN = " link"  # is added to the name of a link that a joint has too
 _DECLARED = b"<!DOCTYPE"  # declares entities: other files, or texts that grow
 _LEAST = 1e-9  # velocity, acceleration or effort that is a limit and no rounding error
@@ -39,40 +40,66 @@ class Chain(NamedTuple):
     tip: str
     without_stops: tuple[str, ...]  # joints that the file calls continuous
     without_shape: tuple[str, ...]  # links whose meshes are not there
+    gripper: tuple[str, ...]  # joints of grippers, fingers and hands, which are locked
+    others: tuple[Candidate, ...]  # links that might be the tip as well; none if the tip was given
 
 
 def read_chain(path: Path, tip: str | None) -> Chain:
-    """The chain from the root of the URDF at `path` to the frame `tip`, by default the last link of its only chain.
+    """The chain from the root of the URDF at `path` to the frame `tip`, by default the end of the longest chain.
+
+    Joints of grippers and hands are no part of it.
 
     Raises
     ------
     DataError
-        No such file, no URDF, a tip that does not exist, several chains and no tip, a joint without limits or with a
-        mimic joint in the chain; each with the name of the joint or link.
+        No such file, no URDF, a tip that does not exist, several chains as long and no tip, a joint without limits or
+        with a mimic joint in the chain, masses or shapes that cannot be read; each with the name of the joint or link.
     """
     robot = read_root(path)
-    parents = {_child(joint, path): joint for joint in robot.findall("joint")}
+    parents = _joints_above(robot, path)
     links = [str(link.get("name")) for link in robot.findall("link")]
-    tip = _tip(tip, links, parents, path)
-    chain = []
-    link, passed = tip, set()
-    while link in parents:
-        if link in passed:
-            raise DataError(f"{path}: the joints above {tip!r} form a circle at {link!r}; a URDF is a tree")
-        passed.add(link)
-        chain.append(parents[link])
-        link = _end(parents[link], "parent", path)
-    moving = [joint for joint in reversed(chain) if joint.get("type") in _MOVING]
+    ends = Ends(links, parents)
+    candidates = ends.candidates()
+    others = tuple(candidates[1:]) if tip is None else ()
+    tip = _tip(tip, links, candidates, path)
+    moving = [joint for joint in _above(tip, parents) if joint.get("type") in MOVING]
+    moving = [joint for joint in moving if joint.get("name") not in ends.gripper]
     if not moving:
         raise DataError(f"{path}: expected at least one joint that moves between the root and {tip!r}, found none")
     free = tuple(str(joint.get("name")) for joint in moving if joint.get("type") == "continuous")
     limits = tuple(_limits(joint, path) for joint in moving)
     check_masses(robot, path)
     check_shapes(robot, path)
+    check_origins(robot, path)
     missing = tuple(dict.fromkeys(resolve_meshes(robot, path)))
     joints = tuple(str(joint.get("name")) for joint in moving)
     units = tuple("m" if joint.get("type") == "prismatic" else "rad" for joint in moving)
-    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing)
+    gripper = tuple(str(joint.get("name")) for joint in robot.findall("joint") if joint.get("name") in ends.gripper)
+    return Chain(_as_text(robot, path), joints, units, limits, tip, free, missing, gripper, others)
+
+
+def _joints_above(robot: ElementTree.Element, path: Path) -> dict[str, ElementTree.Element]:
+    """The joint above each link that has one."""
+    parents: dict[str, ElementTree.Element] = {}
+    for joint in robot.findall("joint"):
+        _end(joint, "parent", path)
+        child = _end(joint, "child", path)
+        if child in parents:
+            raise DataError(
+                f"{path}: link {child!r} is the child of {parents[child].get('name')!r} and of {joint.get('name')!r}; "
+                "a URDF is a tree"
+            )
+        parents[child] = joint
+    return parents
+
+
+def _above(tip: str, parents: dict[str, ElementTree.Element]) -> list[ElementTree.Element]:
+    """The joints between the root and a link."""
+    chain, link = [], tip
+    while link in parents:
+        chain.append(parents[link])
+        link = str(parents[link].find("parent").get("link"))  # type: ignore[union-attr] # looked at before
+    return chain[::-1]
 
 
 def _as_text(robot: ElementTree.Element, path: Path) -> str:
@@ -83,12 +110,12 @@ def _as_text(robot: ElementTree.Element, path: Path) -> str:
 
 
 def read_root(path: Path) -> ElementTree.Element:
-    """The root of a URDF file, in which no link is called like a joint.
+    """The root of a URDF file, in which no link is called like a joint; of a xacro file, what it is converted to.
 
     Raises
     ------
     DataError
-        No such file, one of more than 20 MB, no XML, or XML that is no URDF.
+        No such file, one of more than 20 MB, no XML, or XML that is no URDF; xacro without the package of that name.
     """
     try:
         if path.stat().st_size > _LARGEST:
@@ -103,11 +130,10 @@ def read_root(path: Path) -> ElementTree.Element:
         raise DataError(
             f"{path}: expected a URDF file, got text that is no XML of a robot: it declares a document type"
         )
+    if has_macros(robot):
+        robot = without_macros(path)
     if robot.tag != "robot":
-        raise DataError(
-            f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>; "
-            "a xacro file is turned into one with: xacro FILE > robot.urdf"
-        )
+        raise DataError(f"{path}: expected a URDF, whose root is <robot>, got <{robot.tag}>")
     _name_apart(robot)
     return robot
 
@@ -131,27 +157,25 @@ def _end(joint: ElementTree.Element, which: str, path: Path) -> str:
     return str(end.get("link"))
 
 
-def _child(joint: ElementTree.Element, path: Path) -> str:
-    return _end(joint, "child", path)
-
-
-def _tip(tip: str | None, links: list[str], parents: dict[str, ElementTree.Element], path: Path) -> str:
+def _tip(tip: str | None, links: list[str], candidates: list[Candidate], path: Path) -> str:
+    """The link that is asked for, else the end of the longest chain if one is longer than all others."""
     if tip is not None:
         tip = f"{tip}{_TWIN}" if tip not in links and f"{tip}{_TWIN}" in links else tip
         if tip not in links:
             from difflib import get_close_matches
 
-            alike = get_close_matches(tip, links, 3) or links[-5:]
-            raise DataError(f"{path}: has no link {tip!r} to be the tip; there are {', '.join(map(repr, alike))}, ...")
+            alike = get_close_matches(tip, links, 3)
+            listed = f"{', '.join(map(repr, alike))}, ..." if alike else in_words(candidates)
+            raise DataError(f"{path}: has no link {tip!r} to be the tip; there are {listed}")
         return tip
-    above = {_end(joint, "parent", path) for joint in parents.values()}
-    ends = [link for link in links if link in parents and link not in above]
-    if len(ends) != 1:
+    if not candidates:
+        raise DataError(f"{path}: expected a robot with at least one joint that moves, found none")
+    if len(candidates) > 1 and candidates[0].n_joints == candidates[1].n_joints:
         raise DataError(
-            f"{path}: expected a tip, as the robot ends in {len(ends)} links: {', '.join(map(repr, ends[:8]))}; "
+            f"{path}: expected a tip, as the robot ends in {len(candidates)} links: {in_words(candidates)}; "
             "say which one follows the movement (tip=..., --tip)"
         )
-    return ends[0]
+    return candidates[0].link
 
 
 def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
@@ -188,12 +212,7 @@ def _limits(joint: ElementTree.Element, path: Path) -> JointLimits:
 
 def _number(limit: ElementTree.Element, key: str, joint: ElementTree.Element, path: Path) -> float:
     text = limit.get(key)
-    if text is None:
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = math.nan if text is None else finite_number(text)
+    if value is None:
         raise DataError(f"{path}: joint {joint.get('name')!r}: expected a number for {key}, got {text!r}")
     return value
