@@ -214,30 +214,30 @@ def test_a_movement_that_rests_has_a_picture_too(make_movement):
 
 def test_a_table_has_a_row_for_each_sample(kind, rollout, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))  # whatever is installed
-    table = rollout.to_dataframe()
+    table = rollout.to_pandas()
     n, n_samples, _ = rollout.positions.shape
-    assert list(table) == ["movement", "label", "time", *AXES[kind]]
+    assert list(table) == ["movement", "label", "time [s]", *AXES[kind]]
     assert table["movement"].tolist() == [i for i in range(n) for _ in range(n_samples)]
     assert table["label"].tolist() == ["aba"[i] for i in table["movement"]]
-    np.testing.assert_array_equal(table["time"], rollout.times.ravel())
+    np.testing.assert_array_equal(table["time [s]"], rollout.times.ravel())
     back = np.column_stack([table[name] for name in AXES[kind]]).reshape(n, n_samples, -1)
     np.testing.assert_array_equal(back, rollout.positions)
 
 
 def test_a_table_without_labels_has_none(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=dict))
-    table = kineme.DMP().learn([np.linspace(0, 1, 50) ** 2]).rollout(n_samples=5).to_dataframe()
+    table = kineme.DMP().learn([np.linspace(0, 1, 50) ** 2]).rollout(n_samples=5).to_pandas()
     assert table["label"].tolist() == [None] * 5
 
 
 def test_a_table_needs_pandas(rollout, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(kineme.DataError, match="expected the package pandas for a data frame; pip install pandas"):
-        rollout.to_dataframe()
+        rollout.to_pandas()
 
 
 def test_pandas_takes_the_table(rollout):
     pandas = pytest.importorskip("pandas")
-    table = rollout.to_dataframe()
+    table = rollout.to_pandas()
     assert isinstance(table, pandas.DataFrame)
     assert len(table) == rollout.times.size

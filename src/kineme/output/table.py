@@ -1,15 +1,16 @@
-"""A table as data, written as text for the terminal and as HTML for the report."""
+"""A table as data, written as text for the terminal, as HTML for reports and notebooks, and as a data frame."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from shutil import get_terminal_size
 from statistics import fmean
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from kineme.errors import DataError
 from kineme.output.display_width import padded, widest_word, width_of, wrapped
 from kineme.output.text import LONGEST_CELL, in_markup, printable, printable_lines, shortened
 
@@ -132,3 +133,18 @@ def to_html(table: Table) -> str:
         f"<figure><table><caption>{in_markup(table.title)}</caption><thead><tr>{head}</tr></thead>"
         f"<tbody>{body}</tbody></table>{reading}</figure>"
     )
+
+
+def data_frame(columns: Mapping[str, Any]) -> Any:
+    """Columns as a data frame of pandas.
+
+    Raises
+    ------
+    DataError
+        The package pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise DataError("expected the package pandas for a data frame; pip install pandas") from error
+    return pd.DataFrame(columns)

@@ -6,27 +6,23 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.errors import DataError
 from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.movements import axis_names
+from kineme.movements.trajectories.presented import Presented, Samples, with_units
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.batch import Batch
 from kineme.primitives.recorded_as import RecordedAs, with_recorded
 from kineme.validation import Array
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-
-class BaseRollout(ABC):
+class BaseRollout(Presented, ABC):
     """n generated movements of T samples each: a sequence of `Trajectory`, taken wherever movements are expected.
 
     ``len(rollout)`` is n, iterating gives one `Trajectory` each, ``rollout[i]`` is one `Trajectory` and
@@ -85,6 +81,14 @@ class BaseRollout(ABC):
         """What the d columns of `positions` are called, in tables and figures."""
         about = self._to_recording
         return axis_names(self.positions.shape[2]) if about is None else list(about.column_names)
+
+    @property
+    def _samples(self) -> Samples:
+        n, n_samples, d = self.positions.shape
+        names = with_units(tuple(self.axis_names), self.channels)
+        columns = self.positions.reshape(-1, d)
+        offsets = n_samples * np.arange(n + 1)
+        return Samples(self.times.ravel(), offsets, columns, names, columns, names, self.labels)
 
     @property
     def rate_names(self) -> list[str]:
@@ -153,68 +157,3 @@ class BaseRollout(ABC):
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.positions, dtype=dtype, copy=copy)
-
-    @overload
-    def plot(self, ax: None = None) -> Figure: ...
-    @overload
-    def plot(self, ax: Axes) -> Axes: ...
-    def plot(self, ax: Axes | None = None) -> Figure | Axes:
-        """A picture: each dimension over time, and the path where it has two or three dimensions.
-
-        A circle is where a path starts, a star where it ends. Of more than 50 movements, some are drawn; the title says
-        how many.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw into these axes: the path of movements of two dimensions, of three if they are axes of projection
-            "3d", or the only dimension over time.
-
-        Returns
-        -------
-        matplotlib.figure.Figure or matplotlib.axes.Axes
-            `ax` if it was given; else a new figure, ``figure.savefig("movements.png")`` writes it to a file. If
-            `matplotlib.pyplot` has been imported, the figure belongs to it: ``plt.show()`` and notebooks show it, and
-            ``plt.close(figure)`` frees it.
-
-        Raises
-        ------
-        SpecificationError
-            Something else than axes, axes in the plane for movements in space or the reverse, or axes for movements
-            of more than three dimensions.
-        """
-        from kineme.primitives.rollout_figure import draw_rollout, draw_rollout_into
-
-        what = (self.times, self.positions, self.axis_names, self.labels)
-        if ax is None:
-            return draw_rollout(*what)
-        draw_rollout_into(ax, *what)
-        return ax
-
-    def to_dataframe(self) -> Any:
-        """All samples in one long table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            One row per sample, with the columns ``movement`` (its number), ``label`` (None without one), ``time`` [s]
-            and one per dimension, named as `axis_names`.
-
-        Raises
-        ------
-        DataError
-            The package pandas is not installed.
-        """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise DataError("expected the package pandas for a data frame; pip install pandas") from error
-        n, n_samples, d = self.positions.shape
-        labels = np.full(n, None) if self.labels is None else self.labels
-        columns = {
-            "movement": np.repeat(np.arange(n), n_samples),
-            "label": np.repeat(labels, n_samples),
-            "time": self.times.ravel(),
-        }
-        flat = self.positions.reshape(-1, d)
-        return pd.DataFrame(columns | {name: flat[:, k] for k, name in enumerate(self.axis_names)})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,20 @@ from kineme.comparison.references import IndexedMovements, References
 from kineme.comparison.scores import Compared, for_compared
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import Label
-from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.output.table import Table, data_frame, to_html
 from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import RULES, Calibration
 from kineme.recognition.transform import Transform, map_onto
 from kineme.validation import Array
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _SHOWN = 3  # demonstrations named in an answer
+_LISTED = 10  # classes that a notebook shows
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,64 @@ class Answer:
     def promise(self) -> str:
         """What the rule says of known movements that are called unknown, in one sentence."""
         return RULES[self.rule]
+
+    @property
+    def in_words(self) -> str:
+        """The label and how sure it is, or what the movement is most like if it is unknown."""
+        if self.label is None:
+            return f"unknown, most like {self.ranked[0]}"
+        return f"{self.label}, confidence {self.confidence:.2f}"
+
+    def to_pandas(self) -> Any:
+        """Return the answer as a table of one row: ``pandas.concat(one.to_pandas() for one in answers)`` joins many.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns ``label`` (None if unknown), ``confidence``, ``p_known``, ``rule``, ``calibrated``,
+            ``most_like`` (the best-ranked class), ``nearest`` (index of the nearest demonstration), ``nearest_name``,
+            ``similarity``, ``angle`` [rad] and ``duration_ratio``.
+
+        Raises
+        ------
+        DataError
+            The package pandas is not installed.
+        """
+        nearest = self.nearest[0]
+        row = {name: getattr(self, name) for name in ("label", "confidence", "p_known", "rule", "calibrated")}
+        row |= {"most_like": self.ranked[0], "nearest": nearest.index, "nearest_name": nearest.name}
+        row |= {"similarity": nearest.similarity, "angle": self.transform.angle}
+        row["duration_ratio"] = self.transform.duration_ratio
+        return data_frame({name: [value] for name, value in row.items()})
+
+    def plot(self, movement: MovementLike | None = None, demonstrations: MovementsLike | None = None) -> Figure:
+        """Draw the p-values of the first ten classes, and the share of each representation in the similarity.
+
+        Parameters
+        ----------
+        movement : Trajectory or array, optional
+            What was recognized: it is drawn beside the nearest demonstration, which is mapped onto it by `transform`.
+        demonstrations : MovementsLike, optional
+            Those of the recognizer, ``recognizer.demonstrations_``, which `nearest` counts.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            ``figure.savefig("answer.png")`` writes it to a file; see `Demonstrations.plot` for ``plt.show()``.
+
+        Raises
+        ------
+        SpecificationError
+            One of the two alone, another number of dimensions, or demonstrations of another recognizer.
+        """
+        from kineme.recognition.answer_figure import draw_answer
+
+        return draw_answer(self, movement, demonstrations)
+
+    def _repr_html_(self) -> str:
+        """Show the first ten classes in a notebook; names are escaped."""
+        rows = [(str(label), f"{self.p_values[label]:.2g}") for label in self.ranked[:_LISTED]]
+        return to_html(Table(self.in_words, ("class", "p-value"), rows, self.promise))
 
     def __repr__(self) -> str:
         sure = f"confidence={self.confidence:.3g}, rule={self.rule!r}, calibrated={self.calibrated}"

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
-from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.channel import Channels, recorded_names
 from kineme.movements.trajectories.collect import collect_arrays, collect_trajectories
 from kineme.movements.trajectories.data_frames import collect_data_frames, frames_of, is_data_frame
 from kineme.movements.trajectories.indexing import as_indices
 from kineme.movements.trajectories.labels import label_array
-from kineme.movements.trajectories.movements import Movements
+from kineme.movements.trajectories.movements import Movements, axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
+from kineme.movements.trajectories.presented import Presented, Samples, with_units
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import Array, describe
 
@@ -27,7 +28,7 @@ _NESTED = 8  # records around movements; more are a mistake, such as a stand-in 
 _ARRAYS = {np.ndarray, list, tuple, float, int}  # what lists of arrays hold
 
 
-class Demonstrations(Sequence[Trajectory]):
+class Demonstrations(Presented, Sequence[Trajectory]):
     """An immutable sequence of `Trajectory`, stored as one block so that batch work never loops in Python.
 
     Parameters
@@ -237,6 +238,12 @@ class Demonstrations(Sequence[Trajectory]):
     def even_length(self) -> int | None:
         """The common number of samples when all movements have it and are evenly sampled, else None."""
         return self.movements.even_length
+
+    @property
+    def _samples(self) -> Samples:
+        names = with_units(self.dimensions or tuple(axis_names(self.n_dims)), self.channels)
+        heads = names if self.channels is None else with_units(recorded_names(self.channels), self.channels)
+        return Samples(self.times, self.offsets, self.positions, names, self.recorded, heads, self.labels)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, overload
 from numpy.typing import NDArray
 
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.presented import Presented, Samples
 from kineme.movements.trajectories.trajectory import Trajectory
 
 
-class MovementSequence:
+class MovementSequence(Presented):
     """A sequence of the movements in `demonstrations`, a field or property of the subclass."""
 
     if TYPE_CHECKING:  # read-only here
@@ -20,6 +21,10 @@ class MovementSequence:
         def demonstrations(self) -> Demonstrations:
             """The movements."""
             ...
+
+    @property
+    def _samples(self) -> Samples:
+        return self.demonstrations._samples
 
     def __iter__(self) -> Iterator[Trajectory]:
         return iter(self.demonstrations)

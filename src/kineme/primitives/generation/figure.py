@@ -11,12 +11,12 @@ from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
 from kineme.files.write_movement import Columns
+from kineme.movements.trajectories.figure import set_equal_scales
 from kineme.output.figures import BLUE, GRAY, GREEN, ORANGE, new_figure
 from kineme.output.text import drawable
 from kineme.primitives.generation.deviation import largest_deviation
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
-from kineme.primitives.rollout_figure import set_equal_scales
 from kineme.validation import Array
 
 _LONGEST = 14  # characters of a name beside its axes

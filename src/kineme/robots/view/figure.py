@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from kineme.movements.trajectories.figure import set_equal_scales
 from kineme.output.figures import BLUE, GRAY, ORANGE, new_figure
 from kineme.output.text import drawable
-from kineme.primitives.rollout_figure import set_equal_scales
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.planning.robot_movement import RobotMovement
 

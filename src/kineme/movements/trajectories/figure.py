@@ -1,4 +1,4 @@
-"""A figure of generated movements."""
+"""Figures of movements, recorded or generated."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _START, _END = ("o", 4), ("*", 8)  # markers and their sizes
 class _Drawn(NamedTuple):
     """The movements that are drawn, and how."""
 
-    times: Array  # (k, T)
-    positions: Array  # (k, T, d)
+    times: list[Array]  # k arrays (T_i,)
+    positions: list[Array]  # k arrays (T_i, d)
     axis_names: Sequence[str]
     colors: list[Any]
     alpha: float
@@ -38,47 +38,66 @@ class _Drawn(NamedTuple):
     title: str  # empty if all are drawn
 
 
-def draw_rollout(times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None) -> Figure:
+class Paths(NamedTuple):
+    """Movements to draw, one after the other: times (total,), positions (total, d), offsets (n + 1,), names, labels."""
+
+    times: Array
+    positions: Array
+    offsets: NDArray[np.intp]
+    axis_names: Sequence[str]
+    labels: NDArray[Any] | None
+
+    @property
+    def n_dims(self) -> int:
+        """Number of dimensions d."""
+        return int(self.positions.shape[1])
+
+
+def draw_movements(paths: Paths) -> Figure:
     """Each dimension over time, and the path where it has two or three dimensions.
 
-    Parameters
-    ----------
-    times : ndarray of shape (n, T)
-    positions : ndarray of shape (n, T, d)
-    axis_names : sequence of d str
-    labels : ndarray of shape (n,) or None
-        Each label has its color, named in a legend; with more than 30 labels all movements have one color.
+    Each label has its color, named in a legend; with more than 30 labels all movements have one color.
     """
-    d = positions.shape[2]
-    has_path, n_rows = d in (2, 3), min(d, _ROWS)
     with matplotlib.rc_context():  # the style is this figure's, and none of what the caller draws next
-        drawn = _choose(times, positions, axis_names, labels)
-        key = drawn.key + (_ends() if has_path else [])
-        figure = figure_to_show(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * (len(key) // _IN_A_ROW))
-        over_time: Figure | SubFigure = figure
-        if has_path:
-            left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
-            path_axes: Any = left.subplots(subplot_kw=None if d == 2 else {"projection": "3d"})
-            _draw_paths(path_axes, drawn)
-            set_equal_scales(path_axes, drawn.positions.reshape(-1, d))
-        _draw_over_time(over_time, drawn, n_rows)
-        figure.suptitle(drawn.title, fontsize=9)
-        if key:
-            figure.legend(handles=key, loc="outside lower center", ncols=min(len(key), _IN_A_ROW))
+        drawn = _choose(paths)
+        n_rows, n_entries = min(paths.n_dims, _ROWS), len(_key(drawn))
+        figure = figure_to_show(7.2, max(3.2, 1.0 + 0.95 * n_rows) + 0.2 * (n_entries // _IN_A_ROW))
+        _draw(figure, drawn)
     return figure
 
 
-def draw_rollout_into(
-    axes: Axes, times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None
-) -> None:
-    """The path, or the only dimension over time, in axes of the caller's; parameters as for `draw_rollout`.
+def draw_movements_beside(figure: SubFigure, paths: Paths) -> None:
+    """The same as a part of a figure."""
+    _draw(figure, _choose(paths))
+
+
+def _draw(figure: Figure | SubFigure, drawn: _Drawn) -> None:
+    d, over_time = len(drawn.axis_names), figure
+    if d in (2, 3):
+        left, over_time = figure.subfigures(1, 2, width_ratios=(1, 1.1))  # type: ignore[misc]
+        path_axes: Any = left.subplots(subplot_kw=None if d == 2 else {"projection": "3d"})
+        _draw_paths(path_axes, drawn)
+        set_equal_scales(path_axes, np.concatenate(drawn.positions))
+    _draw_over_time(over_time, drawn, min(d, _ROWS))
+    figure.suptitle(drawn.title, fontsize=9)
+    if key := _key(drawn):
+        figure.legend(handles=key, loc="outside lower center", ncols=min(len(key), _IN_A_ROW))
+
+
+def _key(drawn: _Drawn) -> list[Any]:
+    """Entries of the legend."""
+    return drawn.key + (_ends() if len(drawn.axis_names) in (2, 3) else [])
+
+
+def draw_movements_into(axes: Axes, paths: Paths) -> None:
+    """The path, or the only dimension over time, in axes of the caller's.
 
     Raises
     ------
     SpecificationError
         No axes of matplotlib, axes in the plane for a movement in space or the reverse, or more than three dimensions.
     """
-    d = positions.shape[2]
+    d = paths.n_dims
     if not isinstance(axes, Axes):
         raise SpecificationError(f"expected ax to be an Axes of matplotlib, got {type(axes).__name__}; write plt.gca()")
     if d > 3:
@@ -86,7 +105,7 @@ def draw_rollout_into(
     if (axes.name == "3d") != (d == 3):
         projection = 'subplot_kw={"projection": "3d"}' if d == 3 else "no projection"
         raise SpecificationError(f"expected ax with {projection} for {d} dimensions, got projection {axes.name!r}")
-    drawn = _choose(times, positions, axis_names, labels)
+    drawn = _choose(paths)
     if d == 1:
         _draw_dimension(axes, drawn, 0)
         axes.set_xlabel("time [s]")
@@ -94,21 +113,22 @@ def draw_rollout_into(
         _draw_paths(axes, drawn)
     if drawn.title:
         axes.set_title(drawn.title)
-    if key := drawn.key + (_ends() if d > 1 else []):
+    if key := _key(drawn):
         axes.legend(handles=key)
 
 
-def _choose(times: Array, positions: Array, axis_names: Sequence[str], labels: NDArray[Any] | None) -> _Drawn:
-    n = len(positions)
+def _choose(paths: Paths) -> _Drawn:
+    n, labels = len(paths.offsets) - 1, paths.labels
     chosen = np.arange(0, n, math.ceil(n / _MOST))
+    rows = [slice(paths.offsets[i], paths.offsets[i + 1]) for i in chosen]
     distinct = [] if labels is None else list(dict.fromkeys(labels[chosen].tolist()))
     palette = _palette(len(distinct))
     of_label = dict(zip(distinct, palette, strict=False))
     colors = [palette[0]] * len(chosen) if labels is None else [of_label[label] for label in labels[chosen].tolist()]
     return _Drawn(
-        times[chosen],
-        positions[chosen],
-        axis_names,
+        [paths.times[one] for one in rows],
+        [paths.positions[one] for one in rows],
+        list(map(drawable, paths.axis_names)),
         colors,
         1.0 if len(chosen) < 10 else 0.5,
         [_entry(drawable(str(label)), color) for label, color in of_label.items() if 1 < len(distinct) <= _NAMED],
@@ -124,7 +144,7 @@ def _palette(n: int) -> list[Any]:
 
 
 def _draw_over_time(figure: Figure | SubFigure, drawn: _Drawn, n_rows: int) -> None:
-    d = drawn.positions.shape[2]
+    d = len(drawn.axis_names)
     grid = figure.subplots(n_rows, math.ceil(d / n_rows), sharex=True, squeeze=False).T.ravel()
     for k, axes in enumerate(grid[:d]):
         _draw_dimension(axes, drawn, k)
@@ -137,8 +157,8 @@ def _draw_over_time(figure: Figure | SubFigure, drawn: _Drawn, n_rows: int) -> N
 
 
 def _draw_dimension(axes: Axes, drawn: _Drawn, k: int) -> None:
-    for times, x, color in zip(drawn.times, drawn.positions[:, :, k], drawn.colors, strict=True):
-        axes.plot(times, x, color=color, alpha=drawn.alpha)
+    for times, path, color in zip(drawn.times, drawn.positions, drawn.colors, strict=True):
+        axes.plot(times, path[:, k], color=color, alpha=drawn.alpha)
     axes.set_ylabel(drawn.axis_names[k])
 
 
