@@ -80,9 +80,9 @@ def test_a_missing_number_costs_its_movement_or_its_sample():
     broken = [dict(one) for one in SAMPLES]
     broken[3]["x"] = None
     del broken[4]["y"]
-    with pytest.raises(DataError, match="expected finite positions"):
-        read_json(broken)
-    assert read_json(broken, skip="sample").demonstrations.lengths.tolist() == [8]
+    with pytest.raises(DataError, match="got nothing in 10 % of the samples, 10 % of 'y'"):
+        read_json(broken, fill_gaps=0)
+    assert read_json(broken, skip="sample", fill_gaps=0).demonstrations.lengths.tolist() == [8]
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,7 @@ class Heads(click.ParamType):  # type: ignore[type-arg]
         """The columns."""
         if isinstance(value, tuple):
             return value
-        return tuple(part.strip() for row in csv.reader([value], skipinitialspace=True) for part in row)
+        return tuple(part.strip() for row in csv.reader([value], skipinitialspace=True) for part in row or [""])
 
 
 class Kind(click.ParamType):  # type: ignore[type-arg]
