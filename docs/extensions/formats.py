@@ -22,8 +22,10 @@ _READ = {
     ".mat": ("MATLAB up to version 7.2; the name of the file is the label", ""),
     ".h5 .hdf5": ("HDF5, a data set or group for each movement; MATLAB from 7.3", "hdf5"),
     ".bvh": ("skeletons in motion: positions and rotations of joints", ""),
-    ".c3d": ("markers of motion capture, binary", "mocap"),
+    ".c3d": ("markers of motion capture, or rotations of segments, binary", "mocap"),
     ".trc": ("markers of motion capture, text", ""),
+    ".mot .sto": ("coordinates, markers and orientations of OpenSim and OpenSense", ""),
+    ".mvnx": ("segments and joints of Xsens MVN", ""),
     ".bag .db3 .mcap": ("bags of ROS 1 and ROS 2, by topic or by frame", "ros"),
 }  # fmt: skip
 _FOLDERS = {"meta/info.json": ("data sets of LeRobot", "parquet"), "metadata.yaml": ("bags of ROS 2", "ros")}

@@ -121,6 +121,26 @@ def _qualisys():
     return (head + "\n".join(f"{k}\t1\t2\t{k * k}\t0.5\t0" for k in range(N_SAMPLES))).encode()
 
 
+def _storage():
+    head = "DataRate=60\nDataType=Quaternion\nversion=3\nOpenSimVersion=4.4\nendheader\ntime\thip_imu\n"
+    return (head + "\n".join(f"{k / 60}\t1,0,{k / 100},0" for k in range(N_SAMPLES))).encode()
+
+
+def _motion():
+    head = f"Coordinates\nversion=1\nnRows={N_SAMPLES}\nnColumns=3\ninDegrees=yes\nendheader\ntime\thip\tpelvis_tx\n"
+    return (head + "\n".join(f"{k / 60}\t{k}\t{k * k}" for k in range(N_SAMPLES))).encode()
+
+
+def _mvnx():
+    head = '<?xml version="1.0"?><mvnx><subject frameRate="60"><segments><segment label="Hip"/></segments><frames>'
+    frames = "".join(
+        f'<frame time="{17 * k}" type="normal"><orientation>1 0 0 0</orientation>'
+        f"<position>{k} {k * k} 1</position></frame>"
+        for k in range(N_SAMPLES)
+    )
+    return f"{head}{frames}</frames></subject></mvnx>".encode()
+
+
 def _trc():
     head = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n100\tmm\nFrame#\tTime\tone\t\t\n\t\tX1\tY1\tZ1\n\n"
     return (head + "\n".join(f"{k}\t{k / 100}\t{k}\t{k * k}\t1" for k in range(N_SAMPLES))).encode()
@@ -279,6 +299,9 @@ def samples():
         "motive.csv": _motive(),
         "qualisys.tsv": _qualisys(),
         "markers.trc": _trc(),
+        "imu.sto": _storage(),
+        "walk.mot": _motion(),
+        "suit.mvnx": _mvnx(),
         "units.csv": b"time,x\nms,mm\n" + b"".join(b"%d,%d\n" % (10 * k, k * k) for k in range(N_SAMPLES)),
         **_optional(("robomimic.hdf5", _hdf5), ("points.c3d", _c3d)),
         "vectors.parquet": _vectors(),

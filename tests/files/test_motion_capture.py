@@ -177,6 +177,17 @@ def test_zeros_in_place_of_a_lost_marker_are_a_gap():
     assert everywhere.demonstrations.dimensions == ("Head.x", "Head.y", "Head.z")
 
 
+@pytest.mark.parametrize("zeros", ["0\t0\t0", "0.000\t0.000\t0.000", "\t\t"])
+def test_zeros_and_nothing_in_place_of_a_marker_of_trc_are_a_gap(zeros):
+    whole, lost = trc(), trc()
+    for k in (5, 6):
+        lost = lost.replace(f"\t{k}\t{k * k}\t3\t", f"\t{zeros}\t")
+    found = read(lost, "walk.trc")
+    assert (found.sources[0].filled, found.problems) == (2, ())
+    expected = read(whole, "walk.trc").demonstrations.positions
+    np.testing.assert_allclose(found.demonstrations.positions, expected, atol=0.5)
+
+
 def test_qualisys_bodies_are_positions_and_angles():
     found = read(qualisys_bodies(), "a.tsv")
     names = ["Cup.position.x", "Cup.position.y", "Cup.position.z", "Cup.roll", "Cup.pitch", "Cup.yaw"]

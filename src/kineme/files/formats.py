@@ -18,6 +18,7 @@ from kineme.files.lerobot.info import MARKER
 from kineme.files.lerobot.read import lerobot_movements
 from kineme.files.motion_capture.bvh import read_bvh_table
 from kineme.files.motion_capture.c3d import read_c3d_table
+from kineme.files.motion_capture.mvnx import read_mvnx_table
 from kineme.files.ros.bag_contents import bag_contents
 from kineme.files.ros.read_bag import read_bag
 from kineme.files.tables.parquet import read_parquet_table
@@ -107,6 +108,10 @@ def _read_c3d(data: bytes, layout: Layout) -> Parsed:
     return table_movements(*read_c3d_table(data, layout), layout, "C3D")
 
 
+def _read_mvnx(data: bytes, layout: Layout) -> Parsed:
+    return table_movements(*read_mvnx_table(data, layout), layout, "MVNX")
+
+
 _BAG = Format(read_path=read_bag, contents=bag_contents)
 
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
@@ -125,6 +130,9 @@ FORMATS: dict[str, Format] = {
     ".bvh": Format(_read_bvh),
     ".c3d": Format(_read_c3d),
     ".trc": Format(_read_text),
+    ".mot": Format(_read_text),
+    ".sto": Format(_read_text),
+    ".mvnx": Format(_read_mvnx),
     ".bag": _BAG,
     ".db3": _BAG,
     ".mcap": _BAG,

@@ -1,4 +1,9 @@
-"""C3D: the points of a motion capture recording; its parameters are read by the package of that name."""
+"""C3D: the points or rotations of a motion capture recording; its parameters are read by the package of that name.
+
+Source: Motion Lab Systems, "The C3D File Format User Guide"; of rotations C-Motion, "ROTATION_DATA_TYPE": for each
+frame and segment 16 numbers of a matrix, column by column, that turns and shifts it, and one that is negative where it
+is unknown.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +22,11 @@ from kineme.movements.tables.parsed import no_lines
 from kineme.movements.tables.table import Table
 
 _STAMP = "time [s]"
+_OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
-    """The positions of all points over time; a sample without its point is NaN.
+    """The positions of all points over time, of a file without points the poses of all segments; what is lost is NaN.
 
     Raises
     ------
@@ -38,32 +44,73 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
             reader = c3d.Reader(io.BytesIO(data))
-            points, names, unit, rate = _content(reader, data)
+            names, values, units, rate = _content(reader, data)
     except DataError:
         raise
     except Exception as error:  # the package raises much on damaged files, even names that it did not assign
         raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
-    heads = (_STAMP, *(f"{name}.{axis}" for name in without_common_subject(names) for axis in "xyz"))
+    heads = (_STAMP, *names)
     roles = choose_roles(heads, ("number",) * len(heads), layout)
-    columns = [np.arange(len(points)) / rate, *points.reshape(len(points), -1).T]
-    units = ("s", *(unit for _ in heads[1:]))
-    return Table(heads, columns, len(points), no_lines, measured_in=units), roles
+    columns = [np.arange(len(values)) / rate, *values.T]
+    return Table(heads, columns, len(values), no_lines, measured_in=("s", *units)), roles
 
 
-def _content(reader: Any, data: bytes) -> tuple[Any, list[str], str, float]:
-    """Points (T, n, 3), their names, the unit of their positions, and the rate [Hz]."""
+def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float]:
+    """Names of the columns, their values (T, d), their units, and the rate [Hz]."""
     count, rate = int(reader.point_used), float(reader.point_rate)
     n_frames = int(reader.last_frame) - int(reader.first_frame) + 1
+    unit = reader.get("POINT:UNITS")
+    length = unit.string_value.strip() if unit is not None else ""
+    if count < 1 and n_frames > 0 and reader.get("ROTATION:USED") is not None:
+        return _rotations(reader, data, n_frames, length)
     if count < 1 or n_frames < 1 or not 0 < rate < float("inf"):
         raise DataError(
             f"expected points over time in a C3D file, got {count} points and {n_frames} frames at {rate:g} Hz"
         )
     check_expanded(40 * count * n_frames)
     points = _points(reader, data, count, n_frames)
-    labels = [label.strip() for label in reader.point_labels][:count]
-    names = [label or f"point {k}" for k, label in enumerate([*labels, *[""] * (count - len(labels))], 1)]
-    unit = reader.get("POINT:UNITS")
-    return points, names, unit.string_value.strip() if unit is not None else "", rate
+    names = without_common_subject(_names(reader.point_labels, count, "point"))
+    heads = [f"{name}.{axis}" for name in names for axis in "xyz"]
+    return heads, points.reshape(n_frames, -1), [length] * len(heads), rate
+
+
+def _names(labels: Any, count: int, what: str) -> list[str]:
+    """A name for each of so many points or segments, numbered where the file has none."""
+    known = [label.strip() for label in labels][:count]
+    return [label or f"{what} {k}" for k, label in enumerate([*known, *[""] * (count - len(known))], 1)]
+
+
+def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[list[str], Any, list[str], float]:
+    """Positions and orientations of segments, as `_content`; NaN where a matrix is unknown or no rotation."""
+    said = {name: reader.get(f"ROTATION:{name}") for name in ("USED", "DATA_START", "RATIO", "RATE", "LABELS")}
+    count, block = (0 if said[name] is None else said[name].int16_value for name in ("USED", "DATA_START"))
+    ratio = 1 if said["RATIO"] is None else max(1, said["RATIO"].int16_value)
+    rate = float(reader.point_rate) * ratio
+    rate = rate if rate > 0 or said["RATE"] is None else said["RATE"].float_value
+    if count < 1 or not 0 < rate < float("inf"):
+        raise DataError(f"expected points or rotations over time in a C3D file, got {count} rotations at {rate:g} Hz")
+    n_samples, start = n_frames * ratio, (block - 1) * 512
+    check_expanded(3 * 8 * 17 * count * n_samples)
+    if not 0 < start <= len(data) - 4 * 17 * count * n_samples:
+        raise DataError(f"expected {n_samples} samples of {count} rotations in a C3D file, got fewer: a truncated file")
+    dtype = np.dtype(reader._dtypes.float32)
+    words = np.frombuffer(data, dtype, 17 * count * n_samples, start).reshape(n_samples * count, 17).astype(np.float64)
+    poses = words[:, :16].reshape(-1, 4, 4).transpose(0, 2, 1)
+    turns = poses[:, :3, :3]
+    with np.errstate(invalid="ignore", over="ignore"):
+        off = np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+        known = (words[:, 16] >= 0) & (off < _OFF) & (np.linalg.det(turns) > 0)
+    values = np.full((len(poses), 7), np.nan)
+    if known.any():
+        from scipy.spatial.transform import Rotation
+
+        values[known, :3] = poses[known, :3, 3]
+        values[known, 3:] = Rotation.from_matrix(turns[known]).as_quat(scalar_first=True)
+    labels = [] if said["LABELS"] is None else np.ravel(said["LABELS"].string_array).tolist()
+    names = [name.removesuffix("_4X4") for name in without_common_subject(_names(labels, count, "segment"))]
+    ends = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
+    heads = [f"{name}.{end}" for name in names for end in ends]
+    return heads, values.reshape(n_samples, -1), [*[length] * 3, *[""] * 4] * count, rate
 
 
 def _points(reader: Any, data: bytes, count: int, n_frames: int) -> Any:
@@ -85,5 +132,5 @@ def _points(reader: Any, data: bytes, count: int, n_frames: int) -> Any:
         )
     words = np.frombuffer(data, dtype, n_frames * wide, start).reshape(n_frames, wide)[:, : 4 * count]
     values = words.reshape(n_frames, count, 4).astype(np.float64)
-    lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2)
+    lost = (values[:, :, 3] < 0) | ~np.isfinite(values).all(axis=2) | (values[:, :, :3] == 0).all(axis=2)
     return np.where(lost[:, :, None], np.nan, values[:, :, :3] * (1.0 if is_float else abs(reader.point_scale)))

@@ -15,7 +15,8 @@ class ExportHead(NamedTuple):
     ----------
     maker : str
         Such as ``"OptiTrack"``.
-    separator : str
+    separator : str or None
+        None: blanks.
     heads : tuple of str
         One per column; empty for columns that are not coordinates, such as residuals.
     measured_in : tuple of str
@@ -28,16 +29,19 @@ class ExportHead(NamedTuple):
         Samples per second, where the head says it.
     zeros_are_gaps : bool
         Whether three zeros in place of a marker mean that it was not found.
+    packed : bool
+        Whether cells hold several numbers between commas; `heads` has one for each number.
     """
 
     maker: str
-    separator: str
+    separator: str | None
     heads: tuple[str, ...]
     measured_in: tuple[str, ...]
     first: int
     end: int | None = None
     rate: float | None = None
     zeros_are_gaps: bool = False
+    packed: bool = False
 
     @property
     def is_timed(self) -> bool:

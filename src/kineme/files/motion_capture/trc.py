@@ -37,4 +37,5 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
     heads = ("frame", "time [s]", *columns[2:])
     measured_in = ("", "s", *(unit if head else "" for head in heads[2:]))
     first_sample = 5 if any(cells_of(lines[5], separator)) else 6
-    return ExportHead("TRC", separator, heads, measured_in, first_sample, None, positive(said.get("datarate", "")))
+    rate = positive(said.get("datarate", ""))
+    return ExportHead("TRC", separator, heads, measured_in, first_sample, None, rate, zeros_are_gaps=True)

@@ -11,6 +11,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.files.motion_capture.export_heads import STAMP, ExportHead
+from kineme.files.motion_capture.opensim import opensim_head
 from kineme.files.motion_capture.optitrack import optitrack_head
 from kineme.files.motion_capture.qualisys import qualisys_head
 from kineme.files.motion_capture.trc import trc_head
@@ -20,7 +21,13 @@ from kineme.movements.tables.table import Table
 
 _HEAD_LINES = 400  # of an export with a head of its own, at most
 _FIRST = 3  # lines among which the first line of an export is
-_MAKERS = {"OptiTrack": optitrack_head, "Vicon": vicon_head, "Qualisys": qualisys_head, "TRC": trc_head}
+_MAKERS = {
+    "OptiTrack": optitrack_head,
+    "Vicon": vicon_head,
+    "Qualisys": qualisys_head,
+    "TRC": trc_head,
+    "OpenSim": opensim_head,
+}
 _LINE = 100  # bytes of a line in Python, beside its characters
 _SAMPLES = 5  # in which decimal commas are looked for
 _ROUNDED = 1e-5  # s by which written times may differ from those of frames at the rate
@@ -46,7 +53,9 @@ def export_head(lines: Iterable[str], n_bytes: int) -> tuple[ExportHead, Dialect
         raise DataError(f"expected samples below the heads of a {head.maker} export, got none")
     wide = max(0, len(rows[0]) - len(head.heads))
     heads, units = ((*given, *[""] * wide) for given in (head.heads, head.measured_in))
-    comma = head.separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in rows for cell in row)
+    comma = (
+        not head.packed and head.separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in rows for cell in row)
+    )
     kinds = ("number",) * len(heads)
     return head, Dialect(head.separator, comma, heads, True, head.first, kinds, units, head.end)
 

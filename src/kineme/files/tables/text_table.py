@@ -80,6 +80,7 @@ def _with_names_of_joints(heads: tuple[str, ...], columns: Sequence[Any]) -> tup
 def _read_export(data: bytes, encoding: str, export: tuple[ExportHead, Dialect], layout: Layout) -> tuple[Table, Roles]:
     """Read the text export of a motion capture system; the rate in its head becomes time stamps."""
     head, dialect = export
+    data = data.replace(b",", b"\t") if head.packed else data
     _check_memory(data, dialect)
     heads, kinds, measured_in = with_times(head, dialect)
     roles = choose_roles(heads, kinds, layout)

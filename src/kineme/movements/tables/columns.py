@@ -302,6 +302,8 @@ def _says_nothing_new(head: str, plain: set[str]) -> bool:
     counts = words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS
     if counts or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
         return True
+    if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states
+        return True
     derived = _DERIVATIVE.fullmatch(_plain(head))
     if derived is None:  # of the state of a joint: field.velocity0 beside field.position0
         states = {_JOINT_STATE.sub(what, _plain(head)) for what in ("position", "positions")}
