@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import select
+import shutil
 import subprocess
 import sys
 import time
@@ -17,13 +18,19 @@ import kineme
 KINDS = ["CShape", "GShape", "NShape", "Sine"]
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """Movements without labels."""
-    demos = kineme.load_lasa(KINDS)
-    with kineme.ActionLibrary(tmp_path / "actions", create=True) as library:
+@pytest.fixture(scope="module")
+def unlabeled(tmp_path_factory):
+    """A library of movements without labels, which no test changes."""
+    demos, folder = kineme.load_lasa(KINDS), tmp_path_factory.mktemp("anchor") / "actions"
+    with kineme.ActionLibrary(folder, create=True) as library:
         library.learn(demos, [None] * len(demos))
-    return tmp_path / "actions"
+        library.propose()  # what it computes is stored beside the movements
+    return folder
+
+
+@pytest.fixture
+def folder(unlabeled, tmp_path):
+    return shutil.copytree(unlabeled, tmp_path / "actions")
 
 
 def test_without_a_choice_it_only_lists(folder, tmp_path):
