@@ -65,7 +65,7 @@ ros2: .venv-ros2/ready
 	touch $@
 
 soak: $(DEV)/ready
-	$(DEV)/bin/pytest soak -p no:cacheprovider
+	KINEME_SOAK=1 $(DEV)/bin/pytest soak tests/studio/test_runtime.py -p no:cacheprovider
 
 fuzz: $(DEV)/ready
 	$(DEV)/bin/pytest fuzz -p no:cacheprovider

@@ -59,6 +59,11 @@ def one_in(n, demos, first=0):
     return (np.arange(len(demos)) - first) % 7 < n
 
 
+def repeated(*values):
+    """Parameters whose values are each tried with others already: `make soak` tries them together, too."""
+    return pytest.param(*values, marks=pytest.mark.skipif("KINEME_SOAK" not in os.environ, reason="make soak tries it"))
+
+
 class Case(NamedTuple):
     """A snapshot, questions to the runtime about it, and what Python says to each."""
 
@@ -91,8 +96,11 @@ def compare_answers(case, runtime=RUNTIME):
     return worst
 
 
-@pytest.mark.parametrize("shots", [1, 3])
-@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+@pytest.mark.parametrize(
+    ("space", "shots"),
+    [(False, 3), (True, 1), repeated(False, 1), repeated(True, 3)],
+    ids=["plane-3", "space-1", "plane-1", "space-3"],
+)
 def test_handwriting_is_recognized_as_in_python(shots, space):
     """312 to 208 movements each: held out, and perturbed; some of them unknown."""
     demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
@@ -207,8 +215,18 @@ def every_tenth(movements):
     return [kineme.Trajectory(one.times[::10], one.positions[::10]) for one in movements]
 
 
-@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
-@pytest.mark.parametrize("settings", [{}, {"max_angle": 0.0}, {"translation": False}], ids=str)
+@pytest.mark.parametrize(
+    ("space", "settings"),
+    [
+        (False, {}),
+        (True, {}),
+        (True, {"max_angle": 0.0}),
+        (False, {"translation": False}),
+        repeated(False, {"max_angle": 0.0}),
+        repeated(True, {"translation": False}),
+    ],
+    ids=str,
+)
 def test_movements_under_way_are_recognized_as_in_python(space, settings):
     demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
     recognizer = kineme.Recognizer(**settings).fit(demos[one_in(2, demos)])
@@ -250,8 +268,19 @@ def compare_rollouts(case, runtime=RUNTIME):
 
 
 @pytest.mark.filterwarnings("ignore::kineme.errors.ExtrapolationWarning")  # via points far away are asked for, too
-@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
-@pytest.mark.parametrize("formulation", ["bio-inspired", "original", "amplitude-scaled", "decoupled"])
+@pytest.mark.parametrize(
+    ("space", "formulation"),
+    [
+        (False, "bio-inspired"),
+        (True, "original"),
+        (False, "amplitude-scaled"),
+        (True, "decoupled"),
+        repeated(True, "bio-inspired"),
+        repeated(False, "original"),
+        repeated(True, "amplitude-scaled"),
+        repeated(False, "decoupled"),
+    ],
+)
 def test_movements_to_new_goals_are_those_of_python(space, formulation):
     demos = lifted(kineme.load_lasa()) if space else kineme.load_lasa()
     assert compare_rollouts(rollouts_of(demos[one_in(1, demos)], formulation)) <= MOVED
