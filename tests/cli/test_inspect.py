@@ -152,3 +152,17 @@ def test_movements_that_cannot_be_compared_are_no_error(tmp_path):
     done = run(tmp_path)
     assert done.returncode == 0, done.stderr
     assert "outliers were not looked for: expected training movements that differ" in done.stdout
+
+
+def test_lines_and_blocks_are_movements():
+    rows = "".join(f"{k % 2},{','.join(str(k + i * i / 7) for i in range(12))}\n" for k in range(6))
+    data = json.loads(run("-", "--rows", "--columns", "x,y", "--units", "0.1", "--json", input=rows).stdout)
+    assert [(one["label"], one["movements"], one["duration"]["median"]) for one in data["labels"]] == [
+        ("0", 3, pytest.approx(0.5)),
+        ("1", 3, pytest.approx(0.5)),
+    ]
+    log = "aX,aY\n" + "".join(f"{k * k},{100 - k}\n" for k in range(40))
+    assert run("-", "--every", "10", "--units", "0.01", input=log).stdout.startswith("4 movements of 2 dimensions")
+    done = run("-", "--every", "11", "--units", "0.01", input=log)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "expected blocks of 11 samples, got 40 samples: 3 blocks and 7 more" in done.stderr

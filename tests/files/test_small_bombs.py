@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import kineme
-from kineme.files.recordings import read_recordings_from_bytes
 from kineme.movements.tables.layout import Layout
 from limited_child import MIB, LimitedChild
 
@@ -40,17 +39,6 @@ def test_many_lines_with_an_empty_cell_are_read_in_seconds_and_an_empty_column_i
     assert outcome.how == "done", outcome
     assert outcome.what.demonstrations.lengths.tolist() == [60_000]
     assert outcome.what.detected[0][0].ignored == ("x",)
-
-
-def test_empty_cells_are_named_by_their_column_beside_numbers_that_are_written_as_nan():
-    rows = ["0,1,2,3", "1,,2,3", "2,2,,", ",3,2,3", "4,nan,2,3", "5,5,2,4"]
-    for lines in (rows, [one for one in rows if "nan" not in one]):
-        data = "\n".join(["time,x,y,z", *lines]).encode()
-        with pytest.raises(kineme.DataError, match="line 3: expected a number in 'x', got nothing; 3 more"):
-            read_recordings_from_bytes(data, "a.csv", Layout())
-    data = "\n".join(["time,x,y,z", "0,1,2,3", "1,1,,3", "2,1,2,", ",4,2,3", *rows[3:]]).encode()
-    with pytest.raises(kineme.DataError, match="line 3: expected a number in 'y', got nothing"):
-        read_recordings_from_bytes(data, "a.csv", Layout())
 
 
 def unwritten(file):

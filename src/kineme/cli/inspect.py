@@ -35,6 +35,8 @@ def inspect(
     the innermost folder is the label. Topics and frames of ROS bags are listed first. Outliers, movements unlike the
     others of their label, are listed last, if there are at least 20 movements, 5 of a label.
 
+    The exit status is 0 if movements were read, whatever else was not, 1 if none were, and 2 for options that are none.
+
     Example: kineme inspect recordings/ --plot recordings.png
     """
     from kineme.errors import DataError
@@ -47,6 +49,7 @@ def inspect(
     files = [one for one in recordings if str(one) != "-"]
     contents = contents_of_all(files, options["follow_links"])
     unlike: tuple[int, ...] = ()
+    recorded: Any = None
     found: dict[str, Any] = {}
     try:
         recorded = read(recordings, options)
@@ -65,6 +68,8 @@ def inspect(
             _draw(recorded, unlike, plot)
     data = as_data(summary) | found | ({"contents": contents_as_data(contents)} if contents else {})
     say(as_json, data, lambda: "\n\n".join([*contents_as_words(contents), *texts]))
+    if recorded is None:
+        click.get_current_context().exit(1)
 
 
 def _outliers(recorded: Any, error_rate: float) -> tuple[tuple[int, ...], dict[str, Any], str]:

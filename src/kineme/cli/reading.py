@@ -125,6 +125,14 @@ layout_options = under(
         "--label-by", type=Level(),
         help="Label by the task of LeRobot, by the innermost folder, or by the folder so many levels up.",
     ),
+    click.option(
+        "--rows", is_flag=True, default=None,
+        help="Each line of a text file is a movement: a label, then x, y, x, y, ... with --columns x,y.",
+    ),
+    click.option(
+        "--every", type=click.IntRange(4), metavar="SAMPLES",
+        help="Samples of a movement, where a file holds one after the other.",
+    ),
     click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
@@ -152,8 +160,9 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     known = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
     how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
-    if known.get("fill_gaps") is None:
-        known.pop("fill_gaps", None)
+    for name in ("fill_gaps", "rows"):  # libraries store what was given
+        if known.get(name) is None:
+            known.pop(name, None)
     if library is not None:
         from kineme.library.recognition.known_sources import known_sources
 

@@ -21,6 +21,7 @@ from kineme.files.motion_capture.c3d import read_c3d_table
 from kineme.files.motion_capture.mvnx import read_mvnx_table
 from kineme.files.ros.bag_contents import bag_contents
 from kineme.files.ros.read_bag import read_bag
+from kineme.files.rows import row_movements, series_movements
 from kineme.files.tables.parquet import read_parquet_table
 from kineme.files.tables.text_table import read_text_table
 from kineme.movements.tables.layout import Layout
@@ -41,12 +42,15 @@ class Format(NamedTuple):
         Whether the name of the file is the label of its movements.
     contents : callable, optional
         What a file holds besides what is read of it, for formats that hold more than one recording.
+    has_lines : bool
+        Whether it is text, of which each line may be a movement.
     """
 
     read_bytes: Callable[[bytes, Layout], Parsed] | None = None
     read_path: Callable[[Path, Layout], Parsed] | None = None
     label_is_stem: bool = False
     contents: Callable[[Path], list[Contents]] | None = None
+    has_lines: bool = False
 
 
 class DataSet(NamedTuple):
@@ -80,6 +84,8 @@ class DataSet(NamedTuple):
 
 
 def _read_text(data: bytes, layout: Layout) -> Parsed:
+    if layout.rows:
+        return row_movements(data, layout)
     return table_movements(*read_text_table(data, layout), layout, "CSV")
 
 
@@ -116,9 +122,10 @@ _BAG = Format(read_path=read_bag, contents=bag_contents)
 
 #: File ending -> format. A reader raises a `DataError` or any `ValueError`, `KeyError` or `TypeError`.
 FORMATS: dict[str, Format] = {
-    ".csv": Format(_read_text),
-    ".tsv": Format(_read_text),
-    ".txt": Format(_read_text),
+    ".csv": Format(_read_text, has_lines=True),
+    ".tsv": Format(_read_text, has_lines=True),
+    ".txt": Format(_read_text, has_lines=True),
+    ".ts": Format(series_movements, has_lines=True),
     ".npz": Format(_read_npz),
     ".json": Format(json_movements),
     ".jsonl": Format(json_lines_movements),

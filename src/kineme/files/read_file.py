@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
+from kineme.files.blocks import in_blocks
 from kineme.files.check_block import check_block
 from kineme.files.folders import OUTSIDE, as_text, leads_out
 from kineme.files.formats import FORMATS, Format, data_set_of
@@ -111,7 +112,10 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
     name = as_text(relative)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is reported later
-            detected, block, left_out = select_columns(parse, layout)
+            if layout.rows and not form.has_lines:
+                raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
+            parsed = select_columns(parse, layout)
+            detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
             block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])

@@ -43,6 +43,8 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     follow_links: bool = False,
     exclude: Column | Sequence[Column] | None = None,
     fill_gaps: float = FILL_GAPS,
+    rows: bool = False,
+    every: int | None = None,
     progress: Progress | None = None,
 ) -> Recordings:
     """Read all movements of a folder, a file, a data set that is a folder, or of several of them.
@@ -101,6 +103,12 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         are interpolated by Akima's cubic polynomials, orientations by turning evenly, and discrete channels keep the
         value before. At its ends a movement is cropped to where all columns have values, unless that would cost half
         of it. `Source` says of each movement what was filled and cropped.
+    rows : bool, default False
+        Whether each line of a text file is one movement: a label, then the coordinates of its samples, one sample after
+        the other. `columns` names the coordinates of a sample, ``("x", "y")`` where a line goes on x, y, x, y, and
+        `label` the column of the label. `units` is the step between samples.
+    every : int, optional
+        Number of samples of a movement, where a file holds one after the other without a mark between them.
     progress : callable, optional
         Wraps the list of files, to show how far the reading is.
 
@@ -114,8 +122,9 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         limit of memory that is no number.
     """
     layout = Layout(
-        time, columns, movement, label, units, skip, kinds, topic, frame, person, exclude=exclude, fill_gaps=fill_gaps
-    )
+        time, columns, movement, label, units, skip, kinds, topic, frame, person,
+        exclude=exclude, fill_gaps=fill_gaps, rows=rows, every=every,
+    )  # fmt: skip
     rule = NameRule(label_pattern, label_by)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
     return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, progress=progress)

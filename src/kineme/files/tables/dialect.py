@@ -122,7 +122,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
         more = len(lines) == _HEAD
         raise DataError(f"expected samples, got {f'none in the first {_HEAD:,} lines' if more else 'an empty file'}")
     kept = _with_names_like_comments(lines, kept)
-    separator = _separator([lines[k] for k in kept[:2]])
+    separator = separator_of([lines[k] for k in kept[:2]])
     cells = [split(lines[k], separator) for k in kept]
     comma = separator != "," and any(COMMA_NUMBER.fullmatch(cell) for row in cells for cell in row)
     named = not _is_sample(cells, comma)
@@ -153,7 +153,7 @@ def _with_names_like_comments(lines: Sequence[str], kept: list[int]) -> list[int
 
     Only if the first cells of all other rows are not numbers; otherwise such a line is a row that was commented out.
     """
-    separator = _separator([lines[kept[0]]])
+    separator = separator_of([lines[kept[0]]])
     if separator is None or len(kept) == len(lines) - kept[0]:  # no line below was skipped
         return kept
     rows = [split(lines[k], separator) for k in kept]
@@ -168,7 +168,8 @@ def _is_row(cells: Sequence[str], n_columns: int, separator: str) -> bool:
     return len(cells) == n_columns and any(is_number(cell, separator != ",") for cell in cells[1:])
 
 
-def _separator(lines: Sequence[str]) -> str | None:
+def separator_of(lines: Sequence[str]) -> str | None:
+    """The mark between cells, by the first lines; None for blanks."""
     for mark in _SEPARATORS:
         if all(mark in line for line in lines):
             return None if mark == "," and all(map(_COMMA_NUMBERS.fullmatch, lines)) else mark

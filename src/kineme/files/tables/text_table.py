@@ -117,6 +117,12 @@ def _check_lines(data: bytes) -> None:
             raise DataError(f"expected lines of at most {LONGEST:,} characters, got a longer one")
 
 
+def lines_of(data: bytes) -> Iterator[str]:
+    """The lines of a text of any encoding that `read_text_table` takes; a `DataError` if it is none."""
+    _check_lines(data)
+    return _lines(data, _encoding(data))
+
+
 def _encoding(data: bytes) -> str:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"

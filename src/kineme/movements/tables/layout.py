@@ -9,7 +9,7 @@ from numbers import Real
 from kineme.errors import SpecificationError
 from kineme.movements.tables.time_stamps import PER_SECOND
 from kineme.units import is_unit_of
-from kineme.validation import check_choice, check_number
+from kineme.validation import MIN_SAMPLES, check_choice, check_count, check_number
 
 Column = str | int  # head, or number counted from 0
 
@@ -76,11 +76,17 @@ class Layout:
         Columns that are left aside, whatever else chooses them; one that a file does not have is no matter to it.
     fill_gaps : float
         Longest gap [s] that is filled, from the value before it to the value after it; 0 fills none.
+    rows : bool
+        Whether each line of a text is a movement, see `kineme.files.rows`; `columns` then name the coordinates
+        of a sample.
+    every : int, optional
+        Number of samples of a movement, where a recording holds one after the other.
 
     Raises
     ------
     SpecificationError
-        An unknown unit or choice, or a gap that is no number of seconds from 0.
+        An unknown unit or choice, a gap that is no number of seconds from 0, blocks of fewer than `MIN_SAMPLES`
+        samples, or columns that rows do not have.
     """
 
     time: Column | None = None
@@ -96,10 +102,18 @@ class Layout:
     known: Known | None = None
     exclude: Column | Sequence[Column] | None = None
     fill_gaps: float = FILL_GAPS
+    rows: bool = False
+    every: int | None = None
 
     def __post_init__(self) -> None:
         check_choice("skip", self.skip, SKIP)
         check_number("fill_gaps", self.fill_gaps, least=0)
+        if self.every is not None:
+            check_count("every", self.every, MIN_SAMPLES)
+        if self.rows and any(one is not None for one in (self.every, self.time, self.movement, self.person)):
+            raise SpecificationError(
+                "expected rows without every, time, movement and person, since each line is a whole movement, got both"
+            )
         if isinstance(self.units, Real) and not isinstance(self.units, bool):
             check_number("units", self.units, above=0)
         elif self.units is not None and not (isinstance(self.units, str) and is_unit_of(self.units, "time")):

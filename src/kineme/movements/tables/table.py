@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -75,8 +75,6 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     texts in them, and with equal labels, are one movement, in any order. With a column of labels or of people alone, a
     new movement begins where they change or the time decreases. Otherwise the table is one movement.
     """
-    if layout.coordinates is None:
-        table, roles = _without_empty(table, roles)
     positions = np.column_stack([table.columns[k] for k in roles.positions])
     times, units, units_from = _times(table, roles, layout)
     _check_clocks(table, roles, times)
@@ -105,19 +103,6 @@ def table_movements(table: Table, roles: Roles, layout: Layout, kind: str) -> Pa
     )
     places = [""] * n if n == 1 and _in_turns(roles) and table.segments is None else keys
     return Parsed(detected, Block(positions, times, offsets, labels, places, rows, table.line_of, table.faults, people))
-
-
-def _without_empty(table: Table, roles: Roles) -> tuple[Table, Roles]:
-    """Leave columns aside that hold no number at all: their lack is no fault of a sample."""
-    empty = {k for k in roles.positions if np.isnan(table.columns[k][:1]).all() and np.isnan(table.columns[k]).all()}
-    if not empty or len(empty) == len(roles.positions):
-        return table, roles
-    reasons = {f"expected a number in {table.heads[k]!r}, got nothing" for k in empty}
-    faults = {row: reason for row, reason in table.faults.items() if reason not in reasons}
-    positions = tuple(k for k in roles.positions if k not in empty)
-    return replace(table, faults=faults), roles._replace(
-        positions=positions, ignored=tuple(sorted({*roles.ignored, *empty}))
-    )
 
 
 def _people(column: NDArray[Any], codes: NDArray[np.intp]) -> list[str | None]:
