@@ -119,7 +119,11 @@ def test_tokens_in_addresses_open_nothing_but_the_page(client):
     assert client.get("/api/library", params={"token": TOKEN}, headers={"Authorization": ""}).status_code == 401
 
 
-NAMES = ["evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example", "", "[", "10.0.0.9"]
+NAMES = [
+    "evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example", "", "[", "10.0.0.9",
+    "evil.example@localhost", "evil.example:8420@127.0.0.1:8420", "localhost@evil.example", "localhost/@evil.example",
+    "localhost:8420:1", "[::1", "localhost#.evil.example", "localhost evil.example",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("host", NAMES)

@@ -10,16 +10,19 @@ from __future__ import annotations
 import hashlib
 import hmac
 import ipaddress
+import re
 import socket
 from collections.abc import Mapping
 from contextlib import suppress
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from kineme.studio.server.refusals import refuse
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
+#: A name or an address, and a port: nothing else, as a user before an @, of which readers differ what the name is.
+_HOST = re.compile(r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[\w.-]+))(?::\d*)?", re.ASCII)
 _FRAMED = "/arm.html"  # the only page that the studio's page shows inside itself
 
 
@@ -71,10 +74,9 @@ class Guard:
         return None
 
     def _is_ours(self, host: str) -> bool:
-        try:
-            name = (urlsplit(f"//{host}").hostname or "").lower()
-        except ValueError:
+        if (parts := _HOST.fullmatch(host)) is None:
             return False
+        name = (parts["address"] or parts["name"]).lower()
         address = _address(name)
         return name in self.names or (address is not None and (self.any_address or address.is_loopback))
 

@@ -60,7 +60,9 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
             f"expected the packages of the studio ({error}); install them with: pip install 'kineme[studio]'"
         ) from error
     from kineme.studio.server.access import own_names
+    from kineme.studio.server.connections import log_errors_once
 
+    log_errors_once()
     token, once = _token(), secrets.token_urlsafe(24)
     with closing(_listening(options)) as listening:
         hosts = () if is_loopback(options.host) else own_names(options.host)
@@ -74,13 +76,17 @@ def serve(options: Options, ready: Callable[[str, str], object]) -> None:
 
 
 def config_of(app: Any) -> Any:
-    """How uvicorn serves the application: quietly, with limited messages, without trust in headers of proxies."""
+    """How uvicorn serves the application: quietly, with limits, without trust in headers of proxies."""
     import uvicorn
+
+    from kineme.studio.server.connections import BACKLOG, LimitedConnection
 
     return uvicorn.Config(
         app,
         log_level=logging.WARNING,
         access_log=False,
+        http=LimitedConnection,
+        backlog=BACKLOG,
         ws="websockets-sansio",
         ws_max_size=_MESSAGE,
         ws_per_message_deflate=False,  # it takes longer than it saves, and a small message can expand to a large one
