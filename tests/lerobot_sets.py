@@ -104,3 +104,33 @@ def write_v2(folder, lengths=(20, 30, 25)):
     rows = [{"task_index": k, "task": task} for k, task in enumerate(TASKS)]
     (folder / "meta" / "tasks.jsonl").write_text("\n".join(map(json.dumps, rows)))
     return folder
+
+
+SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+
+
+def write_so101(folder, states, task, fps=30):
+    """Episodes of an SO-101 (T, 6) in the unit of its driver, which no file says."""
+    import pandas as pd
+
+    names = [f"{joint}.pos" for joint in SO101]
+    lengths = [len(one) for one in states]
+    write_info(folder, "v3.0", lengths, "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet", fps)
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    for name in ("observation.state", "action"):
+        info["features"][name] = {"dtype": "float32", "shape": [6], "names": names}
+    path.write_text(json.dumps(info | {"robot_type": "so101_follower"}))
+    rows = []
+    for k, state in enumerate(states):
+        rows.append(pd.DataFrame(episode_rows(k, len(state), sum(lengths[:k]), fps) | {"task_index": 0}))
+        for name in ("observation.state", "action"):
+            rows[-1][name] = list(state.astype(np.float32))
+    for part in ("data", "meta/episodes"):
+        (folder / part / "chunk-000").mkdir(parents=True)
+    pd.concat(rows).to_parquet(folder / "data/chunk-000/file-000.parquet")
+    episodes = {"episode_index": range(len(states)), "length": lengths, "data/chunk_index": 0, "data/file_index": 0}
+    pd.DataFrame(episodes).to_parquet(folder / "meta/episodes/chunk-000/file-000.parquet")
+    tasks = pd.DataFrame({"task_index": [0]}, index=pd.Index([task], name="task"))
+    tasks.to_parquet(folder / "meta" / "tasks.parquet")
+    return folder

@@ -33,7 +33,7 @@ def test_joints_are_written_with_their_names_and_the_gripper_steps(wave):
     assert result.exit_code == 0, result.output
     assert "self-collision" in result.output
     heads = (wave / "joints.csv").read_text().splitlines()[0].split(",")
-    assert heads[:9] == ["time", *(f"panda_joint{k}" for k in range(1, 8)), "gripper"]
+    assert heads[:9] == ["time", *(f"panda_joint{k} [rad]" for k in range(1, 8)), "gripper"]
     gripper = np.loadtxt(wave / "joints.csv", delimiter=",", skiprows=1)[:, 8]
     assert set(gripper) == {0.0, 1.0}
     assert np.count_nonzero(np.diff(gripper)) == 1

@@ -61,6 +61,29 @@ def test_features_are_chosen_whole_or_by_their_entries(folder):
         kineme.read_recordings(folder, columns="velocity")
 
 
+def test_entries_are_chosen_as_inspect_prints_them(folder):
+    assert kineme.read_recordings(folder).demonstrations.dimensions == tuple(NAMES)
+    one = kineme.read_recordings(folder, columns=[NAMES[2], "action.elbow_flex.pos"]).demonstrations[0]
+    whole = kineme.read_recordings(folder, columns=["observation.state", "action"]).demonstrations[0]
+    np.testing.assert_array_equal(one.positions, whole.positions[:, [2, 4]])
+    with pytest.raises(
+        DataError, match=r"expected a column 'wrist', got the columns \['observation\.state\.shoulder_pan"
+    ):
+        kineme.read_recordings(folder, columns="wrist")
+
+
+def test_units_that_the_description_says_are_those_of_the_columns(folder):
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    info["features"]["observation.state"]["units"] = ["deg", None, "%"]
+    path.write_text(json.dumps(info))
+    one = kineme.read_recordings(folder).demonstrations[0]
+    assert [(channel.name, channel.unit) for channel in one.channels] == [
+        ("shoulder_pan.pos [deg]", "deg"), ("elbow_flex.pos", None), ("gripper.pos [%]", "%"),
+    ]  # fmt: skip
+    assert kineme.read_recordings(folder, columns="shoulder_pan.pos").demonstrations.dimensions[0].endswith("[deg]")
+
+
 def test_without_a_state_the_vector_features_are_listed(folder):
     path = folder / "meta" / "info.json"
     info = json.loads(path.read_text())

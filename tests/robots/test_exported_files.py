@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def test_paths_may_be_texts(trajectory, tmp_path):
     assert write_joints(f"{tmp_path}/joints.csv", trajectory).is_file()
     assert write_action_goal(f"{tmp_path}/goal.json", trajectory).is_file()
     text = (tmp_path / "joints.csv").read_text().splitlines()
-    assert text[0] == "time,a 1e-05,b,v_a 1e-05,v_b,a_a 1e-05,a_b"
+    assert text[0] == "time,a 1e-05 [rad],b [rad],v_a 1e-05 [rad/s],v_b [rad/s],a_a 1e-05 [rad/s^2],a_b [rad/s^2]"
     t = trajectory
     columns = np.column_stack((t.times, t.positions, t.velocities, t.accelerations))
     np.testing.assert_array_equal(np.array([line.split(",") for line in text[1:]], dtype=float), columns)
@@ -58,6 +59,18 @@ def test_the_trajectory_of_a_bag_is_sent_at_its_beginning_and_states_at_their_ti
         sent = [(connection.msgtype, stamp) for connection, stamp, _ in bag.messages()]
     assert sent[0] == ("trajectory_msgs/msg/JointTrajectory", 0)
     assert [stamp for kind, stamp in sent[1:]] == [0, 10**9, 2 * 10**9, 3 * 10**9]
+
+
+@pytest.mark.parametrize("name", ["plan.bag", "plan.mcap"])
+def test_a_bag_says_the_units_in_the_definitions_of_its_types(trajectory, tmp_path, name):
+    rosbags = pytest.importorskip("rosbags.highlevel", reason="the extra ros is not installed")
+    slid = replace(trajectory, units=("rad", "m"))
+    with rosbags.AnyReader([write_bag(tmp_path / name, slid)]) as bag:
+        definitions = [one.msgdef.data for one in bag.connections]
+        messages = [bag.deserialize(raw, one.msgtype) for one, _, raw in bag.messages()]
+    assert len(definitions) == 2
+    assert all(one.startswith("# positions of a 1e-05 [rad], b [m]; velocities per s") for one in definitions)
+    np.testing.assert_array_equal(messages[-1].position, slid.positions[-1])
 
 
 def test_frames_without_end_are_refused_before_they_fill_the_memory(trajectory, tmp_path):

@@ -2,13 +2,14 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import kineme
-from kineme.errors import DataError
+from kineme.errors import DataError, SpecificationError
 from kineme.files.lerobot import write_episode as module
 from kineme.files.lerobot.statistics import merged_statistics, statistics_of
 from kineme.robots.execution.joint_trajectory import JointTrajectory
@@ -38,12 +39,13 @@ def rows(folder):
 def test_episodes_are_read_back_with_their_tasks(folder):
     found = kineme.read_recordings(folder)
     assert (found.labels.tolist(), found.problems) == (["wave", "pour", "wave"], ())
-    assert found.demonstrations.dimensions == ("a", "b", "c", "grip")
+    assert found.demonstrations.dimensions == ("a.pos [deg]", "b.pos [deg]", "c.pos [deg]", "grip")
     assert found.demonstrations.lengths.tolist() == [49, 37, 43]
     for one, n in zip(found.demonstrations, (80, 60, 70), strict=True):
         until = np.minimum(one.times, trajectory(n).duration)
-        expected = np.column_stack((np.sin(until), until**2, np.cos(3 * until), until >= 0.8))
-        np.testing.assert_allclose(one.positions, expected, atol=1e-6)
+        expected = np.column_stack((np.sin(until), until**2, np.cos(3 * until)))
+        np.testing.assert_allclose(one.positions[:, :3], np.degrees(expected), atol=1e-4)
+        np.testing.assert_array_equal(one.positions[:, 3], until >= 0.8)
 
 
 def test_every_row_is_what_lerobot_counts(folder):
@@ -60,9 +62,9 @@ def test_every_row_is_what_lerobot_counts(folder):
     assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, 129, 2)
     assert info["splits"] == {"train": "0:3"}
     known = json.loads((folder / "meta/stats.json").read_text())["observation.state"]
-    np.testing.assert_allclose(known["mean"], state.mean(axis=0), atol=1e-6)
-    np.testing.assert_allclose(known["std"], state.std(axis=0), atol=1e-6)
-    np.testing.assert_allclose(known["max"], state.max(axis=0), atol=1e-6)
+    np.testing.assert_allclose(known["mean"], state.mean(axis=0), rtol=1e-6)  # of single precision
+    np.testing.assert_allclose(known["std"], state.std(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(known["max"], state.max(axis=0), rtol=1e-6)
     assert known["count"] == [129]
     assert pd.read_parquet(folder / "meta/tasks.parquet").index.tolist() == ["wave", "pour"]
 
@@ -134,3 +136,18 @@ def test_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(DataError, match=r"pip install 'kineme\[parquet\]'"):
         write_lerobot(tmp_path / "set", trajectory(), "x")
+
+
+def test_joints_have_the_names_and_units_that_drivers_take(tmp_path):
+    one = replace(trajectory(), units=("rad", "m", "rad"))
+    for units, size in (("deg", 180 / np.pi), ("rad", 1.0)):
+        write_lerobot(tmp_path / units, one, "x", 30, joint_units=units)
+        state = json.loads((tmp_path / units / "meta/info.json").read_text())["features"]["observation.state"]
+        assert state["names"] == ["a.pos", "b.pos", "c.pos", "grip"]
+        assert state["units"] == [units, "m", units, None]
+        last = np.vstack(rows(tmp_path / units)["observation.state"])[-1]
+        np.testing.assert_allclose(last[:3], one.positions[-1] * [size, 1, size], rtol=1e-6)
+    with pytest.raises(SpecificationError, match="expected the robot of the trajectory, with limits of every joint"):
+        write_lerobot(tmp_path / "percent", one, "x", 30, joint_units="percent")
+    with pytest.raises(DataError, match=r"they differ in action, observation\.state"):
+        write_lerobot(tmp_path / "deg", one, "x", 30, joint_units="rad")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import kineme
 from arm_samples import stroke
-from kineme.errors import TrajectoryError
+from kineme.errors import SpecificationError, TrajectoryError
 from kineme.orientation import PoseDMP
 from kineme.primitives.generation.learned import learn_one
 from kineme.robots import InfeasibleError, load, move
@@ -136,6 +136,47 @@ def test_every_spelling_of_degrees_moves_the_joints_alike(tmp_path, unit):
         recorded(["time [s]", *(f"{name} [{unit}]" for name in robot.joints)], columns, tmp_path), robot, "auto"
     )
     np.testing.assert_allclose(asked.positions, joints, atol=1e-12)
+
+
+def test_joints_are_known_by_their_names_in_any_order_and_others_go_along(tmp_path):
+    robot = load("ur5e")
+    u = np.linspace(0, 1, 60)
+    joints = robot.rest + 0.3 * (10 * u**3 - 15 * u**4 + 6 * u**5)[:, None] * np.array([1, -1, 1, 0.5, 0.3, -1])
+    heads = ["time [s]", "width", *(f"/joint_states.{name} [deg]" for name in robot.joints[::-1])]
+    one = recorded(heads, np.column_stack((4 * u, 100 * u, np.degrees(joints)[:, ::-1])), tmp_path)
+    made = move(one, robot, timing="fastest")
+    np.testing.assert_allclose(made.trajectory.positions[-1], joints[-1], atol=1e-6)
+    width = made.trajectory.steps["width"]
+    assert (width[0], width[-1]) == (0, pytest.approx(100, abs=1))
+    assert np.diff(width).min() >= 0
+
+
+def test_units_of_joints_are_those_of_the_heads_or_as_is_said(tmp_path):
+    robot = load("ur5e")
+    u = np.linspace(0, 1, 60)[:, None]
+    joints = robot.rest + 0.1 * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    share = (joints - robot.lower) / (robot.upper - robot.lower)
+    for unit, values, said in (
+        ("", np.degrees(joints), "deg"),
+        ("", joints, "rad"),
+        ("", 200 * share - 100, "percent"),
+        (" [-100..100]", 200 * share - 100, "percent"),
+        (" [%]", 100 * share, "percent"),
+        (" [deg]", np.degrees(joints), "deg"),
+    ):
+        one = recorded(["time [s]", *(name + unit for name in robot.joints)], np.hstack((3 * u, values)), tmp_path)
+        asked = request_of(one, robot, "auto", joint_units=said)
+        np.testing.assert_allclose(asked.positions, joints, atol=1e-9)
+        if unit == " [deg]":
+            with pytest.raises(TrajectoryError, match="whose columns say no other unit, got 'shoulder_pan_joint"):
+                request_of(one, robot, "auto", joint_units="rad")
+        if unit == " [%]":
+            with pytest.raises(TrajectoryError, match=r"in a unit of angle .* say joint_units='percent'"):
+                request_of(one, robot, "auto")
+    with pytest.raises(TrajectoryError, match="if these are degrees, say joint_units='deg'"):
+        request_of(kineme.Trajectory(3 * u[:, 0], np.degrees(joints)), robot, "joints")
+    with pytest.raises(SpecificationError, match="joint_units"):
+        move(kineme.Trajectory(3 * u[:, 0], joints), robot, joint_units="grad")
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,9 @@ _NEW_FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option("--follow", type=click.Choice(["full", "axis", "free"]), default="full", show_default=True,
               help="How much of the orientation: all, the direction of the z axis of the tip, nothing.")  # fmt: skip
 @click.option("--joints", is_flag=True, help="SOURCE moves the joints, not the tip.  [default: by its columns]")
+@click.option("--joint-units", type=click.Choice(["deg", "rad", "percent"]),
+              help="Of joints whose columns say no unit, and of --lerobot. percent: -100 to 100 between the limits of "
+              "the URDF, as LeRobot calibrates.  [default: rad; of shoulder_pan.pos and --lerobot deg]")  # fmt: skip
 @click.option("--max-velocity", type=Finite(), help="Of every joint, below what the model allows.")
 @click.option("--max-acceleration", type=Finite(), help="The same for accelerations.")
 @heading("Movement")
@@ -75,6 +78,7 @@ def move(**options: Any) -> None:
     kineme move wave --library actions/ --robot panda --at 0.45,0.1,0.3 --goal 0.5,-0.2,0.4 -o wave_joints.csv
     kineme move wave --library actions/ --robot my_robot.urdf --tip tool0 --slow-down --ros2 wave.mcap
     """  # noqa: D301 - a backspace tells click to keep the lines
+    from kineme.errors import heard_warnings
     from kineme.output.table import to_text
     from kineme.robots.checks.report import preflight_table
     from kineme.robots.models.load import load
@@ -87,7 +91,12 @@ def move(**options: Any) -> None:
     )
     for sentence in robot.assumed:
         write(f"note: {sentence}", err=True)
-    made = _moved(robot, options)
+    with heard_warnings() as heard:
+        try:
+            made = _moved(robot, options)
+        finally:
+            for sentence in heard:
+                write(f"note: {sentence}", err=True)
     if str(options["output"]) != "-":
         say(
             options["as_json"],
@@ -120,6 +129,7 @@ def _moved(robot: Any, options: dict[str, Any]) -> Any:
             rate=options["rate"],
             start=options["start"],
             steps=generated.steps,
+            continuous=generated.continuous,
             force=options["force"],
         )
     except InfeasibleError as error:
@@ -150,7 +160,8 @@ def _generated(robot: Any, options: dict[str, Any]) -> tuple[Any, str]:
         options["duration"],
         scale=options["scale"],
         rate=options["rate"],
-        joints=space == "joints",
+        joints=robot if space == "joints" else None,
+        joint_units=options["joint_units"],
         plane=options["plane"],
     )
     return generated, space

@@ -97,7 +97,8 @@ def write_files(made: Any, options: dict[str, Any]) -> None:
         from kineme.robots.export.lerobot import write_lerobot
 
         task = name_of_source(options)
-        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot.name)
+        units = "percent" if options["joint_units"] == "percent" else "deg"
+        write_lerobot(options["lerobot"], trajectory, task, options["fps"], made.robot, units)
     if options["view"]:
         from kineme.robots.view.write_view import write_view
 

@@ -17,6 +17,7 @@ def read_source(options: dict[str, Any]) -> Any:
     """The primitive of a symbol, a recording or a file, with the recording that it is of."""
     source = options["source"]
     if _is_symbol(source, options["folder"]):
+        _check_of_symbol(source)
         from kineme.library.library import ActionLibrary
         from kineme.library.symbols.grounding import learned_of
 
@@ -35,6 +36,18 @@ def read_source(options: dict[str, Any]) -> Any:
     dmp = DMP(**{name: options[name] for name in SPECIFICATION})
     recordings = read(Path(source), {name: options[name] for name in LAYOUT_OPTIONS})
     return learn_one(_chosen(recordings, options), dmp)
+
+
+def _check_of_symbol(source: str) -> None:
+    """Refuse options that say how a recording is read or learned: a symbol of a library was when it was learned."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        is_given = context.get_parameter_source(option.name or "") == ParameterSource.COMMANDLINE
+        if is_given and option.name in (*LAYOUT_OPTIONS, *SPECIFICATION, "index"):
+            raise click.UsageError(
+                f"expected {option.opts[0]} with a recording, got it with {printable(source)}, a symbol of a library: "
+                f"its columns and primitives are those that it was learned with; say {option.opts[0]} to kineme learn"
+            )
 
 
 def name_of_source(options: dict[str, Any]) -> str:

@@ -18,6 +18,7 @@ from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
+from kineme.units import split_head
 from kineme.validation import Array, as_numbers, as_path
 
 _DERIVATIVES = ("velocities", "accelerations")
@@ -120,8 +121,14 @@ def _heads(columns: Columns, names: ColumnNames | None) -> list[str]:
             "velocities": list(names.rates),
             "accelerations": list(names.rates),
         }
-    prefixes = {"positions": "", "velocities": "v_", "accelerations": "a_"}
-    return ["time", *(prefixes[name] + axis for name in columns if name != "times" for axis in axes[name])]
+    marks = {"positions": ("", ""), "velocities": ("v_", "/s"), "accelerations": ("a_", "/s^2")}
+    return ["time", *(_marked(axis, *marks[name]) for name in columns if name != "times" for axis in axes[name])]
+
+
+def _marked(head: str, prefix: str, per: str) -> str:
+    """The head of a position or of a rate; the unit of a rate, if the head says one, is that per second."""
+    name, unit = split_head(head)
+    return f"{prefix}{head}" if unit is None or not per else f"{prefix}{name} [{unit}{per}]"
 
 
 def _table(columns: Columns) -> Array:

@@ -97,17 +97,21 @@ def read_info(folder: Path) -> Info:
 
 
 def _entries(name: str, feature: Any) -> tuple[str, ...]:
-    """The names of a feature's entries; none for images, texts and counters."""
+    """The names of a feature's entries, with their units where it says them; none for images, texts and counters."""
     if name in COUNTERS or not isinstance(feature, Mapping) or not str(feature.get("dtype")).startswith(_NUMBERS):
         return ()
     shape = feature.get("shape")
     if not isinstance(shape, list) or not all(isinstance(one, int) and one > 0 for one in shape):
         return ()
     width = math.prod(shape)
-    names = _names(feature.get("names"))
+    names, units = _names(feature.get("names")), feature.get("units")
     if width > _WIDEST:
         return ()
     if len(names) == width and len(set(names)) == width and width > 1:
+        if isinstance(units, list) and len(units) == width:
+            return tuple(
+                f"{name} [{unit}]" if isinstance(unit, str) else name for name, unit in zip(names, units, strict=True)
+            )
         return tuple(names)
     return tuple(map(str, range(width))) if width > 1 else ("",)
 

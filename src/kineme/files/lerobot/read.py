@@ -14,7 +14,7 @@ from kineme.files.lerobot.info import Info, read_info
 from kineme.files.lerobot.order import episode_names, whole_episodes
 from kineme.files.lerobot.shards import Frames, joined, read_shard
 from kineme.movements.tables.columns import choose_roles, column_numbers
-from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.layout import Column, Layout
 from kineme.movements.tables.parsed import Parsed, listed, no_lines
 from kineme.movements.tables.table import Segments, Table, table_movements
 from kineme.validation import Array
@@ -83,10 +83,11 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
     entries = [entry for one in info.heads.values() for entry in one]
     full = [f"{name}.{entry}" if entry else name for name, entry in zip(owners, entries, strict=True)]
     vectors = info.vectors
+    name = STATE if STATE in info.heads else next(iter(vectors)) if len(vectors) == 1 else None
     if layout.coordinates is not None:
-        numbers: Sequence[int] = column_numbers(full, layout.coordinates)
-    elif STATE in info.heads or len(vectors) == 1:
-        name = STATE if STATE in info.heads else next(iter(vectors))
+        short = [entry if owner == name else head for owner, entry, head in zip(owners, entries, full, strict=True)]
+        numbers: Sequence[int] = _numbers_of(full, short, layout.coordinates)
+    elif name is not None:
         numbers = [k for k, owner in enumerate(owners) if owner == name]
     else:
         got = listed(f"{name} ({width})" for name, width in (vectors or dict.fromkeys(info.heads, 1)).items())
@@ -97,6 +98,25 @@ def _chosen(info: Info, layout: Layout) -> tuple[dict[str, int], tuple[str, ...]
     alone = len(features) == 1
     heads = tuple(entries[k] if alone and entries[k] and not entries[k].isdecimal() else full[k] for k in numbers)
     return features, heads, columns
+
+
+def _numbers_of(full: Sequence[str], short: Sequence[str], columns: Sequence[Column]) -> list[int]:
+    """Where columns stand that are called by feature and entry or, of the feature read by default, by entry alone."""
+    numbers: list[int] = []
+    for column in columns:
+        try:
+            numbers += column_numbers(full, [column])
+        except DataError:
+            if not isinstance(column, str) or column.isdecimal():
+                raise
+            try:
+                numbers += column_numbers(short, [column])
+            except DataError:
+                pass
+            else:
+                continue
+            raise
+    return numbers
 
 
 def _all_frames(folder: Path, declared: Episodes, features: dict[str, int]) -> tuple[Frames, dict[str, str]]:

@@ -26,7 +26,9 @@ _IN_CHUNK = 1000  # files
 Features = Mapping[str, Array]  # feature -> (T, d)
 
 
-def write_episode(folder: Path, features: Features, names: Sequence[str], fps: float, task: str, robot: str) -> int:
+def write_episode(
+    folder: Path, features: Features, entries: Mapping[str, str | None], fps: float, task: str, robot: str
+) -> int:
     """Write one episode; every file is written whole or not at all, and what counts the episodes last.
 
     Parameters
@@ -35,8 +37,8 @@ def write_episode(folder: Path, features: Features, names: Sequence[str], fps: f
         A new folder, or a data set of version 3 with the same features, names and rate: the episode is then its last.
     features : mapping of str to ndarray of shape (T, d)
         As ``action`` and ``observation.state``.
-    names : sequence of d str
-        Of their entries.
+    entries : mapping of d str to str or None
+        Names of their entries, and the unit of each as meta/info.json says it; None where it is not known.
     fps : float
         Frames per second.
     task : str
@@ -58,7 +60,7 @@ def write_episode(folder: Path, features: Features, names: Sequence[str], fps: f
         import pyarrow  # noqa: F401 - so that the message names the extra
     except ImportError as error:
         raise DataError("expected the package pyarrow to write LeRobot; pip install 'kineme[parquet]'") from error
-    entry = _declared(features, names)
+    entry = _declared(features, entries)
     if (folder / MARKER).is_file():
         info = read_json(folder / MARKER, MARKER)
         _check(info, entry, fps)
@@ -73,8 +75,8 @@ def write_episode(folder: Path, features: Features, names: Sequence[str], fps: f
         return _append(hidden, info, features, task)
 
 
-def _declared(features: Features, names: Sequence[str]) -> dict[str, Any]:
-    vector = {"dtype": "float32", "shape": [len(names)], "names": list(names)}
+def _declared(features: Features, entries: Mapping[str, str | None]) -> dict[str, Any]:
+    vector = {"dtype": "float32", "shape": [len(entries)], "names": list(entries), "units": list(entries.values())}
     counter = {"dtype": "int64", "shape": [1], "names": None}
     stamp = {"timestamp": {"dtype": "float32", "shape": [1], "names": None}}
     return {**dict.fromkeys(features, vector), **stamp, **dict.fromkeys(_COUNTERS, counter)}

@@ -21,7 +21,9 @@ class JointTrajectory:
     positions, velocities, accelerations : ndarray of shape (T, n)
         [rad, m], per second, per second squared.
     steps : dict of str to ndarray of shape (T,)
-        Discrete channels such as a gripper: the value that holds from each sample on.
+        Channels beside the joints, such as a gripper: the value that holds from each sample on.
+    units : tuple of n str
+        "rad", or "m" of joints that slide; by default "rad".
     """
 
     joints: tuple[str, ...]
@@ -30,6 +32,10 @@ class JointTrajectory:
     velocities: Array
     accelerations: Array
     steps: dict[str, Array]
+    units: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "units", tuple(self.units) or ("rad",) * len(self.joints))
 
     @property
     def duration(self) -> float:
@@ -51,4 +57,6 @@ def joined(first: JointTrajectory, second: JointTrajectory) -> JointTrajectory:
 
     times = np.concatenate((first.times[:-1], second.times + first.duration))
     held = {name: np.concatenate((np.full(len(first) - 1, values[0]), values)) for name, values in second.steps.items()}
-    return JointTrajectory(second.joints, times, both("positions"), both("velocities"), both("accelerations"), held)
+    return JointTrajectory(
+        second.joints, times, both("positions"), both("velocities"), both("accelerations"), held, second.units
+    )

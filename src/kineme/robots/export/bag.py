@@ -18,7 +18,8 @@ STATES = "/joint_states"
 def write_bag(path: str | Path, trajectory: JointTrajectory, topic: str = TOPIC) -> Path:
     """Write a ``.bag`` of ROS 1, a ``.mcap`` of ROS 2, or, with no ending, a folder of ROS 2 with MCAP in it.
 
-    One JointTrajectory on `topic` at time 0, and a JointState for each sample on /joint_states.
+    One JointTrajectory on `topic` at time 0, and a JointState for each sample on /joint_states. The definitions of both
+    types in the bag begin with a comment that says the units.
 
     Raises
     ------
@@ -72,8 +73,21 @@ def _write_2(folder: Path, trajectory: JointTrajectory, topic: str) -> None:
 
 
 def _fill(writer: Any, store: Any, serialize: Any, trajectory: JointTrajectory, topic: str) -> None:
-    wanted = writer.add_connection(topic, TRAJECTORY, typestore=store)
-    states = writer.add_connection(STATES, STATE, typestore=store)
+    wanted, states = (
+        writer.add_connection(name, kind, **_definition(store, kind, trajectory))
+        for name, kind in ((topic, TRAJECTORY), (STATES, STATE))
+    )
     writer.write(wanted, 0, serialize(trajectory_message(store.types, trajectory), TRAJECTORY))
     for stamp, message in state_messages(store.types, trajectory):
         writer.write(states, stamp, serialize(message, STATE))
+
+
+def _definition(store: Any, kind: str, trajectory: JointTrajectory) -> dict[str, str]:
+    """The definition of a type with the units in front, which its checksum leaves out, and that checksum."""
+    units = ", ".join(f"{name} [{unit}]" for name, unit in zip(trajectory.joints, trajectory.units, strict=True))
+    about = f"# positions of {units}; velocities per s, accelerations per s^2\n"
+    if "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__:  # ROS 1
+        definition, checksum = store.generate_msgdef(kind)
+        return {"msgdef": about + definition, "md5sum": checksum}
+    definition, _ = store.generate_msgdef(kind, ros_version=2)
+    return {"msgdef": about + definition, "rihs01": store.hash_rihs01(kind)}

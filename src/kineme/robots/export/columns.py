@@ -13,6 +13,8 @@ from kineme.robots.execution.joint_trajectory import JointTrajectory
 def write_joints(path: str | Path, trajectory: JointTrajectory) -> Path:
     """Times, joints and discrete channels under their names, then velocities ``v_NAME`` and accelerations ``a_NAME``.
 
+    The heads of joints end in their units: ``shoulder_pan [rad]``, ``v_shoulder_pan [rad/s]``.
+
     Raises
     ------
     DataError
@@ -36,4 +38,5 @@ def as_columns(trajectory: JointTrajectory) -> tuple[Columns, ColumnNames]:
         "velocities": trajectory.velocities,
         "accelerations": trajectory.accelerations,
     }
-    return columns, ColumnNames((*trajectory.joints, *trajectory.steps), trajectory.joints)
+    joints = tuple(f"{name} [{unit}]" for name, unit in zip(trajectory.joints, trajectory.units, strict=True))
+    return columns, ColumnNames((*joints, *trajectory.steps), joints)

@@ -13,7 +13,8 @@ from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import Learned
 from kineme.robots.kinematics.task_path import PLANES
-from kineme.robots.planning.roles import Roles, roles_of, sizes_of
+from kineme.robots.models.robot import Robot
+from kineme.robots.planning.roles import Roles, Scales, roles_of, scales_of
 from kineme.validation import Array, as_numbers
 
 
@@ -22,6 +23,7 @@ class Generated(NamedTuple):
 
     movement: Trajectory  # [m] or [rad]; of the tip alone or, (T, 7), with its orientations w, x, y, z
     steps: dict[str, Array]  # name -> (T,)
+    continuous: dict[str, Array]  # the same of what moves beside joints, as a gripper
 
 
 class _Frame(NamedTuple):
@@ -47,7 +49,8 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     displacement: ArrayLike | None = None,
     scale: float | None = None,
     rate: float = 100.0,
-    joints: bool = False,
+    joints: Robot | None = None,
+    joint_units: str | None = None,
     plane: str = "xy",
 ) -> Generated:
     """Generate a movement with start and goal in the frame of a robot.
@@ -67,8 +70,10 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
         of its columns say, and where they do not, 1.
     rate : float, default 100
         Samples per second, at least.
-    joints : bool, default False
-        It is a movement of the joints.
+    joints : Robot, optional
+        It is a movement of the joints of this arm; without, one of the tip.
+    joint_units : {"deg", "rad", "percent"}, optional
+        Of columns of joints that say no unit; see `move`.
     plane : {"xy", "xz", "yz"}
         Where the axes of a movement of two dimensions lie.
 
@@ -79,16 +84,16 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     SpecificationError
         A start or goal of another number of coordinates.
     """
-    roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip")
-    _check_tip(roles, learned, joints)
+    roles = roles_of(learned.primitive.channels, len(learned.columns), "joints" if joints else "tip", joints)
+    _check_tip(roles, learned, joints is not None)
     n = len(roles.positions)
     begin, end = (_point(point, name, n if joints else 3) for point, name in ((at, "at"), (goal, "goal")))
     axes = list(PLANES[plane]) if n == 2 and not joints else list(range(n))
     shown = generate(learned, MovementOptions(duration=duration, rate=rate)).columns["positions"]
     start = shown[0, roles.positions]
-    quantities = ("angle", "length") if joints else ("length",)
-    units = sizes_of(roles, [quantities] * n) if scale is None else np.full(n, scale)
-    frame = _Frame(start, units, start * units if begin is None else begin[axes])
+    scales = Scales(np.full(n, scale), np.zeros(n)) if scale is not None else scales_of(roles, joints, joint_units)
+    shown_there = start * scales.size + scales.offset
+    frame = _Frame(start, scales.size, shown_there if begin is None else begin[axes])
     target = None if end is None else _goal_as_recorded(shown[-1], roles, frame.to_recording(end[axes]))
     if (way := _point(displacement, "displacement", n)) is not None:
         target = _goal_as_recorded(shown[-1], roles, start + way)
@@ -100,8 +105,11 @@ def generate_at(  # noqa: PLR0913 - one parameter per option
     if roles.orientation is not None and moved.shape[1] == 3:
         channel, columns = roles.orientation
         moved = np.column_stack((moved, as_wxyz(made["positions"][:, columns], channel)))
-    steps = {name: made["positions"][:, column] for name, column in roles.discrete.items()}
-    return Generated(Trajectory(times=made["times"], positions=moved), steps)
+    steps, continuous = (
+        {name: made["positions"][:, column] for name, column in columns.items()}
+        for columns in (roles.discrete, roles.continuous)
+    )
+    return Generated(Trajectory(times=made["times"], positions=moved), steps, continuous)
 
 
 def _goal_as_recorded(end: Array, roles: Roles, goal: Array) -> Array:

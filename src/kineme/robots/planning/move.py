@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from kineme.robots.planning.joint_path import PLACES, joints_along, path_of_the_
 from kineme.robots.planning.refusal import refuse_failed
 from kineme.robots.planning.request import request_of
 from kineme.robots.planning.robot_movement import RobotMovement
-from kineme.robots.planning.roles import SPACES
+from kineme.robots.planning.roles import JOINT_UNITS, SPACES
 from kineme.robots.planning.timed_movement import FASTEST_RATE, SLOWEST_RATE, TIMINGS, Untimed, with_timing
 from kineme.validation import Array, as_numbers, check_choice, check_number, check_switch
 
@@ -36,6 +37,8 @@ def move(  # noqa: PLR0913 - one parameter per option
     rate: float = 100.0,
     start: ArrayLike | None = None,
     steps: Mapping[str, Array] | None = None,
+    continuous: Mapping[str, Array] | None = None,
+    joint_units: str | None = None,
     force: bool = False,
 ) -> RobotMovement:
     """Make a movement of the tip or of the joints executable on an arm, and check it.
@@ -48,8 +51,9 @@ def move(  # noqa: PLR0913 - one parameter per option
         are kept as `steps`.
     robot : Robot
     space : {"auto", "tip", "joints"}, default "auto"
-        Of what the positions are. "auto": of the joints, if there are as many angles as the robot has joints; without
-        channels, if there are as many columns, neither two, three nor a pose. Else of the tip.
+        Of what the positions are. "auto": of the joints, if columns have their names, alone or as ``shoulder_pan.pos``
+        in data sets of LeRobot, or if there are as many angles as the robot has joints; without channels, if there are
+        as many columns, neither two, three nor a pose. Else of the tip.
     orientation : array_like of shape (4,), optional
         Unit quaternion w, x, y, z of the tip throughout; by default as in the movement, and where it has none, that of
         the rest posture.
@@ -68,6 +72,13 @@ def move(  # noqa: PLR0913 - one parameter per option
         Where the joints stand now; by default the rest posture. The approach begins there.
     steps : dict of str to array_like of shape (T,), optional
         Discrete channels, as of a gripper, at the samples of the movement: kept as steps, whatever the timing.
+    continuous : dict of str to array_like of shape (T,), optional
+        Channels that move on and are no joints, as a gripper from 0 to 100: interpolated, and sent beside `steps`.
+        Those of a movement whose columns have the names of the joints are taken without being given.
+    joint_units : {"deg", "rad", "percent"}, optional
+        Of joints whose columns say no unit: degrees, radians, or -100 to 100 between the limits of each joint in its
+        URDF, as LeRobot's drivers normalize to their calibration. By default radians; of columns that are called as
+        LeRobot's drivers call them, ``shoulder_pan.pos``, degrees, which a warning says.
     force : bool, default False
         Return a trajectory that did not pass its checks.
 
@@ -91,9 +102,11 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_choice("plane", plane, list(PLANES))
     check_choice("timing", timing, TIMINGS)
     check_choice("place", place, PLACES)
+    if joint_units is not None:
+        check_choice("joint_units", joint_units, tuple(JOINT_UNITS))
     check_number("rate", rate, least=SLOWEST_RATE, most=FASTEST_RATE)
     check_switch("force", force)
-    request = request_of(movement, robot, space, steps)
+    request = request_of(movement, robot, space, steps, continuous, joint_units)
     stands = robot.rest if start is None else _posture(start, robot)
     if request.space == "joints":
         joints, path = CubicSpline(request.times, request.positions), None
@@ -102,8 +115,9 @@ def move(  # noqa: PLR0913 - one parameter per option
         joints, path = joints_along(ik, path_of_the_tip(ik, request, orientation, plane), place, stands)
         if not force:
             check_reached(robot, path, joints(path.times), ik.costs, TRACKED)
-    untimed = Untimed(robot, joints, path, stands, rate, request.times, request.steps, follow)
+    untimed = Untimed(robot, joints, path, stands, rate, request.times, request.steps, follow, request.continuous)
     made = with_timing(untimed, timing)
+    made = replace(made, trajectory=replace(made.trajectory, units=robot.units))
     if not force:
         refuse_failed(made, untimed, timing)
     return made

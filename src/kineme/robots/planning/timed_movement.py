@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ class Untimed(NamedTuple):
     step_times: Array  # (T,) [s], from which on each value of `steps` holds
     steps: Mapping[str, Array]  # discrete channels, (T,)
     follow: str  # how much of the orientation
+    continuous: Mapping[str, Array] = MappingProxyType({})  # channels that move and are no joints, (T,)
 
 
 def with_timing(untimed: Untimed, timing: str, most: int = LONGEST) -> RobotMovement:
@@ -86,7 +88,8 @@ def _assembled(untimed: Untimed, joints: CubicSpline, timing: Timing, longer: fl
     robot = untimed.robot
     in_force = np.searchsorted(untimed.step_times, timing.generated + 1e-9, "right") - 1
     steps = {name: values[in_force] for name, values in untimed.steps.items()}
-    movement = replace(timed(robot, joints, timing), steps=steps)
+    along = {name: np.interp(timing.generated, untimed.step_times, x) for name, x in untimed.continuous.items()}
+    movement = replace(timed(robot, joints, timing), steps=steps | along)
     first = approach(robot, untimed.start, movement.positions[0], untimed.rate, longer)
     whole = joined(first, movement)
     times = dense_times(robot, whole)

@@ -54,7 +54,7 @@ def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
         asked.duration,
         displacement=None if asked.goal is not None else asked.displacement,
         scale=None if asked.size is None or space == "joints" else asked.size / _extent(learned),
-        joints=space == "joints",
+        joints=robot if space == "joints" else None,
         plane=asked.plane,
     )
     try:
@@ -66,6 +66,7 @@ def move(studio: Reads, asked: ArmWanted) -> dict[str, Any]:
             place="as given" if asked.at is not None or space == "joints" else "free",
             timing="slowed" if asked.slow_down else "generated",
             steps=generated.steps,
+            continuous=generated.continuous,
         )
     except InfeasibleError as error:
         return {**_answer(robot, error.preflight), "refusal": in_studio_words(str(error)), "scene": None}
