@@ -29,6 +29,7 @@ WORDS = (
     "nan", "inf", "-inf", "1e308", "-1e400", "1e-320", "null", "", " ", "-0", "wave", "é", "\0", "#", "//", '"', "'",
     ",", ";", "\n", "\r", "\t", "[", "]", "{", "}", "True", "0x1", "1_0", "²", "2024-01-01T00:00:00Z", "9" * 400,
 )  # fmt: skip
+_TEXTS = (".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh", ".eaf", ".mot", ".sto", ".mvnx")
 NUMBERS = (0, 1, 2, 7, 127, 128, 255, 256, 65535, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
 
 
@@ -337,7 +338,7 @@ def mutant(rng, data, name):
     if "compressed.mat" in name and rng.random() < 0.7:
         return _mat_mutant(rng, data)
     for _ in range(int(rng.integers(1, 5))):
-        data = _damaged(rng, data, is_text=name.endswith((".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh", ".eaf")))
+        data = _damaged(rng, data, is_text=name.endswith(_TEXTS))
     return data
 
 

@@ -112,6 +112,14 @@ def test_a_bad_movement_among_arrays_costs_itself_alone():
     assert short == "movement 2: expected at least 4 samples, got 2"
 
 
+@pytest.mark.parametrize("shape", [(9, 6, 40), (6, 40)])
+def test_arrays_of_more_dimensions_than_samples_say_which_axis_to_move(shape):
+    with pytest.raises(kineme.DataError, match=r"got shape \(6, 40\), .* save np.moveaxis\(array, 1, 2\)"):
+        read({"positions_0": np.ones(shape)} if len(shape) == 2 else {"positions": np.ones(shape)})
+    right = np.cumsum(np.ones((9, 6, 40)), axis=1)
+    assert read({"positions": right}, units=0.02).demonstrations.lengths.tolist() == [6] * 9
+
+
 def test_the_arrays_of_the_caller_are_left_alone():
     x, t = X.copy(), T.copy() * 1000
     x.setflags(write=False)

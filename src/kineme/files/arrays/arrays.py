@@ -92,6 +92,12 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
+        if wide := [x.shape for x in xs if x.shape[0] < x.shape[1]]:
+            raise DataError(
+                f"expected samples along the first axis of each movement, got shape {wide[0]}, more dimensions than "
+                "samples; if time runs along the last axis, as in (n, d, T), save np.moveaxis(array, 1, 2), of one "
+                "movement array.T; if it is right, say the step between samples with units=, in the shell --units"
+            )
     positions = np.concatenate(xs)
     columns = distinct(columns or axis_names(positions.shape[1]))
     if len(columns) != positions.shape[1]:

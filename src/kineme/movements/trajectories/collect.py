@@ -16,6 +16,7 @@ from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import (
+    MIN_SAMPLES,
     Array,
     as_positions,
     as_times,
@@ -25,6 +26,10 @@ from kineme.validation import (
     describe,
     refuse_lossy,
 )
+
+#: What to do with a block (n, d, T), as libraries for time series have it, and with a list of arrays (d, T).
+_TIME_LAST = "if time runs along the last axis, as in (n, d, T), pass np.moveaxis(array, 1, 2)"
+_EACH = "transpose the array, as by [x.T for x in arrays]"
 
 
 def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
@@ -87,7 +92,8 @@ def collect_arrays(
     if names is not None and len(names) != n:
         raise TrajectoryError(f"expected one name for each of the {n} movements, got {len(names)}")
     if times is None:
-        _refuse_transposed(offsets, positions.shape[1], names)
+        way = _TIME_LAST if is_block and arrays.ndim == 3 else "transpose the array" if is_block else _EACH
+        _refuse_transposed(offsets, positions.shape[1], names, way)
     check_finite(positions, offsets, names, "positions")
     check_extents(positions, offsets, names)
     stamps = None if times is None else _concatenate_times(times, offsets, names)
@@ -115,20 +121,25 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
     if block.dtype.kind not in "biuf":
         raise TrajectoryError(f"expected positions to be an array of numbers, got an array of type {block.dtype}")
     refuse_lossy(block, "the block")
+    if is_many and block.shape[1] < MIN_SAMPLES <= block.shape[2]:
+        raise TrajectoryError(
+            f"expected an array of shape (n, T, d), movements by samples by dimensions, got shape {block.shape}; "
+            f"{_TIME_LAST}"
+        )
     as_positions(block[0], "every movement of the block" if is_many else "the movement")
     n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
     return flat.reshape(-1, n_dims), np.arange(n + 1) * n_samples
 
 
-def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[str | None] | None) -> None:
+def _refuse_transposed(offsets: NDArray[np.intp], n_dims: int, names: Sequence[str | None] | None, way: str) -> None:
     """Refuse a movement without time stamps that has more dimensions than samples; stamps say which axis is time."""
     lengths = np.diff(offsets)
     if (wide := lengths < n_dims).any():
         i = int(np.argmax(wide))
         raise TrajectoryError(
             f"{describe(i, names)}: expected samples along the first axis and dimensions along the last, got shape "
-            f"({lengths[i]}, {n_dims}), more dimensions than samples; transpose the array, or, if it is right, pass "
+            f"({lengths[i]}, {n_dims}), more dimensions than samples; {way}, or, if it is right, pass "
             "its time stamps: kineme.Trajectory(times, array), or times= of Demonstrations.from_arrays"
         )
 
@@ -182,9 +193,10 @@ def _concatenate(checked: list[Array], names: Names) -> tuple[Array, NDArray[np.
     except ValueError:
         n_dims = checked[0].shape[1]
         odd = next(i for i, x in enumerate(checked) if x.shape[1] != n_dims)
+        way = f"; {_EACH}" if len({*lengths.tolist()}) == 1 and lengths[0] < n_dims else ""
         raise TrajectoryError(
             f"{describe(odd, names)}: expected {n_dims} dimensions as in trajectory 0, "
-            f"got {checked[odd].shape[1]}; movements of one batch share their dimensions"
+            f"got {checked[odd].shape[1]}; movements of one batch share their dimensions{way}"
         ) from None
 
 
