@@ -223,6 +223,8 @@ def test_a_library_takes_its_columns_from_recordings_with_more(tmp_path):
     fewer.write_bytes(table(t, x[:, [0, 2, 3]], ("battery", "hand.x", "elbow.x")))
     answer = CliRunner().invoke(main, ["recognize", str(more), *library])
     assert "wave" in answer.output
+    said = "Read the columns of the library alone, hand.x, hand.y, without battery, elbow.x; say --columns"
+    assert said in answer.output
     lacking = CliRunner().invoke(main, ["recognize", str(fewer), *library])
     assert lacking.exit_code
     assert (

@@ -13,7 +13,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, force_option, heading, json_option, library_option
 from kineme.cli.output import check_new, say, write
-from kineme.cli.reading import chosen_topics, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import counted, printable
 
 
@@ -80,7 +80,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
                 _check_folder(target, force)
         with _progress(parsed) as progress:
             found = find(library.store, parsed, error_rate, progress)
-        notes = chosen_topics(parsed) + notes_on_gaps(parsed)
+        notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
         notes += differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {

@@ -13,6 +13,7 @@ import click
 from kineme.cli.options import READING, Finite, under
 from kineme.output.text import printable
 
+_NAMED = 6  # columns that a sentence names
 STANDARD_INPUT = "standard input.csv"
 
 
@@ -174,15 +175,32 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     return read_paths(files, Layout(**known), rule, **how, progress=_watched, standard_input=given)
 
 
-def chosen_topics(parsed: Any) -> list[str]:
-    """A sentence for each topic or frame that was read since the movements of the library were read from such."""
+def known_choices(parsed: Any, options: dict[str, Any], learned: Any) -> list[str]:
+    """A sentence for what was read since the movements of the library were read so: topics and frames, and columns.
+
+    `learned` are the channels of the library.
+    """
+    from kineme.movements.channels.channel import recorded_names
     from kineme.movements.tables.layout import AS_KNOWN
 
-    return [
+    sentences = [
         f"Read {one.layout.removesuffix(AS_KNOWN)}, as the movements of the library; say --topic or --frame for others"
         for one in dict(parsed.detected)
         if one.layout.endswith(AS_KNOWN)
     ]
+    columns = None if options["columns"] or learned is None else recorded_names(learned)
+    aside = sorted({name for one in dict(parsed.detected) if one.columns == columns for name in one.ignored if name})
+    if aside:
+        sentences.append(
+            f"Read the columns of the library alone, {_some(columns or ())}, without {_some(aside)}; say --columns for "
+            "others"
+        )
+    return sentences
+
+
+def _some(names: Sequence[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def problem_lines(problems: Any, lost: str = "not read: ") -> list[str]:

@@ -11,7 +11,7 @@ import click
 from kineme.cli.channels import differences
 from kineme.cli.options import Finite, GroupedCommand, json_option, library_option, whole
 from kineme.cli.output import say
-from kineme.cli.reading import chosen_topics, layout_options, problem_lines, read, recordings_argument
+from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import printable
 
 _SMALLEST = 0.001  # p-value that is shown; JSON has all digits
@@ -48,7 +48,7 @@ def recognize(
     with ActionLibrary(folder, read_only=True) as library:
         parsed = read(recordings, options, library)
         answers = _recognized(library, parsed.demonstrations, error_rate)
-        notes = chosen_topics(parsed) + notes_on_gaps(parsed)
+        notes = known_choices(parsed, options, library.channels) + notes_on_gaps(parsed)
         notes += differences(library.channels, parsed.demonstrations.channels)
         stored = {symbol.name: symbol.id for symbol in library.symbols()}
     data = {
