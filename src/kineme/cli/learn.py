@@ -80,7 +80,7 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "people": sorted({one for one in people or () if one is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
-            "notes": notes_on_gaps(parsed) + notes_on_extents(parsed.demonstrations),
+            "notes": [*parsed.notes, *notes_on_gaps(parsed), *notes_on_extents(parsed.demonstrations)],
         }
     say(as_json, data, lambda: _text(data, problem_lines(parsed.problems, "left out ")))
 

@@ -134,6 +134,10 @@ layout_options = under(
         "--every", type=click.IntRange(4), metavar="SAMPLES",
         help="Samples of a movement, where a file holds one after the other.",
     ),
+    click.option(
+        "--join-files", is_flag=True, default=None,
+        help="The files of a folder that lie on one clock, as a phone's sensors, are one recording.",
+    ),
     click.option("--trim", is_flag=True, help="Leave out the rests before and after each movement."),
     click.option("--follow-links", is_flag=True, help="Also read links that lead out of the folder."),
 )  # fmt: skip
@@ -161,6 +165,7 @@ def read(paths: Path | Sequence[Path], options: dict[str, Any], library: Any = N
     known = {name.removesuffix("_column"): value for name, value in options.items()}
     rule = NameRule(known.pop("label_pattern", None), known.pop("label_by", None))
     how = {name: known.pop(name, False) for name in ("follow_links", "trim")}
+    how["join"] = bool(known.pop("join_files", False))
     for name in ("fill_gaps", "rows"):  # libraries store what was given
         if known.get(name) is None:
             known.pop(name, None)

@@ -82,12 +82,15 @@ class Recordings(MovementSequence):
     problems : tuple of Problem
     detected : tuple of (Detected, int)
         How files were understood, and how many in this way; most frequent first.
+    notes : tuple of str
+        What else a person should know of how they were read.
     """
 
     demonstrations: Demonstrations
     sources: tuple[Source, ...]
     problems: tuple[Problem, ...]
     detected: tuple[tuple[Detected, int], ...]
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.sources)

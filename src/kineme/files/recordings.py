@@ -10,6 +10,7 @@ from kineme.errors import DataError, SpecificationError, warn
 from kineme.files.entries import entries_of, in_words, name_of
 from kineme.files.formats import data_set_of
 from kineme.files.inspection.gaps import notes_on_gaps
+from kineme.files.join_files import Placed, join_files, notes_on_clocks
 from kineme.files.limits import max_file_bytes
 from kineme.files.merge_files import Recordings, merge_files
 from kineme.files.name_rule import TASK, NameRule
@@ -45,6 +46,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     fill_gaps: float = FILL_GAPS,
     rows: bool = False,
     every: int | None = None,
+    join_files: bool = False,
     progress: Progress | None = None,
 ) -> Recordings:
     """Read all movements of a folder, a file, a data set that is a folder, or of several of them.
@@ -109,6 +111,9 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
         `label` the column of the label. `units` is the step between samples.
     every : int, optional
         Number of samples of a movement, where a file holds one after the other without a mark between them.
+    join_files : bool, default False
+        Whether the files of a folder that lie on one clock, as those of a phone's sensors, are one recording, see
+        `kineme.files.join_files`. Its label is the folder around that of the files.
     progress : callable, optional
         Wraps the list of files, to show how far the reading is.
 
@@ -127,7 +132,7 @@ def read_recordings(  # noqa: PLR0913 - one parameter per question that a table 
     )  # fmt: skip
     rule = NameRule(label_pattern, label_by)
     paths = [Path(path)] if isinstance(path, (str, Path)) else [Path(one) for one in path]
-    return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, progress=progress)
+    return read_paths(paths, layout, rule, follow_links=follow_links, trim=trim, join=join_files, progress=progress)
 
 
 def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
@@ -137,6 +142,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     *,
     follow_links: bool = False,
     trim: bool = False,
+    join: bool = False,
     progress: Progress | None = None,
     standard_input: tuple[str, bytes] | None = None,
 ) -> Recordings:
@@ -147,6 +153,7 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     if rule.names_person and layout.person is not None:
         raise SpecificationError("expected person, a column, or {person} in label_pattern, not both")
     entries, problems = entries_of(paths, follow_links)
+    files: list[Placed] = []
     read, where = [], list(paths)
     if standard_input is not None:
         name, data = Path(standard_input[0]), standard_input[1]
@@ -158,8 +165,12 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
         relative = Path(entry.relative.name) if rule.label_by == TASK else entry.relative
         one = read_file(path, relative, layout, follow_links)
         one = one._replace(path=entry.name, problems=[each._replace(file=entry.name) for each in one.problems])
-        read.append(rule.apply(one, path))
-    recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip)
+        files.append((one, entry._replace(relative=relative)))
+    notes = () if join else notes_on_clocks(files)
+    if join:
+        files = join_files(files, layout.kinds or {})
+    read += [rule.apply(one, entry.path) for one, entry in files]
+    recordings = replace(merge_files(read, in_words(where), problems, layout.kinds, layout.skip), notes=notes)
     _check_excluded(recordings, layout)
     if layout.person is not None and recordings.people is None:
         raise DataError(

@@ -141,7 +141,7 @@ def _range(values: Array) -> Range:
 
 
 def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: Sampling) -> list[str]:
-    notes, demos = [], recordings.demonstrations
+    notes, demos = [*recordings.notes], recordings.demonstrations
     rate = float(np.median(sampling.rates))
     if not _RATES[0] <= rate <= _RATES[1]:
         notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")

@@ -1,0 +1,122 @@
+"""The files of a phone's sensors, one for each sensor in a folder for each recording, as one recording."""
+
+import json
+
+import commands
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+import kineme
+
+BEGIN = 1_700_000_000.0  # s since 1970
+
+
+def table(path, heads, times, values):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [
+        ",".join([str(round(t * 1e9)), repr(t - BEGIN), *map(repr, row)])
+        for t, row in zip(times.tolist(), values, strict=True)
+    ]
+    path.write_text("\n".join([",".join(["time", "seconds_elapsed", *heads]), *rows]) + "\n")
+
+
+def clock(rate, begin, end):
+    return BEGIN + np.arange(begin, end, 1 / rate)
+
+
+def spatial(t):
+    return np.column_stack([np.sin(t - BEGIN), np.cos(2 * (t - BEGIN)), (t - BEGIN) ** 2])
+
+
+def heading(t):
+    return (170 + 20 * (t - BEGIN) + 180) % 360 - 180  # degrees that wrap after half a second
+
+
+def turned(t):
+    return Rotation.from_rotvec(np.outer(t - BEGIN, [0.3, 0.4, 1.2]))
+
+
+def record(folder):
+    t = clock(100, 0.05, 2)
+    table(folder / "Accelerometer.csv", ["z", "y", "x"], t, spatial(t).tolist())
+    t = clock(40, 0, 2.2)
+    table(folder / "Gyroscope.csv", ["z", "y", "x"], t, (2 * spatial(t)).tolist())
+    t = clock(25, 0.1, 1.9)
+    q = turned(t).as_quat()
+    q[::7] *= -1
+    table(
+        folder / "Orientation.csv", ["qx", "qy", "qz", "qw", "yaw [deg]"], t, np.column_stack([q, heading(t)]).tolist()
+    )
+    (folder / "Metadata.csv").write_text("device name,platform\nphone,android\n")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("log")
+    for name in ("wave/one", "wave/two", "nod/one"):
+        record(folder / name)
+    return folder
+
+
+def test_each_folder_is_one_recording_with_the_columns_of_all_files(folder):
+    read = kineme.read_recordings(folder, join_files=True)
+    assert [(one.path, one.label) for one in read.sources] == [
+        ("nod/one", "nod"), ("wave/one", "wave"), ("wave/two", "wave"),
+    ]  # fmt: skip
+    names = [channel.name for channel in read.demonstrations.channels]
+    assert names[:4] == ["Accelerometer.z", "Accelerometer.y", "Accelerometer.x", "Gyroscope.z"]
+    kinds = {channel.name: channel.kind for channel in read.demonstrations.channels}
+    assert sorted(kinds.values()) == ["angle", "orientation", *["position"] * 6]
+    assert sum("Metadata.csv" in one.file for one in read.problems) == 3
+    assert "3 files on one clock" in read.detected[0][0].layout
+
+
+def test_samples_are_those_of_the_densest_file_and_the_others_are_interpolated(folder):
+    demos = kineme.read_recordings(folder / "wave" / "one", join_files=True).demonstrations
+    t = demos.times
+    assert demos.names == ("one",)
+    np.testing.assert_allclose(np.diff(t), 0.01, atol=1e-6)
+    assert t[0] - BEGIN == pytest.approx(0.1, abs=0.011)
+    assert t[-1] - BEGIN == pytest.approx(1.86, abs=0.011)
+    recorded = demos.recorded
+    np.testing.assert_allclose(recorded[:, :3], spatial(t), atol=1e-6)
+    np.testing.assert_allclose(recorded[:, 3:6], 2 * spatial(t), atol=2e-3)
+    stamps = clock(25, 0.1, 1.9)
+    expected = Slerp(stamps, turned(stamps))(t).as_matrix()
+    got = Rotation.from_quat(recorded[:, 6:10]).as_matrix()
+    np.testing.assert_allclose(got, expected, atol=1e-5)
+    np.testing.assert_allclose(np.unwrap(recorded[:, 10], period=360), 170 + 20 * (t - BEGIN), atol=1e-4)
+
+
+def test_files_that_last_elsewhere_are_problems_and_files_alone_stay_as_they_are(tmp_path):
+    record(tmp_path / "wave" / "one")
+    later = clock(50, 100, 102)
+    table(tmp_path / "wave" / "one" / "Magnetometer.csv", ["z", "y", "x"], later, spatial(later).tolist())
+    read = kineme.read_recordings(tmp_path, join_files=True)
+    (odd,) = [one for one in read.problems if "Magnetometer" in one.file]
+    assert "expected samples at the time of wave/one/Accelerometer.csv" in odd.reason
+    assert [one.label for one in read.sources] == ["wave"]
+    alone = tmp_path / "alone"
+    table(alone / "nod" / "a.csv", ["x", "y", "z"], later, spatial(later).tolist())
+    assert [one.path for one in kineme.read_recordings(alone, join_files=True).sources] == ["nod/a.csv"]
+
+
+def test_columns_and_kinds_of_a_joined_recording_are_chosen_by_their_names(folder):
+    read = kineme.read_recordings(folder, join_files=True, kinds={"Accelerometer.z": "discrete"})
+    assert read.demonstrations.channels[0].kind == "discrete"
+    with pytest.raises(kineme.KinemeError):
+        kineme.read_recordings(folder, join_files=True, kinds={"Barometer.z": "discrete"})
+
+
+def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):
+    text = commands.run("inspect", folder).stdout
+    assert "lie on one clock, and so do files in 2 other folders; --join-files" in text
+    done = commands.run("inspect", folder, "--join-files", "--json")
+    data = json.loads(done.stdout)
+    assert (data["movements"], {one["label"] for one in data["labels"]}) == (3, {"nod", "wave"})
+    assert not any("one clock" in one for one in data["notes"])
+    for k in range(4):  # repetitions that each begin at 0 are none
+        rows = [f"{i / 100},{i * k},{i * i}" for i in range(50 + k)]
+        (tmp_path / f"{k}.csv").write_text("\n".join(["time,x,y", *rows]))
+    assert "one clock" not in commands.run("inspect", tmp_path).stdout
