@@ -65,6 +65,20 @@ def test_inspect_lists_the_topics_of_several_bags(tmp_path):
     assert "file" not in answer("inspect", several[0])["contents"]["topics"][0]
 
 
+def test_inspect_says_once_what_several_bags_have_alike_and_leaves_out_what_does_not_move(tmp_path):
+    m = Maker("ros1")
+    for n in (20, 30):
+        messages = [("/arm", ns, m.joint_state(ns, ["a"], [k / 9])) for k, ns in enumerate(stamps(n))]
+        messages += [(f"/idle_{k}", START, m.string("x")) for k in range(25)]
+        write_bag(tmp_path, "ros1", messages, f"of_{n}")
+    done = run("inspect", tmp_path)
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["/arm", "sensor_msgs/msg/JointState", "20", "to", "30", "a", "movement", "2", "of", "2"] in lines
+    assert "and 25 topics that hold no movement; --json lists them" in done.stdout
+    assert len(lines) < 20
+    assert len(answer("inspect", tmp_path)["contents"]["topics"]) == 52
+
+
 def test_what_is_read_is_said(bag):
     done = run("inspect", bag, "--frame", "base:tool")
     assert "frames base:tool: time 'header.stamp' in s (stamps of headers)" in done.stdout

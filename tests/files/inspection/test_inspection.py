@@ -143,13 +143,33 @@ def test_columns_of_one_kind_may_move_alone(columns):
     assert spans(**columns) == ()
 
 
-def test_long_lists_are_cut_in_words_only(tmp_path, make_movement):
+def test_long_lists_are_cut_in_words_only_and_a_reason_of_many_files_is_said_once(tmp_path, make_movement):
     recordings(tmp_path, make_movement)
     for k in range(30):
-        (tmp_path / f"{k:02}.md").write_text("")
+        (tmp_path / f"a.{k:02}").write_text("")
     found = inspect(read_recordings(tmp_path))
     assert "  and 11 more" in as_words(found)
+    for k in range(30):
+        (tmp_path / f"a.{k:02}").rename(tmp_path / f"{k:02}.md")
+    found = inspect(read_recordings(tmp_path))
+    assert "  00.md, 01.md, 02.md and 27 more: expected a file ending in" in as_words(found)
+    assert "  and " not in as_words(found)
     assert len(as_data(found)["problems"]) == 31
+
+
+def test_many_columns_are_said_in_few_lines_and_those_that_never_move_are_named():
+    t = np.linspace(0, 1, 20)
+    moving = [f"joint_{k}" for k in range(30)]
+    heads = ["time", *moving, "fixed_1", "fixed_2"]
+    rows = [",".join(map(repr, [at, *(float(np.sin(at + k)) for k in range(30)), 1.5, 0.25])) for at in t.tolist()]
+    found = inspect(read_recordings_from_bytes("\n".join([",".join(heads), *rows]).encode(), "a.csv", Layout()))
+    words = as_words(found)
+    assert "joint_22, joint_23 and 8 more" in words
+    assert "  joint_0, joint_1, joint_2, joint_3" in words.partition("kinds:")[2]
+    assert "joint_11 and 18 more: angle; wraps are taken away" in words
+    assert "2 of 32 channels never move: fixed_1, fixed_2; --exclude leaves them out" in found.notes
+    assert len(words.splitlines()) < 20
+    assert as_data(found)["detected"][0]["columns"] == tuple(heads[1:])
 
 
 @pytest.mark.parametrize("n_dims", [1, 2, 3, 5])

@@ -21,6 +21,7 @@ from kineme.movements.tables.time_stamps import GUESSED
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
+_MANY, _NAMED = 7, 12  # columns from which on still ones are counted; channels that a note names
 _RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
 
 
@@ -163,10 +164,28 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
-    """Columns whose values do not fit their kind."""
-    notes = []
+    """Columns whose values do not fit their kind, and those that never change."""
+    notes = _notes_on_still_columns(demos)
     for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True):
         values = demos.recorded[:, columns.start]
         if one.kind == "position" and values.min() < values.max() and ((values == 0) | (values == 1)).all():
             notes.append(f"{one.name} is 0 or 1 throughout; if it is a switch, say --kind {one.name}=discrete")
     return notes
+
+
+def _notes_on_still_columns(demos: Demonstrations) -> list[str]:
+    """Columns of many that have one value throughout every movement: they tell nothing of what moves."""
+    names, x, starts = recorded_names(demos.channels or ()), demos.recorded, demos.offsets[:-1]
+    if len(names) < _MANY:
+        return []
+    still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)
+    quiet = [
+        one.name
+        for one, columns in zip(demos.channels or (), columns_of(demos.channels or ()), strict=True)
+        if still[columns].all()
+    ]
+    if not quiet:
+        return []
+    more = f" and {len(quiet) - _NAMED} more" if len(quiet) > _NAMED else ""
+    named = f"{', '.join(quiet[:_NAMED])}{more}"
+    return [f"{len(quiet)} of {len(demos.channels or ())} channels never move: {named}; --exclude leaves them out"]

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from kineme.files.inspection.inspect import Inspection, LabelSummary, Range
-from kineme.movements.channels.channel import Channel
+from kineme.files.problem import Problem
+from kineme.movements.channels.channel import Channel, Channels
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.parsed import Detected
 from kineme.output.table import Table, to_text
 from kineme.output.text import counted, printable
 
 _SHOWN = 20  # lines of a list; the rest is counted
+_COLUMNS, _CHANNELS, _FILES = 24, 12, 3  # names in a line
 
 
 def as_data(inspection: Inspection) -> dict[str, Any]:
@@ -43,10 +46,10 @@ def as_words(inspection: Inspection) -> str:
     parts = [to_text(Table(title, heads, rows))]
     parts += _listed("read as", [f"{_understood(how)} ({counted(n, 'file')})" for how, n in inspection.detected])
     channels = inspection.channels or ()
-    parts += _listed("kinds", [_kind(one, lever_of(channels)) for one in channels if one.kind != "position"])
+    parts += _listed("kinds", _kinds(channels))
     parts += _listed("the same movement more than once", [" = ".join(group) for group in inspection.duplicates])
-    parts += _listed("not read", [str(one) for one in inspection.problems if not one.samples])
-    parts += _listed("read but for samples", [str(one) for one in inspection.problems if one.samples])
+    parts += _listed("not read", _once([one for one in inspection.problems if not one.samples]))
+    parts += _listed("read but for samples", _once([one for one in inspection.problems if one.samples]))
     parts += _listed("note", list(inspection.notes))
     return "\n\n".join(parts)
 
@@ -56,6 +59,21 @@ def _listed(head: str, lines: list[str]) -> list[str]:
         return []
     more = [f"  and {len(lines) - _SHOWN} more"] if len(lines) > _SHOWN else []
     return ["\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines[:_SHOWN]), *more])]
+
+
+def _once(problems: Sequence[Problem]) -> list[str]:
+    """A line for each reason, with the files that share it."""
+    files: dict[str, dict[str, None]] = {}
+    for problem in problems:
+        files.setdefault(problem.what, {})[problem.file] = None
+    return [
+        f"{_names([*names], _FILES)}{', ' if what.startswith('line ') else ': '}{what}" for what, names in files.items()
+    ]
+
+
+def _names(names: Sequence[str], most: int) -> str:
+    """The first names of many."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _row(one: LabelSummary) -> tuple[str, ...]:
@@ -72,6 +90,18 @@ def _range(values: Range) -> str:
     return median if least == greatest else f"{median} ({least} to {greatest})"
 
 
+def _kinds(channels: Channels) -> list[str]:
+    """A line for each channel that is no position; of many, a line for each kind."""
+    lever = lever_of(channels)
+    others = [(one, _kind(one, lever)) for one in channels if one.kind != "position"]
+    if len(others) <= _CHANNELS:
+        return [f"{', '.join(one.columns)}: {kind}" for one, kind in others]
+    names: dict[str, list[str]] = {}
+    for one, kind in others:
+        names.setdefault(kind, []).append(one.name)
+    return [f"{_names(alike, _CHANNELS)}: {kind}" for kind, alike in names.items()]
+
+
 def _kind(channel: Channel, lever: float) -> str:
     what = {
         "angle": f"angle{f' in {channel.unit}' if channel.unit else ''}; wraps are taken away",
@@ -79,7 +109,7 @@ def _kind(channel: Channel, lever: float) -> str:
         + ("" if lever == 1 else f", a radian as {lever:g}"),
         "discrete": "discrete; kept as it is, not learned",
     }
-    return f"{', '.join(channel.columns)}: {what[channel.kind]}"
+    return what[channel.kind]
 
 
 def _understood(how: Detected) -> str:
@@ -92,7 +122,7 @@ def _understood(how: Detected) -> str:
         ("left aside", how.ignored),
     ):
         if named := [column for column in columns if column]:
-            parts.append(f"{what} {', '.join(named)}")
+            parts.append(f"{what} {_names(named, _COLUMNS)}")
     return "; ".join(parts)
 
 
@@ -100,6 +130,6 @@ def _coordinates(how: Detected) -> str:
     """The coordinates with their units, once if they have the same."""
     known = set(how.measured_in)
     if len(known) == 1:
-        return f"{', '.join(how.columns)} in {known.pop()}"
+        return f"{_names(how.columns, _COLUMNS)} in {known.pop()}"
     named = zip(how.columns, how.measured_in or [""] * len(how.columns), strict=True)
-    return ", ".join(f"{name} [{unit}]" if unit else name for name, unit in named)
+    return _names([f"{name} [{unit}]" if unit else name for name, unit in named], _COLUMNS)
