@@ -40,7 +40,7 @@ def export(victim, tmp_path):
 
 def _opened(export, tmp_path):
     """The attacked file as a library that was never imported."""
-    (tmp_path / "planted").mkdir()
+    (tmp_path / "planted").mkdir(parents=True)
     shutil.copyfile(export, tmp_path / "planted" / FILE)
     return tmp_path / "planted"
 
@@ -243,3 +243,57 @@ def test_what_a_file_defines_is_never_trusted(victim, tmp_path, mode):
         assert connection.getlimit(sqlite3.SQLITE_LIMIT_LENGTH) == max(1 << 20, path.stat().st_size)
         with pytest.raises(sqlite3.OperationalError, match="too many attached"):
             connection.execute("ATTACH ':memory:' AS other")
+
+
+def _undo_all(library):
+    _again_and_again(library.undo)
+
+
+def _again_and_again(undo):
+    while True:
+        undo()
+
+
+def _learn(library):
+    library.learn([np.column_stack((np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2))], ["new"])
+
+
+#: Rows that are valid one by one, with right seals -> what fails on them.
+MISFITS = {
+    "a member that is nowhere": ("UPDATE member SET movement = 77 WHERE id = 1", _undo_all),
+    "a state that ends later": (
+        "UPDATE symbol_state SET removed = 77 WHERE id = (SELECT min(id) FROM symbol_state)", _undo_all,
+    ),
+    "a number after which there is none": (
+        f"UPDATE member SET id = {2**63 - 1} WHERE id = (SELECT max(id) FROM member)", _learn,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MISFITS)
+def test_rows_that_do_not_fit_together_are_the_fault_of_the_file(export, tmp_path, name):
+    statement, act = MISFITS[name]
+    attack(export, [statement])
+    with ActionLibrary(_opened(export, tmp_path)) as library:
+        with pytest.raises(DataError, match=r"to fit together, got .*; take it from a backup"):
+            act(library)
+        assert library.verify()
+
+
+def test_an_error_of_the_program_around_a_hostile_library_stays_its_own(export, tmp_path):
+    attack(export, [MISFITS["a member that is nowhere"][0]])
+    with pytest.raises(KeyError, match="mine"), ActionLibrary(_opened(export, tmp_path)):
+        raise KeyError("mine")
+    with pytest.raises(TypeError, match="argument"), ActionLibrary(_opened(export, tmp_path / "again")) as library:
+        library.undo(wrong=1)
+
+
+def test_an_error_of_a_function_over_the_store_is_that_of_the_file_too(export, tmp_path):
+    from kineme.library.storage.undo import undo
+
+    attack(export, [MISFITS["a state that ends later"][0]])
+    library = ActionLibrary(_opened(export, tmp_path))
+    with pytest.raises(sqlite3.IntegrityError) as raised:
+        _again_and_again(lambda: undo(library.store))
+    with pytest.raises(DataError, match="to fit together, got"):
+        library.__exit__(type(raised.value), raised.value, None)

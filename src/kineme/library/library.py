@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
@@ -41,6 +42,27 @@ if TYPE_CHECKING:
     from kineme.recognition.recognizer import Recognizer
 
 
+def _blaming(cls: type[ActionLibrary]) -> type[ActionLibrary]:
+    """Let every public method of a library blame a file whose rows do not fit together; see `verify.blame`."""
+    for name, method in list(vars(cls).items()):
+        if isinstance(method, FunctionType) and not name.startswith("_"):
+            setattr(cls, name, _guarded(method))
+    return cls
+
+
+def _guarded(method: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(method)
+    def call(self: ActionLibrary, *arguments: Any, **options: Any) -> Any:
+        try:
+            return method(self, *arguments, **options)
+        except verify.MISFITS as error:
+            verify.blame(self.store, error)
+            raise
+
+    return call
+
+
+@_blaming
 class ActionLibrary:
     """Movements, their primitives and features, and the symbols they stand for, in one folder.
 
@@ -95,8 +117,12 @@ class ActionLibrary:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        try:
+            if error is not None:  # also of functions over the store
+                verify.blame(self.store, error)
+        finally:
+            self.close()
 
     def close(self) -> None:
         """Close the database; the last process to do so leaves a single file."""

@@ -89,7 +89,7 @@ def _begin(connection: sqlite3.Connection, version: int) -> int:
     """The first of the versions in a row that one call made."""
     while version > 1:
         row = _version(connection, version)
-        if row[2] in RETURNS or parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
+        if parsed_column("version", row, "detail", dict).get(CONTINUES) != version - 1:
             break
         version -= 1
     return version
@@ -128,11 +128,12 @@ def _return_movements(change: Change, version: int) -> dict[int, int]:
 
 
 def _free_places(change: Change, lost: list[Row], now: list[Row]) -> None:
-    """Remove movements that were learned later from the positions of the lost ones in their files."""
+    """Remove movements that were learned later from the positions of the lost ones in their files.
+
+    What refers to them is of no earlier version, and is retired with all that is not.
+    """
     at = {row[1:3] for row in lost if row[1] is not None}
-    taken = [row for row in now if row[1] is not None and row[1:3] in at]
-    _leave(change, {row[0] for row in taken})
-    change.retire("movement", taken)
+    change.retire("movement", [row for row in now if row[1] is not None and row[1:3] in at])
 
 
 def _copy(change: Change, again: Mapping[int, int]) -> None:
@@ -159,13 +160,6 @@ def _return_states(change: Change, version: int, ids: Mapping[int, int]) -> None
 
 def _retire_movements(change: Change, kept: set[int]) -> None:
     change.retire("movement", [row for row in _rows(change, "movement", NOW) if row[0] not in kept])
-
-
-def _leave(change: Change, movements: set[int]) -> None:
-    keys = {"keys": listed(movements)}
-    change.retire("member", select(change.connection, "member", f"removed IS NULL AND {among('movement')}", keys))
-    states = select(change.connection, "symbol_state", f"removed IS NULL AND {among('prototype')}", keys)
-    change.retire("symbol_state", states)
 
 
 def _rows(change: Change, table: str, version: int) -> list[Row]:

@@ -6,8 +6,10 @@ import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from types import TracebackType
 from typing import Any
 
+from kineme.errors import DataError, KinemeError
 from kineme.library.storage.channels import other_columns
 from kineme.library.storage.column_checks import ALL_GOOD, CHECKS
 from kineme.library.storage.connection import connect
@@ -21,6 +23,9 @@ from kineme.library.storage.store import Store
 _SHOWN = 100  # messages per check
 _BATCH_BYTES = 1 << 24  # of rows whose contents are checked together
 _ROW_BYTES = 512  # memory of a row beside its bytes
+#: What rows raise that are valid one by one and do not fit together; seals, which anybody can compute, do not tell.
+MISFITS = (LookupError, ArithmeticError, ValueError, TypeError, AttributeError, sqlite3.IntegrityError)
+_CHAPTER = __name__.rpartition(".storage.")[0]
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,32 @@ def verify(store: Store, *, pages: bool = True) -> list[Problem]:
         ]
         problems = [problem for check in checks for problem in _all_of(check, connection)]
         return problems or _all_of(_lives, connection)  # relations between rows are checked only if each row is valid
+
+
+def blame(store: Store, error: BaseException) -> None:
+    """Raise an error of Python while a library is used as the library's, if it does not verify; else return.
+
+    Raises
+    ------
+    DataError
+        The message names the first problem.
+    """
+    if isinstance(error, KinemeError) or not isinstance(error, MISFITS) or not _is_ours(error.__traceback__):
+        return
+    if problems := verify(store):
+        raise DataError(
+            f"expected the rows of {store.path} to fit together, got {problems[0]}; take it from a backup or an export "
+            "that you trust: kineme library verify lists all that is wrong"
+        ) from error
+
+
+def _is_ours(trace: TracebackType | None) -> bool:
+    """Whether an error comes from this chapter, and not from the program around it."""
+    modules = []
+    while trace is not None:
+        modules.append(str(trace.tb_frame.f_globals.get("__name__")))
+        trace = trace.tb_next
+    return sum(name.startswith(_CHAPTER) for name in modules) > 1  # one is the call, whose arguments may be wrong
 
 
 def _all_of(check: Check, connection: sqlite3.Connection) -> list[Problem]:
