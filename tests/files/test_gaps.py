@@ -99,6 +99,22 @@ def test_a_crop_that_would_cost_half_of_a_movement_names_the_markers_instead(tmp
     assert (kept.demonstrations.lengths.tolist(), kept.problems) == ([85], ())
 
 
+def test_a_crop_that_begins_within_a_gap_goes_on_to_its_end(tmp_path):
+    x = points()
+    x[:20, 0] = np.nan
+    x[5:45, 1] = np.nan  # too long to be filled, but for what the other marker takes away anyway
+    x[150:160, 1] = np.nan
+    x[155:, 2] = np.nan
+    write_c3d(tmp_path / "a.c3d", x)
+    read = read_recordings(tmp_path / "a.c3d")
+    np.testing.assert_allclose(read.demonstrations.positions, x_between(points(), 45, 155), atol=0.5)
+    assert (read.sources[0].filled, read.sources[0].cropped) == (5, pytest.approx(0.9))
+
+
+def x_between(x, start, stop):
+    return x[start:stop].reshape(stop - start, -1)
+
+
 def test_markers_that_nobody_named_and_markers_that_were_never_seen_are_left_aside(tmp_path):
     x = points(n_markers=5)
     x[:, 2] = np.nan

@@ -74,12 +74,15 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
     ]
     repairs = [Repair()] * len(block.labels)
     for i in np.flatnonzero(np.diff(lacking)).tolist():
-        rows = np.arange(block.offsets[i], block.offsets[i + 1])
-        inside = rows[_span_of_all(missing[rows], layout.skip)]
-        outside[rows[0] : inside[0]] = outside[inside[-1] + 1 : rows[-1] + 1] = True
-        filled, longest = _fill(positions, inside, (block.times[inside], layout.fill_gaps), channels)
-        ends = block.times[rows[[0, -1]]] - block.times[inside[[0, -1]]]
-        repairs[i] = Repair(filled, longest, float(np.abs(ends).sum()))
+        rows = slice(block.offsets[i], block.offsets[i + 1])
+        times = block.times[rows]
+        filled = _fill(positions[rows], times, layout.fill_gaps, channels)
+        inside = _span_of_all(np.isnan(positions[rows]), layout.skip)
+        outside[rows] = True
+        outside[rows][inside] = False
+        ends = times[[0, -1]] - times[inside][[0, -1]]
+        filled = filled[inside]
+        repairs[i] = Repair(int(np.count_nonzero(filled)), float(filled.max()), float(np.abs(ends).sum()))
     kept = ~outside
     offsets = np.concatenate(([0], np.cumsum(kept)))[block.offsets].astype(np.intp)
     return replace(
@@ -93,17 +96,17 @@ def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:
 
 
 def _span_of_all(missing: Flags, skip: str) -> slice:
-    """The samples from the first to the last one at which the columns of a movement (T, d) have values."""
+    """The samples from the first to the last one in which all columns of a movement (T, d) have values."""
     n = len(missing)
+    complete = np.flatnonzero(~missing.any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
     known = ~missing
-    empty = missing.all(axis=0)
-    first = np.where(empty, n, known.argmax(axis=0))
-    stop = np.where(empty, 0, n - known[::-1].argmax(axis=0))
-    length = int(stop.min()) - int(first.max())
-    if length >= max(MIN_SAMPLES, 0 if skip == "sample" else _LEAST * n):
-        return slice(int(first.max()), int(stop.min()))
-    loose = first + n - stop < _EDGE * n
-    return slice(int(first[loose].max(initial=0)), int(stop[loose].min(initial=n)))
+    ends = np.where(missing.all(axis=0), n, known.argmax(axis=0) + known[::-1].argmax(axis=0))
+    complete = np.flatnonzero(~missing[:, ends < _EDGE * n].any(axis=1))
+    if len(complete) and complete[-1] + 1 - complete[0] >= max(MIN_SAMPLES, _LEAST * n):
+        return slice(int(complete[0]), int(complete[-1]) + 1)
+    return slice(0, n)
 
 
 def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
@@ -117,26 +120,22 @@ def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Fl
     return find_channels(columns, block.positions[complete], offsets, given)
 
 
-def _fill(
-    positions: Array, rows: NDArray[np.intp], clock: tuple[Array, float], channels: Sequence[tuple[Channel, list[int]]]
-) -> tuple[int, float]:
-    """Fill the short gaps of one movement in place; the number of samples that had some, and the longest gap [s]."""
-    times, most = clock
-    filled, longest = np.zeros(len(rows), dtype=bool), 0.0
+def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Channel, list[int]]]) -> Array:
+    """Fill the short gaps of one movement (T, d) in place; the longest gap in which each sample lay, 0 for none [s]."""
+    longest = np.zeros(len(values))
     for one, columns in channels:
-        values = positions[rows[:, None], columns]
-        missing: Flags = np.asarray(np.isnan(values).any(axis=1))
+        missing: Flags = np.asarray(np.isnan(values[:, columns]).any(axis=1))
         spans = spans_of(missing, times)
         short = spans.seconds <= most * (1.0 + _ROUNDING)
         if not short.any():
             continue
-        changes = np.zeros(len(rows) + 1, dtype=np.intp)
-        changes[spans.first[short]], changes[spans.stop[short]] = 1, -1
-        chosen = np.flatnonzero(np.cumsum(changes[:-1]))
-        positions[rows[chosen, None], columns] = _between(one, (times[~missing], values[~missing]), times[chosen])
-        filled[chosen] = True
-        longest = max(longest, float(spans.seconds[short].max()))
-    return int(filled.sum()), longest
+        lengths = (spans.stop - spans.first)[short]
+        begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
+        chosen = begun + np.arange(len(begun))
+        known = times[~missing], values[np.ix_(~missing, columns)]
+        values[np.ix_(chosen, columns)] = _between(one, known, times[chosen])
+        longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
+    return longest
 
 
 def _between(channel: Channel, known: tuple[Array, Array], times: Array) -> Array:
