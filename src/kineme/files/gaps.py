@@ -132,8 +132,8 @@ def _fill(values: Array, times: Array, most: float, channels: Sequence[tuple[Cha
         lengths = (spans.stop - spans.first)[short]
         begun = np.repeat(spans.first[short] - np.cumsum(lengths) + lengths, lengths)
         chosen = begun + np.arange(len(begun))
-        known = times[~missing], values[np.ix_(~missing, columns)]
-        values[np.ix_(chosen, columns)] = _between(one, known, times[chosen])
+        known = times[~missing], values[~missing][:, columns]
+        values[chosen[:, None], columns] = _between(one, known, times[chosen])
         longest[chosen] = np.maximum(longest[chosen], np.repeat(spans.seconds[short], lengths))
     return longest
 
