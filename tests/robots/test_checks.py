@@ -118,7 +118,7 @@ def test_a_limit_that_is_passed_between_two_samples_only_fails(tmp_path):
     assert "position" not in failed
     assert failed["position between samples"].where == "j2"
     assert 0.2 < failed["position between samples"].time < 0.4
-    assert failed["acceleration between samples"].time == pytest.approx(0.4)
+    assert 0.4 < failed["acceleration between samples"].time < 0.6
 
 
 @pytest.mark.parametrize(("off", "passes"), [(0.9e-3, True), (1.1e-3, False)])

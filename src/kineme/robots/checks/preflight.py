@@ -11,11 +11,11 @@ from kineme.errors import TrajectoryError
 from kineme.robots.checks.along import Along, along
 from kineme.robots.checks.between_samples import between_samples
 from kineme.robots.checks.check import Check, Preflight, unit_of
-from kineme.robots.checks.torques import knows_masses
 from kineme.robots.checks.tracking import tracking
 from kineme.robots.execution.between import between, dense_times
 from kineme.robots.execution.joint_trajectory import JointTrajectory
 from kineme.robots.execution.timing import STANDS
+from kineme.robots.execution.torques import knows_masses
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
@@ -113,7 +113,7 @@ def _torques(robot: Robot, trajectory: JointTrajectory, state: Along) -> Iterato
             limit,
             "N" if robot.units[j] == "m" else "Nm",
             passed,
-            1.0 if passed else _slower_for(holding, moving, limit),
+            _slower_for(holding, moving, limit),
         )
 
 

@@ -20,14 +20,11 @@ LONGEST = 1_000_000  # samples of one trajectory, at most
 _LEAST = 4  # samples
 
 
-class Timing(NamedTuple):
-    """The parameter s of a path at T even times t."""
+class Timed(NamedTuple):
+    """A path of joints, followed in time."""
 
-    times: Array  # (T,), t [s]
-    s: Array  # (T,), s(t)
-    velocity: Array  # (T,), ds/dt
-    acceleration: Array  # (T,), d2s/dt2
-    generated: Array  # (T,), the time of the movement as it was generated [s]
+    trajectory: JointTrajectory
+    generated: Array  # (T,), the time of the movement as it was generated, at each sample [s]
 
 
 def n_samples(duration: float, rate: float, most: int = LONGEST) -> int:
@@ -46,12 +43,13 @@ def n_samples(duration: float, rate: float, most: int = LONGEST) -> int:
     return max(_LEAST, round(duration * rate) + 1)
 
 
-def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1.0) -> Timing:
+def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1.0) -> Timed:
     """The timing of the movement itself, t = s; where it begins or ends in motion, with a ramp from or to a stand.
 
     In a ramp of r seconds, with x = t / r, ``ds/dt = 3 x^2 - 2 x^3`` and so ``s = r (x^3 - x^4 / 2)``: it takes r / 2
     seconds more than without. r is such that the arm takes half of its acceleration for it. All of it takes `factor`
-    times as long, ``s(t / factor)``.
+    times as long, ``s(t / factor)``. By the chain rule ``dq/dt = q'(s) ds/dt`` and ``d2q/dt2 = q''(s) (ds/dt)^2 +
+    q'(s) d2s/dt2``.
     """
     duration = float(path.x[-1])
     at_ends = np.abs(path(np.array([0.0, duration]), 1)) / factor  # (2, n)
@@ -69,7 +67,12 @@ def as_generated(robot: Robot, path: CubicSpline, rate: float, factor: float = 1
         velocity[within] = (3 * x**2 - 2 * x**3)[within]
         acceleration[within] = (sign * 6 * (x - x**2) / ramp)[within]
     s = np.clip(s, 0.0, duration)
-    return Timing(factor * times, s, velocity / factor, acceleration / factor**2, s)
+    slope, bend = path(s, 1), path(s, 2)
+    velocity, acceleration = velocity[:, None] / factor, acceleration[:, None] / factor**2
+    trajectory = JointTrajectory(
+        robot.joints, factor * times, path(s), slope * velocity, bend * velocity**2 + slope * acceleration, {}
+    )
+    return Timed(trajectory, s)
 
 
 def _ramp(robot: Robot, velocity: Array) -> float:
@@ -79,20 +82,3 @@ def _ramp(robot: Robot, velocity: Array) -> float:
         return 0.0
     moving, shortest = _GENTLE
     return max(shortest * min(1.0, share / moving), float(np.max(_PEAK * velocity / (_SHARE * robot.acceleration))))
-
-
-def timed(robot: Robot, path: CubicSpline, timing: Timing) -> JointTrajectory:
-    """The joints along the path q(s) at the times of `timing`, by the chain rule.
-
-    ``dq/dt = q'(s) ds/dt`` and ``d2q/dt2 = q''(s) (ds/dt)^2 + q'(s) d2s/dt2``.
-    """
-    first, second = path(timing.s, 1), path(timing.s, 2)
-    velocity, acceleration = timing.velocity[:, None], timing.acceleration[:, None]
-    return JointTrajectory(
-        robot.joints,
-        timing.times,
-        path(timing.s),
-        first * velocity,
-        second * velocity**2 + first * acceleration,
-        {},
-    )

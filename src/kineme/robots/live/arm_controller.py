@@ -13,8 +13,8 @@ from kineme.movements.rotations.matrices import matrices_of
 from kineme.movements.rotations.one_rotation import matrix_one
 from kineme.primitives.control.controller import Controller
 from kineme.primitives.control.state import State
-from kineme.robots.checks.torques import Torques
 from kineme.robots.checks.tracking import TRACKED, TURNED
+from kineme.robots.execution.torques import Torques
 from kineme.robots.kinematics.reach import point_in_words, reaching_postures
 from kineme.robots.live.arm_state import ArmState, ArmStatus
 from kineme.robots.live.live_kinematics import LiveKinematics

@@ -13,6 +13,7 @@ _OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by 
 _ELSEWHERE = "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
 _OTHER_JOINTS = "No speed helps: choose another goal (--goal) or start (--at) of the joints"
 _TRIED = 20_000  # samples, at most, of the movement slowed down
+_ENOUGH = 1_000.0  # samples per second to learn by how much; more of them pass as well
 _MORE = 10  # times the samples, where they are too few
 
 
@@ -26,7 +27,8 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
     more = f"{finer.rate:g} samples per second (rate=, --rate)"
     if sampled and _tried(finer, timing) is not None:
         return f"Choose a higher rate, as of {more}"
-    for one, besides in ((untimed, ""), (finer, f", at {more}"))[: 2 if sampled else 1]:
+    itself = untimed._replace(rate=min(untimed.rate, _ENOUGH))
+    for one, besides in ((itself, ""), (finer, f", at {more}"))[: 2 if sampled else 1]:
         slower = None if timing == "slowed" else _tried(one, "slowed")
         if slower is not None:
             slow = "slow it down (timing='slowed', --slow-down)"

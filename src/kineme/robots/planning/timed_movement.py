@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from kineme.robots.checks.between_samples import SAMPLING
 from kineme.robots.checks.check import Check
 from kineme.robots.checks.preflight import preflight
 from kineme.robots.checks.steps import Steps, steps_kept
 from kineme.robots.execution.approach import approach
 from kineme.robots.execution.between import dense_times
 from kineme.robots.execution.joint_trajectory import JointTrajectory, joined
-from kineme.robots.execution.retime import fastest
-from kineme.robots.execution.timing import LONGEST, Timing, as_generated, n_samples, timed
+from kineme.robots.execution.retime import fastest, sampled
+from kineme.robots.execution.timing import LONGEST, Timed, as_generated, n_samples
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.robots.planning.robot_movement import RobotMovement
@@ -25,8 +27,10 @@ from kineme.validation import Array
 
 SLOWEST_RATE, FASTEST_RATE = 1.0, 10_000.0  # samples per second of what is sent
 TIMINGS = ("generated", "slowed", "fastest")
-_ROUNDS = 8  # of slowing down: torques do not fall as fast as velocities do
-_A_LITTLE = 1 + 1e-6
+_ROUNDS = 16  # of slowing down, at most
+_A_LITTLE = 1e-6  # slower at least, from one round to the next twice as much: samples lie elsewhere each time
+_CLOSE = 1.005  # times as slow as what does not pass: no faster one is looked for
+_OF_SPEED = ("velocity", "acceleration", "torque")
 _APPROACH = 1.01  # times slower than its torques at the samples demand
 
 
@@ -45,26 +49,75 @@ class Untimed(NamedTuple):
 
 
 def with_timing(untimed: Untimed, timing: str, most: int = LONGEST) -> RobotMovement:
-    """The movement with that timing; "slowed" goes on until it passes, as long as that helps.
+    """The movement with that timing; "slowed" and "fastest" as slow as it passes, if any speed does.
+
+    Where the fastest timing along the path is slower than the movement itself, it is that.
 
     Raises
     ------
     SpecificationError
         More than a million samples; slowed down, more than `most`.
+    TrajectoryError
+        The fastest timing of a movement in which no joint moves.
     """
-    robot, rate = untimed.robot, untimed.rate
-    if timing == "fastest":
-        joints, chosen = fastest(robot, untimed.joints, rate)
-        return _checked(untimed, joints, chosen)
-    joints, factor = untimed.joints, 1.0
-    made = _checked(untimed, joints, as_generated(robot, joints, rate))
-    for _ in range(_ROUNDS if timing == "slowed" else 0):
-        if made.preflight.passed or not np.isfinite(made.preflight.slower):
-            break
-        factor *= min(made.preflight.slower, _least(robot, joints, factor)) * _A_LITTLE
-        n_samples(factor * float(joints.x[-1]), rate, most)
-        made = _checked(untimed, joints, as_generated(robot, joints, rate, factor))
-    return made
+    robot, joints, rate = untimed.robot, untimed.joints, untimed.rate
+    itself = partial(as_generated, robot, joints, rate)
+    if timing == "generated":
+        return _checked(untimed, itself(1.0))
+    if timing == "slowed":
+        return _slowed(untimed, itself, most)
+    parameterization = fastest(robot, joints)
+    if parameterization is None:
+        return _slowed(untimed, itself, most)
+    made = _slowed(untimed, partial(sampled, robot, parameterization, rate), most, follows=True)
+    if made.factor <= 1 or not np.isfinite(made.preflight.slower):
+        return made
+    other = _slowed(untimed, itself, most)
+    return min((made, other), key=lambda one: (not one.preflight.passed, one.trajectory.duration))
+
+
+def _slowed(untimed: Untimed, course: Callable[[float], Timed], most: int, follows: bool = False) -> RobotMovement:
+    """The movement as many times as slowly as its course is at the least factor from 1 on with which it passes.
+
+    What the checks of one factor demand is the next one, if it lies between the largest that fails and the least that
+    passes. With `follows` it is the speed that leads the tip off its path.
+    """
+    robot, joints, factor = untimed.robot, untimed.joints, 1.0
+    made = first = _checked(untimed, course(factor))
+    fails, passes, passing = 1.0, np.inf, None
+    for k in range(_ROUNDS):
+        if made.preflight.passed:
+            passes, passing = factor, made
+            if factor == 1 or passes / fails < _CLOSE or _used(made) * _CLOSE > 1:
+                break
+            factor *= max(_used(made), float(np.sqrt(fails / factor)))
+        else:
+            needed = _needed(untimed, made, follows)
+            if not np.isfinite(needed):
+                break
+            fails = factor
+            factor *= max(min(needed, _least(robot, joints, factor)), 1 + _A_LITTLE * 2**k)
+            if factor >= passes:
+                factor = float(np.sqrt(fails * passes))
+        n_samples(factor * float(joints.x[-1]), untimed.rate, most)
+        made = _checked(untimed, course(factor))
+    return passing or (made if np.isfinite(_needed(untimed, made, follows)) else first)
+
+
+def _needed(untimed: Untimed, made: RobotMovement, follows: bool) -> float:
+    """How many times slower the checks that failed demand; a distance from the path falls with the square of it."""
+    return max(
+        (_off_path(c) if follows and c.what == "tracking" else c.slower for c in made.preflight.failed), default=1.0
+    )
+
+
+def _off_path(check: Check) -> float:
+    return float(np.sqrt(check.worst / check.limit))
+
+
+def _used(made: RobotMovement) -> float:
+    """What share of the limits that speed is up to the movement takes, as a factor of its duration."""
+    return max(c.slower for c in made.preflight.checks if c.what.removesuffix(SAMPLING) in _OF_SPEED)
 
 
 def _least(robot: Robot, joints: CubicSpline, factor: float) -> float:
@@ -77,27 +130,27 @@ def _least(robot: Robot, joints: CubicSpline, factor: float) -> float:
     return max(2.0, float(needed) / factor)
 
 
-def _checked(untimed: Untimed, joints: CubicSpline, timing: Timing) -> RobotMovement:
-    """The approach and the movement with that timing, and the checks of both; the approach slow enough for torques."""
-    made = _assembled(untimed, joints, timing)
+def _checked(untimed: Untimed, movement: Timed) -> RobotMovement:
+    """The approach and the movement, and the checks of both; the approach slow enough for torques."""
+    made = _assembled(untimed, movement)
     slower = max((check.slower for check in made.preflight.failed if check.time < made.begins), default=1.0)
-    return _assembled(untimed, joints, timing, slower * _APPROACH) if 1 < slower < np.inf else made
+    return _assembled(untimed, movement, slower * _APPROACH) if 1 < slower < np.inf else made
 
 
-def _assembled(untimed: Untimed, joints: CubicSpline, timing: Timing, longer: float = 1.0) -> RobotMovement:
-    robot = untimed.robot
-    in_force = np.searchsorted(untimed.step_times, timing.generated + 1e-9, "right") - 1
+def _assembled(untimed: Untimed, movement: Timed, longer: float = 1.0) -> RobotMovement:
+    robot, generated = untimed.robot, movement.generated
+    in_force = np.searchsorted(untimed.step_times, generated + 1e-9, "right") - 1
     steps = {name: values[in_force] for name, values in untimed.steps.items()}
-    along = {name: np.interp(timing.generated, untimed.step_times, x) for name, x in untimed.continuous.items()}
-    movement = replace(timed(robot, joints, timing), steps=steps | along)
-    first = approach(robot, untimed.start, movement.positions[0], untimed.rate, longer)
-    whole = joined(first, movement)
+    along = {name: np.interp(generated, untimed.step_times, x) for name, x in untimed.continuous.items()}
+    second = replace(movement.trajectory, steps=steps | along)
+    first = approach(robot, untimed.start, second.positions[0], untimed.rate, longer)
+    whole = joined(first, second)
     times = dense_times(robot, whole)
     times = times[np.searchsorted(times, first.duration - 1e-9) :]
-    report = preflight(robot, whole, _wanted(untimed, timing, times, first.duration), untimed.follow)
+    report = preflight(robot, whole, _wanted(untimed, movement, times, first.duration), untimed.follow)
     report = replace(report, checks=(*report.checks, *_steps(untimed, whole)))
-    wanted = _wanted(untimed, timing, first.duration + timing.times, first.duration)
-    return RobotMovement(robot, whole, wanted, report, first.duration, movement.duration / float(timing.generated[-1]))
+    wanted = _wanted(untimed, movement, first.duration + second.times, first.duration)
+    return RobotMovement(robot, whole, wanted, report, first.duration, second.duration / float(generated[-1]))
 
 
 def _steps(untimed: Untimed, trajectory: JointTrajectory) -> Iterator[Check]:
@@ -106,9 +159,9 @@ def _steps(untimed: Untimed, trajectory: JointTrajectory) -> Iterator[Check]:
         yield steps_kept(untimed.robot, trajectory, Steps(name, values, velocities))
 
 
-def _wanted(untimed: Untimed, timing: Timing, times: Array, begins: float) -> TaskPath | None:
+def _wanted(untimed: Untimed, movement: Timed, times: Array, begins: float) -> TaskPath | None:
     """The poses of the tip at times of the trajectory, in which the movement begins at `begins` [s]."""
     if untimed.path is None:
         return None
-    generated = PchipInterpolator(timing.times, timing.generated)(times - begins)
-    return untimed.path.at(np.clip(generated, 0.0, timing.generated[-1]))._replace(times=times)
+    generated = PchipInterpolator(movement.trajectory.times, movement.generated)(times - begins)
+    return untimed.path.at(np.clip(generated, 0.0, movement.generated[-1]))._replace(times=times)
