@@ -30,13 +30,33 @@ def test_it_touches_a_limit_and_exceeds_none(formulation, limits):
     goal = primitives.goals + 3.0
     via = [(0.4, primitives.rollout(goal=goal, n_samples=11).positions[:, 4] + 2.0)]
     least = primitives.rollout(goal=goal, via=via).least_duration(**limits)
-    fastest = primitives.rollout(goal=goal, via=via, duration=least)
+    fastest = primitives.rollout(goal=goal, via=via, duration=least, n_samples=10_000)
     used = np.zeros(len(primitives))
     for name, limit in limits.items():
         rates = fastest.velocities if name == "velocity" else fastest.accelerations
         used = np.maximum(used, (np.abs(rates) / limit).max(axis=(1, 2)))
-    np.testing.assert_allclose(used, 1.0, rtol=1e-9)
-    assert fastest.least_duration(**limits) == pytest.approx(least)
+    np.testing.assert_allclose(used, 1.0, rtol=1e-5)
+    assert fastest.least_duration(**limits) == pytest.approx(least, rel=1e-9)
+
+
+def test_a_limit_is_kept_between_samples_too():
+    """At its 200 samples this movement has 1.1 % less acceleration than between two of them."""
+    primitive = DMP().learn(kineme.load_lasa(["PShape"]))
+    least = primitive.rollout().least_duration(acceleration=200.0)
+    dense = np.abs(primitive.rollout(duration=least, n_samples=10_000).accelerations).max(axis=(1, 2))
+    np.testing.assert_allclose(dense, 200.0, rtol=1e-5)
+    sparse = np.abs(primitive.rollout(duration=least).accelerations).max(axis=(1, 2))
+    assert sparse.min() < 199.0
+    few = primitive.rollout(n_samples=50).least_duration(acceleration=200.0)
+    np.testing.assert_allclose(few, least, rtol=1e-12)
+
+
+def test_a_rhythm_keeps_its_limit_between_samples_too():
+    t = np.linspace(0.0, 4.0, 400)
+    rhythm = kineme.RhythmicDMP().learn([kineme.Trajectory(t, np.column_stack((np.sin(8 * t), np.cos(16 * t))))])
+    least = rhythm.rollout(n_samples=30).least_period(velocity=1.0)
+    dense = rhythm.rollout(period=least, n_samples=10_000)
+    np.testing.assert_allclose(np.abs(dense.velocities).max(), 1.0, rtol=1e-5)
 
 
 def test_paths_that_depend_on_the_duration_are_refused(learned):

@@ -96,10 +96,11 @@ class Rollout(BaseRollout):
         return self._derivative(2)
 
     def least_duration(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
-        """The least duration of each movement (n,) [s] in which the same path stays within limits, in closed form.
+        """The least duration of each movement (n,) [s] in which the same path stays within limits.
 
         Of one path, velocities are in proportion to ``1 / tau`` and accelerations to ``1 / tau^2``, so it is
-        ``tau max(|v_k| / velocity_k, sqrt(|a_k| / acceleration_k))``, the maximum over samples and dimensions k.
+        ``tau max(|v_k| / velocity_k, sqrt(|a_k| / acceleration_k))``, the maximum over time and dimensions k. It holds
+        between samples too, whatever their number, to 1e-5 of a limit.
         ``rollout(duration=...)`` moves so; initial velocities scale with the rest.
 
         Parameters
@@ -115,8 +116,8 @@ class Rollout(BaseRollout):
         """
         from kineme.primitives.discrete.least_duration import least_durations
 
-        motion = (self.velocities, self.accelerations)
-        return least_durations(self.durations, self.fixed_velocity, motion, (velocity, acceleration))
+        finely = self.end * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        return least_durations(self, self.durations, finely, self.fixed_velocity, (velocity, acceleration))
 
     @property
     def _shares(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,8 +104,12 @@ class PoseRollout(BaseRollout):
         SpecificationError
             As of `Rollout.least_duration`.
         """
-        motion = (self.velocities, self.accelerations)
-        return least_durations(self.tangent.durations, self.tangent.fixed_velocity, motion, (velocity, acceleration))
+        tangent = self.tangent
+        finely = (
+            tangent.end * tangent.primitives.dmp.n_basis,
+            lambda one, n: replace(one, tangent=replace(one.tangent, n_samples=n)),
+        )
+        return least_durations(self, tangent.durations, finely, tangent.fixed_velocity, (velocity, acceleration))
 
     @property
     def axis_names(self) -> list[str]:

@@ -70,7 +70,7 @@ class RhythmicRollout(BaseRollout):
         return (self._derivative(2) / self.periods[:, None, None] ** 2).transpose(0, 2, 1)
 
     def least_period(self, velocity: ArrayLike | None = None, acceleration: ArrayLike | None = None) -> Array:
-        """The least period of each movement (n,) [s] in which the same path stays within limits; closed form.
+        """The least period of each movement (n,) [s] in which the same path stays within limits.
 
         ``rollout(period=...)`` moves so; see `Rollout.least_duration`.
 
@@ -85,7 +85,8 @@ class RhythmicRollout(BaseRollout):
             No limit, or one that is not above 0; a rollout that was given an initial velocity other than 0.
         """
         fixed = self.velocity is not None and bool(self.velocity.any())
-        return least_durations(self.periods, fixed, (self.velocities, self.accelerations), (velocity, acceleration))
+        finely = self.n_periods * self.primitives.dmp.n_basis, lambda one, n: replace(one, n_samples=n)
+        return least_durations(self, self.periods, finely, fixed, (velocity, acceleration))
 
     @property
     def _batch(self) -> Batch:
