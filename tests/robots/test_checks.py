@@ -121,6 +121,21 @@ def test_a_limit_that_is_passed_between_two_samples_only_fails(tmp_path):
     assert 0.4 < failed["acceleration between samples"].time < 0.6
 
 
+@pytest.mark.parametrize("speeds", [(0.0, 0.4), (0.4, 0.0)])
+def test_no_joint_jumps_that_accelerates_evenly_over_a_gap(tmp_path, speeds):
+    """Over half a second its mean velocity is that of both ends, which leads 0.1 rad on, whichever end is faster."""
+    robot = simple_arm(tmp_path)
+    v = np.column_stack((speeds, (0.0, 0.0)))
+    q = np.array([[0.0, 1.0], [0.1, 1.0]])
+    a = np.full((2, 2), [np.diff(speeds)[0] / 0.5, 0.0])
+    report = preflight(robot, JointTrajectory(robot.joints, np.array([0.0, 0.5]), q, v, a, {}))
+    (jump,) = (check for check in report.checks if check.what == "jump")
+    assert jump.worst == pytest.approx(0.0, abs=1e-12)
+    there = q + np.array([[0.0, 0.0], [0.06, 0.0]])
+    report = preflight(robot, JointTrajectory(robot.joints, np.array([0.0, 0.5]), there, v, a, {}))
+    assert "jump" in {check.what for check in report.failed}
+
+
 @pytest.mark.parametrize(("off", "passes"), [(0.9e-3, True), (1.1e-3, False)])
 def test_a_tip_beside_its_path_fails(tmp_path, off, passes):
     robot = simple_arm(tmp_path)

@@ -74,6 +74,13 @@ def test_a_step_before_the_switch_is_in_force_from_the_switch_on():
     np.testing.assert_allclose([time for time, _ in mixed[1:]], [0.5, 1.0], atol=2e-3)
 
 
+def test_a_step_at_the_switch_itself_has_no_value_before_it():
+    """Both are at half the duration: what the second part was until then was never in force."""
+    one, other = gripped([(0.25, 0.0, 1.0)], [2.0]), gripped([(0.5, 5.0, 6.0)], [2.0])
+    steps = blend(one, other, (0.4, 0.6)).recorded_as.steps
+    np.testing.assert_array_equal(steps.values[:, 0], [0.0, 1.0, 6.0])
+
+
 def test_each_movement_of_a_batch_has_its_own_steps(tmp_path):
     many = gripped([(0.25, 0.0, 1.0), (0.5, 0.0, 1.0)], [2.0, 3.0])
     one = gripped([(0.5, 1.0, 0.0)], [4.0])

@@ -119,3 +119,10 @@ class TestRefusals:
         learned = DMP(n_basis=6).learn(shapes)
         with pytest.warns(ExtrapolationWarning, match="the difference of movements 0 is"):
             couple(learned[0], learned[7], (0.1, 0.9), offset=[40.0, 40.0])
+
+    def test_half_a_percent_that_is_missing_is_said(self, shapes):
+        learned = DMP(n_basis=6).learn(shapes)
+        with pytest.warns(ExtrapolationWarning, match=r"movements 0 is 0\.24\d* off, 0\.56 % of their extent"):
+            couple(learned[0], learned[7], (0.3, 0.7))
+        enough = DMP(n_basis=8).learn(shapes)
+        couple(enough[0], enough[7], (0.3, 0.7))  # warnings are errors

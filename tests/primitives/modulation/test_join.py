@@ -136,6 +136,13 @@ class TestBlend:
         assert np.abs(ours[620:] - at(second, u[620:])).max() < 0.01 * extent
         assert mixed.durations[0] == pytest.approx(times[-1], rel=1e-3)
 
+    def test_the_tempo_changes_from_one_to_the_other(self):
+        """Of the rise from 0 to 1 the integral is the rest from the middle of the stretch on."""
+        path = np.column_stack((np.linspace(0, 1, 50), np.linspace(0, 2, 50)))
+        slow, quick = (DMP().learn([kineme.Trajectory(np.linspace(0, end, 50), path)]) for end in (4.0, 1.0))
+        mixed = blend(slow, quick, (0.2, 0.6))
+        np.testing.assert_allclose(mixed.durations, 4.0 * 0.4 + 1.0 * 0.6, rtol=1e-6)
+
     def test_of_a_movement_with_itself_it_is_the_movement(self, parts):
         same = blend(parts[0], parts[0], (0.3, 0.5)).rollout(n_samples=200).positions
         np.testing.assert_allclose(same, parts[0].rollout(n_samples=200).positions, atol=0.05)
