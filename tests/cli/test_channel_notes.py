@@ -34,14 +34,15 @@ def test_names_and_units_that_differ_are_said(folder, command):
     _table(asked, ("px [mm]", "y [mm]", "z [m]"), 1.5)
     told = answer(command, asked, "--library", folder / "actions")
     names, units = told["notes"]
-    assert names == (
-        "Columns are compared in their order: px [mm], y [mm] of the recordings with x [m], y [m] of the library"
-    )
-    assert "Units differ and are not converted: px [mm] in mm, y [mm] in mm in the recordings, x [m] in m" in units
+    assert names == "Columns are compared in their order: px [mm] of the recordings with x [m] of the library"
+    assert "Units are converted: px [mm] in mm, y [mm] in mm in the recordings, x [m] in m" in units
     shown = run(command, asked, "--library", folder / "actions")[1]
     assert "Columns are compared in their order" in " ".join(shown.split())
     _table(asked, ("x [m]", "y [m]", "z [m]"), 1.5)
     assert answer(command, asked, "--library", folder / "actions")["notes"] == []
+    _table(asked, ("x", "y [m]", "z [m]"), 1.5)
+    (unsaid,) = answer(command, asked, "--library", folder / "actions")["notes"]
+    assert unsaid == "The recordings do not say the unit of x, which is taken for that of the library"
 
 
 @pytest.mark.parametrize("command", ["recognize", "annotate"])

@@ -133,7 +133,7 @@ def test_a_file_cut_or_altered_anywhere_gives_a_movement_or_a_problem(tmp_path, 
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        ({"units": "h"}, "expected units to be one of s, ms, us, ns or a number of seconds, got 'h'"),
+        ({"units": "mm"}, "expected units to be one of s, ms, us, ns or a number of seconds, got 'mm'"),
         ({"units": -1.0}, "expected units to be a number above 0, got -1.0"),
         ({"skip": "file"}, r"expected skip to be one of \['movement', 'sample'\], got 'file'"),
     ],

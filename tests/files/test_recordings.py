@@ -78,7 +78,7 @@ def test_columns_are_named(tmp_path):
         ("a.csv", "time,x\n0,1\n1,oops\n", "a.csv, line 3: expected a number in 'x', got 'oops'"),
         ("a.csv", "time,x\n0,1\n1\n", "a.csv, line 3: expected 2 columns, got 1"),
         ("a.csv", "a,b\n0,1\n1,2\n", r"a.csv: expected one column of times, .* got the columns \['a', 'b'\]"),
-        ("a.csv", "time,t,x\n0,1,2\n", "one column of times"),
+        ("a.csv", "time,t,x\n0,1,2\n1,5,2\n", "one column of times"),
         ("a.csv", "1\n2\n3\n4\n", "at least one of positions, got one column"),
         ("a.mp4", "", "a file ending in one of .csv, .tsv, .txt, .npz, .json, .*, got '.mp4'"),
         ("a.json", "[1, 2]", "an object with times and positions, got a list"),

@@ -98,8 +98,8 @@ def test_a_symbol_generates_unit_quaternions_and_the_gripper_under_their_names(l
 
 
 def test_other_channels_are_refused_by_name(library):
-    other = tuple(one if one.kind != "discrete" else one._replace(name="claw") for one in CHANNELS)
-    with pytest.raises(TrajectoryError, match=r"claw \(discrete\), tool.x"):
+    other = tuple(one if one.kind != "discrete" else one._replace(name="claw", columns=("claw",)) for one in CHANNELS)
+    with pytest.raises(TrajectoryError, match=r"as all others of the library .*, got \['claw', 'tool.x'"):
         library.learn(poses(channels=other))
     with pytest.raises(TrajectoryError, match="got plain coordinates"):
         library.learn(Demonstrations.from_arrays(np.cumsum(np.random.default_rng(0).normal(size=(2, 30, 6)), axis=1)))
@@ -281,3 +281,79 @@ def test_columns_of_the_same_names_are_learned_as_the_library_has_them(tmp_path,
         assert made.channels == before
         assert len(made) == 2
         assert {one.label for one in made.recognize(recorded(np.round(t / 2), 0))} == {"grip"}
+
+
+def frames(heads, columns):
+    """Movements of two kinds as data frames."""
+    u = np.linspace(0, 1, 50)
+    shapes = [np.column_stack([u, bend * u**2, np.sin(bend * u)]) for bend in (0.5, 3.0, 0.6, 3.2)]
+    tables = [pd.DataFrame(dict(zip(["t", *heads], np.column_stack([u, columns(x)]).T, strict=True))) for x in shapes]
+    return Demonstrations.from_dataframe(tables)
+
+
+OTHER_UNITS = {
+    "millimeters": (("x [mm]", "y [mm]", "z [mm]"), lambda x: 1000 * x),
+    "order": (("z [m]", "x [m]", "y [m]"), lambda x: x[:, [2, 0, 1]]),
+    "both": (("Z [cm]", "x_mm", "y [m]"), lambda x: x[:, [2, 0, 1]] * [100, 1000, 1]),
+}
+
+
+@pytest.mark.parametrize("other", OTHER_UNITS)
+def test_columns_are_learned_and_recognized_by_name_in_the_unit_of_the_library(tmp_path, other):
+    shown, asked = frames(("x [m]", "y [m]", "z [m]"), lambda x: x), frames(*OTHER_UNITS[other])
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(shown, list("abab"))
+        before = library.channels
+        answers = library.recognize(asked)
+        assert [answer.label for answer in answers] == list("abab")
+        np.testing.assert_allclose([answer.transform.scale[0] for answer in answers], 1.0, rtol=1e-3)
+        assert library.learn(asked).ids.tolist() == [1, 2, 3, 4], "they are the same movements"
+        assert library.channels == before
+        assert library.verify() == []
+
+
+def test_degrees_and_radians_are_one_in_a_library(tmp_path):
+    rad, deg = (
+        frames([f"j{k} [{unit}]" for k in range(3)], lambda x, size=size: size * x)
+        for unit, size in (("rad", 1.0), ("degrees", 180 / np.pi))
+    )
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(rad, list("abab"))
+        assert library.learn(deg).ids.tolist() == [1, 2, 3, 4], "they are the same movements"
+
+
+@pytest.mark.parametrize(
+    ("heads", "message"),
+    [
+        (("elbow_roll", "temp", "volt"), r"expected the columns \['x \[m\]', .* got \['elbow_roll', 'temp', 'volt'\]"),
+        (("x [V]", "y [m]", "z [m]"), r"expected 'x \[V\]' in 'm', as the others have it, got 'V', which cannot be"),
+        (("x", "y", "z"), r"expected 'x' in 'm', as the others have it, got no unit"),
+    ],
+)
+def test_other_names_and_units_are_not_learned(tmp_path, heads, message):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(frames(("x [m]", "y [m]", "z [m]"), lambda x: x))
+        with pytest.raises(TrajectoryError, match=message):
+            library.learn(frames(heads, lambda x: x))
+        assert len(library) == 4
+
+
+@pytest.mark.parametrize("heads", [("x1", "x2", "x3"), ("hand_x", "hand_y", "hand_z")])
+def test_columns_without_names_are_learned_by_their_count(tmp_path, heads):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(frames(("x", "y", "z"), lambda x: x))
+        assert library.learn(frames(heads, lambda x: 2 * x)).added == 4
+
+
+def test_a_name_that_was_learned_in_another_place_is_not_compared_in_order(tmp_path):
+    with ActionLibrary(tmp_path / "actions", create=True) as library:
+        library.learn(frames(("x", "y", "z"), lambda x: x), list("abab"))
+        with pytest.raises(TrajectoryError, match="with z in another place"):
+            library.recognize(frames(("w", "z", "y"), lambda x: x))
+        more = [
+            pd.DataFrame(
+                {"t": np.linspace(0, 1, 50), "load": np.arange(50.0) % 7, "y": 3 * u**2, "x": u, "z": np.sin(3 * u)}
+            )
+            for u in [np.linspace(0, 1, 50)]
+        ]
+        assert library.recognize(Demonstrations.from_dataframe(more))[0].label == "b"

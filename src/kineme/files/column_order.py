@@ -1,41 +1,120 @@
-"""Files with the same columns in several orders, such as quaternions w, x, y, z and x, y, z, w, in one order."""
+"""Files with the same columns in other orders and units, as w, x, y, z beside x, y, z, w, as one set of columns."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import NamedTuple
 
+from kineme.errors import TrajectoryError
+from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
-from kineme.movements.tables.parsed import Detected
+from kineme.movements.channels.column_match import Columns, columns_like
+from kineme.movements.channels.detect import unit_of
+from kineme.movements.tables.parsed import Detected, listed
+from kineme.movements.tables.time_stamps import words_of
+from kineme.units import unit_named
+
+#: Words in names of files that say which sensor of a device wrote x, y and z.
+_SENSORS = frozenset(
+    {
+        "accelerometer", "acceleration", "gyroscope", "gyro", "magnetometer", "gravity", "barometer", "battery",
+        "uncalibrated", "linear", "total",
+    }
+)  # fmt: skip
 
 
-def in_one_order(files: Sequence[FileRead]) -> list[FileRead]:
-    """Files whose columns have the same names in the order of the first file that has them."""
-    first: dict[frozenset[str], tuple[str, ...]] = {}
-    return [_ordered(one, first.setdefault(frozenset(_columns(one)), _columns(one))) for one in files]
+class ColumnSet(NamedTuple):
+    """The files with one set of columns, in one order and unit; those whose columns have no names; problems."""
+
+    same: list[FileRead]
+    nameless: list[FileRead]
+    problems: list[Problem]
 
 
-def notes_on_order(detected: Iterable[Detected], columns: Sequence[str]) -> list[str]:
-    """A sentence if files have the columns in another order than they are read in."""
-    others = [one.columns for one in detected if one.columns != columns and set(one.columns) == set(columns)]
-    if not others:
-        return []
-    moved = [[a, b] for a, b in zip(others[0], columns, strict=True) if a != b]
-    theirs, ours = (", ".join(names) for names in zip(*moved, strict=True))
-    return [f"some files have the columns {theirs} in this order: they are read as {ours}, that of the first file"]
+def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
+    """Files with the columns of most, in the order and in the units of these.
+
+    Parameters
+    ----------
+    files : sequence of FileRead
+        Of equally many columns.
+    by_number : bool, default False
+        The caller chose the columns by their numbers: names do not matter.
+    """
+    columns = [_columns(one) for one in files]
+    keys = [(frozenset(known.names), _sensors(one.path)) for one, known in zip(files, columns, strict=True)]
+    named = [key for key, one, known in zip(keys, files, columns, strict=True) if not _is_nameless(one, known)]
+    most = Counter(named or keys).most_common(1)[0][0]
+    exact = Counter(known for key, known in zip(keys, columns, strict=True) if key == most)
+    units = Counter(frozenset(zip(known.names, known.units, strict=True)) for known in exact.elements())
+    usual = units.most_common(1)[0][0]
+    ours = next(known for known in exact if frozenset(zip(known.names, known.units, strict=True)) == usual)
+    result = ColumnSet([], [], [])
+    for one, key, known in zip(files, keys, columns, strict=True):
+        if key[0] != most[0] and (by_number or _is_nameless(one, known)):
+            result.nameless.append(one)
+        elif key != most and not by_number:
+            result.problems.append(Problem(one.path, None, _otherness(one.path, known, ours, most)))
+        else:
+            try:
+                result.same.append(_as(one, known, ours))
+            except TrajectoryError as error:
+                result.problems.append(Problem(one.path, None, str(error)))
+    return result
 
 
-def _ordered(one: FileRead, heads: tuple[str, ...]) -> FileRead:
-    columns = _columns(one)
-    if columns == heads or one.detected is None or one.block is None:
+def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
+    """A sentence if files have the columns in another order, and one if they have them in other units."""
+    several = [known for known in map(_columns_of, detected) if {*known.names} == {*ours.names}]
+    notes = []
+    if others := [known for known in several if known.names != ours.names]:
+        moved = [[a, b] for a, b in zip(others[0].heads, ours.heads, strict=True) if a != b]
+        theirs, here = (", ".join(names) for names in zip(*moved, strict=True))
+        notes.append(
+            f"some files have the columns {theirs} in this order: they are read as {here}, that of the first file"
+        )
+    wanted = dict(zip(ours.names, ours.units, strict=True))
+    pairs = {(a, wanted[name]) for known in several for name, a in zip(known.names, known.units, strict=True)}
+    if other := sorted((a, b) for a, b in pairs if a and b and unit_named(a) != unit_named(b)):
+        notes.append(f"units are converted: {', '.join(f'{a} to {b}' for a, b in other)}")
+    return notes
+
+
+def _as(one: FileRead, known: Columns, ours: Columns) -> FileRead:
+    """A file with the heads, the order and the units of others."""
+    if known == ours or one.detected is None or one.block is None:
         return one
-    order = [columns.index(head) for head in heads]
-    units = one.detected.measured_in and tuple(one.detected.measured_in[k] for k in order)
-    return one._replace(
-        detected=one.detected._replace(columns=heads, measured_in=units),
-        block=replace(one.block, positions=one.block.positions[:, order]),
-    )
+    positions = columns_like(one.block.positions, known, ours)
+    detected = one.detected._replace(columns=ours.heads, measured_in=tuple(unit or "" for unit in ours.units))
+    return one._replace(detected=detected, block=replace(one.block, positions=positions))
 
 
-def _columns(one: FileRead) -> tuple[str, ...]:
-    return one.detected.columns if one.detected else ()
+def _otherness(path: str, known: Columns, ours: Columns, most: tuple[frozenset[str], frozenset[str]]) -> str:
+    """What keeps a file from having the columns of most."""
+    if {*known.names} != most[0]:
+        return (
+            f"the columns {listed(known.heads)} where most files have {listed(ours.heads)}; choose columns of the same "
+            "names with columns=, or by their numbers to take them in their order, in the shell --columns"
+        )
+    here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (_sensors(path), most[1]))
+    return f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
+
+
+def _sensors(path: str) -> frozenset[str]:
+    return _SENSORS.intersection(words_of(PurePosixPath(path).stem))
+
+
+def _is_nameless(one: FileRead, known: Columns) -> bool:
+    return known.are_nameless or (one.detected is not None and not one.detected.named)
+
+
+def _columns(one: FileRead) -> Columns:
+    return _columns_of(one.detected) if one.detected else Columns((), ())
+
+
+def _columns_of(how: Detected) -> Columns:
+    measured_in = how.measured_in or [""] * len(how.columns)
+    return Columns(how.columns, tuple(a or unit_of(head) for a, head in zip(measured_in, how.columns, strict=True)))

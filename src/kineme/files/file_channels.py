@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,9 +9,10 @@ import numpy as np
 
 from kineme.errors import TrajectoryError
 from kineme.files.check_block import check_block, movement_of, take_movements
+from kineme.files.column_order import in_one_set
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
-from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.channels.channel import Channels, is_plain, recorded_names
 from kineme.movements.channels.coordinates import canonical, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.layout import Layout
@@ -22,14 +22,15 @@ _HINT = "check the order of the columns, or divide the quaternions by their norm
 
 
 def with_channels(
-    files: Sequence[FileRead], given: Given, skip: str = "movement"
+    files: Sequence[FileRead], given: Given, skip: str = "movement", by_number: bool = False
 ) -> tuple[list[FileRead], Channels | None, list[Problem]]:
     """The channels of files with equally many columns, the files that have them, and problems.
 
     Kinds are found for all files together: a gripper that no file opens is one still, and one that some file moves
-    continuously is a position in all of them. Files of other heads are merged
-    by the order of their columns while all are positions or angles, without the wraps of angles, and then nothing is
-    known of the channels; else they are problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
+    continuously is a position in all of them. Columns are put in order and converted by their names, see `in_one_set`.
+    Files whose columns have no names, or are chosen `by_number`, are merged by the order of their columns while all
+    are positions or angles, without the wraps of angles, and then nothing is known of the channels; else they are
+    problems. A quaternion that is not of norm 1 costs its movement, or with `skip`
     ``"sample"`` that sample alone.
 
     Raises
@@ -37,15 +38,15 @@ def with_channels(
     SpecificationError
         See `find_channels`.
     """
-    heads = Counter(one.detected.columns for one in files if one.detected).most_common(1)[0][0]
-    same = [one for one in files if one.detected and one.detected.columns == heads]
+    same, nameless, problems = in_one_set(files, by_number)
     channels = _channels_of(same, given)
-    if len(same) < len(files) and is_plain(channels):
-        return _without_wraps(files, given), None, []
-    problems = [
-        Problem(one.path, None, f"the columns {list(one.detected.columns)} where most files have {list(heads)}")
-        for one in files
-        if one.detected and one.detected.columns != heads
+    if nameless and is_plain(channels):
+        place = {one.path: k for k, one in enumerate(files)}
+        return _without_wraps(sorted([*same, *nameless], key=lambda one: place[one.path]), given), None, problems
+    heads = list(recorded_names(channels))
+    problems += [
+        Problem(one.path, None, f"no names of columns where most files have {heads}; name them as these are")
+        for one in nameless
     ]
     checked = [_check_orientations(_in_order(one, channels), channels, skip) for one in same]
     return [one for one, _ in checked], channels, [*problems, *(one for _, several in checked for one in several)]

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
-from kineme.files.column_order import in_one_order
 from kineme.files.file_channels import with_channels
 from kineme.files.problem import Problem, note_on_missing
 from kineme.files.read_file import FileRead
@@ -140,6 +139,7 @@ def merge_files(
     problems: Sequence[Problem] = (),
     kinds: Given | None = None,
     skip: str = "movement",
+    by_number: bool = False,
 ) -> Recordings:
     """One `Recordings` of all files that hold movements.
 
@@ -154,6 +154,8 @@ def merge_files(
         Kinds of channels that are given, see `kineme.movements.channels.detect.find_channels`.
     skip : {"movement", "sample"}
         What a quaternion that is not of norm 1 costs.
+    by_number : bool, default False
+        Whether the columns of the files were chosen by their numbers, so that other names are no problem.
 
     Raises
     ------
@@ -177,7 +179,7 @@ def merge_files(
     ]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
     understood = {one.path: one.detected for one in full}
-    full, channels, odd_channels = with_channels(in_one_order(full), kinds or {}, skip)
+    full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
     listed += odd_channels
     if not any(len(_block(one).labels) for one in full):
         raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")

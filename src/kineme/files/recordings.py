@@ -170,7 +170,8 @@ def read_paths(  # noqa: PLR0913 - those of `read_recordings`, in records
     if join:
         files = join_files(files, layout.kinds or {})
     read += [rule.apply(one, entry.path) for one, entry in files]
-    recordings = replace(merge_files(read, in_words(where), problems, layout.kinds, layout.skip), notes=notes)
+    recordings = merge_files(read, in_words(where), problems, layout.kinds, layout.skip, layout.by_number)
+    recordings = replace(recordings, notes=notes)
     _check_excluded(recordings, layout)
     if layout.person is not None and recordings.people is None:
         raise DataError(

@@ -99,6 +99,7 @@ def parsed_arrays(
                 "movement array.T; if it is right, say the step between samples with units=, in the shell --units"
             )
     positions = np.concatenate(xs)
+    is_named = columns is not None
     columns = distinct(columns or axis_names(positions.shape[1]))
     if len(columns) != positions.shape[1]:
         raise DataError(f"expected a name for each of the {positions.shape[1]} coordinates, got {listed(columns)}")
@@ -108,7 +109,8 @@ def parsed_arrays(
     if places is None:
         places = [""] if detected[1] == "single" else [str(i) for i in range(len(xs))]
     block = Block(positions, stamps, offsets, list(labels), places)
-    return Parsed(Detected(detected[0], detected[1], columns, None if ts is None else time, units, known), block)
+    how = Detected(detected[0], detected[1], columns, None if ts is None else time, units, known, named=is_named)
+    return Parsed(how, block)
 
 
 def _column_names(arrays: Mapping[str, Any]) -> list[str] | None:

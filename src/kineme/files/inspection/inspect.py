@@ -14,7 +14,8 @@ from kineme.files.inspection.gaps import notes_on_gaps
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
-from kineme.movements.channels.channel import Channels, recorded_names
+from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.column_match import columns_recorded
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.tables.parsed import Detected
 from kineme.movements.tables.time_stamps import GUESSED
@@ -153,7 +154,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
     if any(how.format.startswith("LeRobot") for how, _ in recordings.detected):
         notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
-    notes += notes_on_order((how for how, _ in recordings.detected), recorded_names(demos.channels or ()))
+    notes += notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
     single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]
     if single:
         notes.append(f"only one movement labeled {', '.join(single[:5])}{' and others' if len(single) > 5 else ''}")

@@ -24,15 +24,15 @@ from kineme.library.storage.source import Source
 from kineme.library.storage.store import Store
 from kineme.library.storage.symbols import check_name
 from kineme.movements.channels.channel import (
-    Channels,
     in_words,
     is_plain,
     learned_names,
-    moving_kinds,
     recorded_names,
     same_columns,
 )
-from kineme.movements.trajectories.as_learned import as_recorded, of_columns
+from kineme.movements.channels.column_match import columns_recorded
+from kineme.movements.tables.parsed import listed
+from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.channels import in_coordinates
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements import Movements
@@ -163,21 +163,29 @@ def _part(demos: Demonstrations, start: int, stop: int) -> Demonstrations:
 
 
 def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
-    """Columns without channels, or of the same names, as those of the library; generated ones as they are learned."""
+    """Columns without channels, or of the same names, as those of the library; generated ones as they are learned.
+
+    Raises
+    ------
+    TrajectoryError
+        Other names, or units that cannot be converted.
+    """
     ours, n_dims = store.channels, store.n_dims
     if demos.channels is None:
         known = ours is not None and demos.n_dims == len(recorded_names(ours))
         return of_columns(demos, ours) if ours is not None and known else demos
     if ours is None and n_dims == demos.n_dims > len(learned_names(demos.channels)):
         return as_recorded(demos)
-    if ours is not None and _look_otherwise(demos.channels, ours):
-        return of_columns(as_recorded(demos), ours)
+    if ours is not None and not same_columns(demos.channels, ours):
+        here, there = columns_recorded(demos.channels), columns_recorded(ours)
+        if {*here.names} == {*there.names}:  # in other orders, units or kinds, as a gripper that moves in steps
+            return by_names(demos, ours)
+        if len(here.heads) == len(there.heads) and not here.may_be(there):
+            raise TrajectoryError(
+                f"expected the columns {listed(there.heads)} as {_others(store)} of the library in {store.folder}, got "
+                f"{listed(here.heads)}; choose the columns, in the shell with --columns, or make another library"
+            )
     return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
-
-
-def _look_otherwise(channels: Channels, ours: Channels) -> bool:
-    """Whether columns are of the same names but of other kinds, as of a gripper that moves in steps or continuously."""
-    return moving_kinds(channels) != moving_kinds(ours) and recorded_names(channels) == recorded_names(ours)
 
 
 def _check_dimensions(store: Store, demos: Demonstrations) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -51,6 +52,9 @@ _UNIT_WORDS = {
     if (unit.quantity == "angle" and unit.symbol in {"deg", "rad", "mrad"})
     or (unit.quantity == "length" and (name in {"mm", "cm"} or (len(name) > 5 and name.endswith("s"))))
 }
+
+
+_UNIT_WORD = re.compile(rf"[\W_]*(?<![a-z])({'|'.join(_UNIT_WORDS)})(?![a-z])", re.IGNORECASE)
 
 
 def find_channels(
@@ -107,6 +111,14 @@ def unit_of(head: str) -> str | None:
         return bracketed
     words = words_of(head)
     return None if _PER_TIME & {*words} else next((_UNIT_WORDS[one] for one in words if one in _UNIT_WORDS), None)
+
+
+def name_of(head: str) -> str:
+    """The head of a column without its unit: ``x [mm]`` and ``x_mm`` are x."""
+    stem, bracketed = split_head(head)
+    if bracketed is not None or unit_of(head) is None:
+        return stem.strip()
+    return _UNIT_WORD.sub("", head).strip("_. -") or head
 
 
 def _given(heads: Sequence[str], given: Given) -> tuple[dict[int, str], list[Quaternion]]:

@@ -132,6 +132,11 @@ class Layout:
         return _several(self.exclude) or ()
 
     @property
+    def by_number(self) -> bool:
+        """Whether the columns of the coordinates are chosen by their numbers."""
+        return bool(self.coordinates) and all(str(one).isdecimal() for one in self.coordinates or ())
+
+    @property
     def keys(self) -> tuple[Column, ...] | None:
         """The columns that tell movements apart."""
         return _several(self.movement)

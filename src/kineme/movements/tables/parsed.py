@@ -51,6 +51,7 @@ class Detected(NamedTuple):
     ignored: tuple[str, ...] = ()
     measured_in: tuple[str, ...] = ()
     person: tuple[str, ...] = ()
+    named: bool = True
 
 
 class Repair(NamedTuple):

@@ -13,14 +13,18 @@ from kineme.movements.channels.channel import (
     Channels,
     in_words,
     is_plain,
+    learned_names,
     moving_kinds,
     recorded_names,
+    same_columns,
 )
+from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.trajectories.channels import in_coordinates, of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
+from kineme.units import converted
 
 _SELECT = "select the dimensions by columns= of read_recordings, in the shell --columns"
 _SAY = (
@@ -37,15 +41,18 @@ def as_learned(
     - Without channels, positions as wide as the recorded columns are converted: angles are unwrapped, quaternions are
       integrated, discrete columns are left out. Positions as wide as the coordinates are taken as they are, but for
       wraps of angles.
-    - With channels, their kinds have to be those that were learned, in their order, discrete ones left aside; names are
-      free. Columns of the same names are what was learned, whatever kind their values look like.
+    - With channels of the names that were learned, their columns are put in that order and converted to those units,
+      others left aside, whatever kind their values look like.
+    - With channels of other names, their kinds have to be those that were learned, in their order, discrete ones left
+      aside; units are converted.
 
     `what` they are called in messages.
 
     Raises
     ------
     TrajectoryError
-        Channels of other kinds, another number of columns, or columns of a quaternion that is not of norm 1.
+        Channels of other kinds, another number of columns, a unit that cannot be converted, names that were learned in
+        another place, or columns of a quaternion that is not of norm 1.
     """
     if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
         return _one_by_one(movements, learned, n_dims, what)
@@ -83,10 +90,14 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
         if plain.n_dims == n_dims:
             return plain
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
+    if same_columns(channels, learned):
+        return Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps)
+    moving = tuple(one for one in learned if one.coordinates)
+    if {*columns_recorded(moving).names} <= {*columns_recorded(channels).names}:
+        return by_names(demos, moving, known_units=False)
     if moving_kinds(channels) == moving_kinds(learned):
-        return _with_lever(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
-    if recorded_names(channels) == recorded_names(learned):
-        return of_columns(as_recorded(demos), learned)
+        _check_places(channels, learned, what)
+        return _in_units(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
     if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     raise TrajectoryError(
@@ -114,19 +125,56 @@ def of_columns(demos: Demonstrations, learned: Channels) -> Demonstrations:
     return Demonstrations.of_movements(of_channels(raw, learned), demos.steps)
 
 
+def by_names(demos: Demonstrations, learned: Channels, known_units: bool = True) -> Demonstrations:
+    """Movements whose channels have the names of `learned`, in that order and unit, and of those kinds.
+
+    Raises
+    ------
+    TrajectoryError
+        See `kineme.movements.channels.column_match.columns_like`.
+    """
+    raw = as_recorded(demos)
+    ours, wanted = columns_recorded(demos.channels or ()), columns_recorded(learned)
+    positions = np.ascontiguousarray(columns_like(raw.positions, ours, wanted, known_units))
+    return of_columns(Demonstrations.of_movements(replace(raw.movements, positions=positions), demos.steps), learned)
+
+
+def _check_places(channels: Channels, learned: Channels, what: str) -> None:
+    """Refuse to compare columns in their order where one has a name that was learned in another place."""
+    ours, wanted = (learned_names(one) for one in (channels, learned))
+    if moved := [name for k, name in enumerate(ours) if name in wanted and wanted.index(name) != k]:
+        raise TrajectoryError(
+            f"expected {what} of the columns {', '.join(wanted)}, as those that were learned, got {', '.join(ours)}, "
+            f"with {moved[0]} in another place; {_SAY}"
+        )
+
+
 def as_recorded(demos: Demonstrations) -> Demonstrations:
     """The recorded columns as plain positions, of which nothing else is known."""
     plain = replace(demos.movements, positions=demos.recorded, recorded=None, channels=None, dimensions=None)
     return Demonstrations.of_movements(plain, demos.steps)
 
 
-def _with_lever(demos: Demonstrations, learned: Channels) -> Demonstrations:
-    """Rotations beside positions whose unit is not known count as they do beside those that were learned."""
+def _in_units(demos: Demonstrations, learned: Channels) -> Demonstrations:
+    """Coordinates in the units of those that were learned, where both are known.
+
+    Rotations beside positions of another unit, or of one that is not known, count as they do beside those learned.
+    """
     channels = demos.channels or ()
-    units = [one.unit for one in channels if one.kind == "position"]
-    ratio = 1.0 if not units or units[0] is not None else lever_of(learned) / lever_of(channels)
-    if ratio == 1.0 or is_plain(channels):
+    moving = [[one for one in some if one.coordinates] for some in (channels, learned)]
+    positions, k = demos.positions, 0
+    ours = next((one.unit for one in channels if one.kind == "position"), None)
+    theirs = next((one.unit for one in learned if one.kind == "position"), None)
+    ratio = 1.0 if ours is not None and theirs is None else lever_of(learned) / lever_of(channels)
+    for one, other in zip(*moving, strict=True):
+        columns = slice(k, k := k + len(one.coordinates))
+        sizes = None if one.kind == "orientation" else conversion(one.name, one.unit, other.unit, known_units=False)
+        if sizes is None and (one.kind != "orientation" or ratio == 1.0):
+            continue
+        positions = np.array(positions) if positions is demos.positions else positions
+        positions[:, columns] = (
+            positions[:, columns] * ratio if sizes is None else converted(positions[:, columns], *sizes)
+        )
+    if positions is demos.positions:
         return demos
-    turned = np.array([one.kind == "orientation" for one in channels for _ in one.coordinates])
-    positions = demos.positions * np.where(turned, ratio, 1.0)
     return Demonstrations.of_movements(replace(demos.movements, positions=positions), demos.steps)
