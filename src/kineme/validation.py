@@ -43,6 +43,10 @@ def _is_float64(values: Any) -> TypeGuard[Array]:
     return type(values) is np.ndarray and values.dtype is _FLOAT64
 
 
+ROUNDED = ", which would be rounded; subtract an offset, or leave the column out"
+_EXACT_TO = 2**53
+
+
 def refuse_lossy(values: Any, who: str) -> None:
     """Refuse what NumPy would turn into plain numbers silently: masked samples and imaginary parts would be lost."""
     if type(values) is np.ndarray and values.dtype.kind == "f":
@@ -52,6 +56,14 @@ def refuse_lossy(values: Any, who: str) -> None:
         raise TrajectoryError(f"{who}: expected an array of numbers, got one with {n_masked} masked; drop the samples")
     if getattr(getattr(values, "dtype", None), "kind", "") == "c":
         raise TrajectoryError(f"{who}: expected real numbers, got {values.dtype}; pass both parts as columns")
+
+
+def too_long_integer(values: Any) -> int | None:
+    """The first integer of an array beyond 2^53, which a number of 64 bits would round; None where there is none."""
+    if not (isinstance(values, np.ndarray) and values.dtype.kind in "iu" and values.dtype.itemsize == 8):
+        return None
+    long = (values > _EXACT_TO) if values.dtype.kind == "u" else (values > _EXACT_TO) | (values < -_EXACT_TO)
+    return int(values[long][0]) if long.any() else None
 
 
 def as_numbers(values: ArrayLike, who: str, expected: str = "an array of numbers") -> Array:
@@ -84,6 +96,8 @@ def as_positions(positions: ArrayLike, who: str = "trajectory") -> Array:
     if _is_float64(positions) and positions.ndim == 2 and len(positions) >= MIN_SAMPLES and positions.shape[1]:
         return positions
     x = as_numbers(positions, who, "positions to be an array of numbers")
+    if x is not positions and (integer := too_long_integer(np.asarray(positions))) is not None:
+        raise TrajectoryError(f"{who}: expected positions that floats can hold, got {integer}{ROUNDED}")
     flat = x.ndim == 1
     if flat:
         x = x[:, None]

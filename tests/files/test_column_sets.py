@@ -30,7 +30,7 @@ def trc(path, unit, scale):
         "",
     ]
     rows = [
-        "\t".join(map(repr, [k + 1, float(t), *map(float, scale * x)]))
+        "\t".join(map(repr, [k + 1, float(t), *map(float, scale * (1 + x))]))
         for k, (t, x) in enumerate(zip(T, PATH, strict=True))
     ]
     path.write_text("\n".join([*heads, *rows, ""]))
@@ -44,7 +44,7 @@ def test_marker_files_in_millimeters_and_in_meters_have_one_unit(tmp_path):
     assert (len(recordings), recordings.problems) == (3, ())
     assert {one.unit for one in recordings.demonstrations.channels} == {"mm"}
     for one in recordings.demonstrations:
-        np.testing.assert_allclose(one.positions, 1000.0 * PATH, rtol=1e-12)
+        np.testing.assert_allclose(one.positions, 1000.0 * (1 + PATH), rtol=1e-12)
     assert "units are converted: m to mm" in inspect(recordings).notes
 
 

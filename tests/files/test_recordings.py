@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import kineme
@@ -173,3 +174,16 @@ def test_a_name_with_a_line_break_is_one_head_of_csv(tmp_path):
     text = write_movement(tmp_path / "x.csv", columns, names).read_text()
     assert text.startswith('time,a b,"c,""d"""\n')
     np.testing.assert_array_equal(read_recording(tmp_path / "x.csv").positions, PATH)
+
+
+@pytest.mark.parametrize("name", ["=cmd|'/c calc'!A1", "@x", "-x", "'=x", "plain"])
+def test_heads_are_no_formulas_in_csv_and_come_back(tmp_path, name):
+    rows = np.column_stack([np.linspace(0, 1, 9), -np.arange(9.0)])
+    demos = kineme.Demonstrations.of(pd.DataFrame(rows, columns=["t", name]))
+    path = write_movement(
+        tmp_path / "a.csv", {"times": demos.times, "positions": demos.positions}, ColumnNames((name,), (name,))
+    )
+    head, line = path.read_text().splitlines()[:2]
+    assert not [cell for cell in head.replace('"', "").split(",") if cell[:1] in {"=", "+", "-", "@"}]
+    assert line == "0.0,-0.0"
+    assert kineme.read_recordings(path).demonstrations.dimensions == (name,)

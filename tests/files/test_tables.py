@@ -1,8 +1,10 @@
 """Tables of samples by lines: how they may be written, what their columns are, and what is wrong where."""
 
 import io
+import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -406,3 +408,55 @@ def test_columns_of_one_name_are_numbered_as_pandas_does_and_not_chosen_by_it():
 )
 def test_numbered_names_are_all_different(names, expected):
     assert distinct(names) == expected
+
+
+@pytest.mark.parametrize("label", ["%d", "//x", "#hash", "% 3 times"])
+@pytest.mark.parametrize("head", ["label", "trial", "subject"])
+def test_names_like_comments_beside_numbers_are_names_and_rows_commented_out_are_none(label, head):
+    rows = [(name, *row) for name in ("1", "2", label) for row in SIX]
+    found = read(lines([*rows, ("#1", 9, 9, 9), ("# 2", 9, 9, 9)], f"{head},time,x,y"))
+    names = [one.label if head == "label" else one.place for one in found.sources]
+    assert names == (["1", "2", label] if head != "subject" else names)
+    assert (len(found), found.problems) == (3, ())
+    assert found.demonstrations.lengths.tolist() == [6, 6, 6]
+
+
+LONG = 2**53 + 1
+
+
+@pytest.mark.parametrize("integer", [LONG, -LONG, 10**30 + 1])
+def test_integers_that_floats_would_round_are_refused(tmp_path, integer):
+    rows = [(k, k, integer + k) for k in range(6)]
+    with pytest.raises(
+        kineme.DataError, match=rf"expected a number in 'x' that a float can hold, got {integer}, which"
+    ):
+        read(lines(rows, "time,y,x"))
+    assert len(read(lines([(k, k, float(integer) + k * 1e20) for k in range(6)], "time,y,x"))) == 1
+    if abs(integer) > 2**60:
+        return
+    refused = rf"that floats can hold, got {integer}"
+    frame = pd.DataFrame(rows, columns=["time", "y", "x"])
+    with pytest.raises(kineme.KinemeError, match=refused):
+        kineme.Demonstrations.of(frame)
+    with pytest.raises(kineme.KinemeError, match=refused):
+        kineme.Demonstrations.from_arrays(frame[["y", "x"]].to_numpy()[None])
+    with pytest.raises(kineme.KinemeError, match=refused):
+        kineme.Trajectory(np.arange(6.0), frame[["y", "x"]].to_numpy())
+    np.savez(tmp_path / "a.npz", times=np.arange(6), positions=frame[["y", "x"]].to_numpy())
+    frame.to_parquet(tmp_path / "a.parquet")
+    (tmp_path / "a.json").write_text(json.dumps(frame.to_dict("list")))
+    for ending in ("npz", "parquet", "json"):
+        with pytest.raises(kineme.KinemeError, match=refused):
+            kineme.read_recordings(tmp_path / f"a.{ending}")
+
+
+def test_stamps_of_nanoseconds_may_be_rounded(tmp_path):
+    stamps = 1_700_000_000_123_456_789 + 10_000_000 * np.arange(6)
+    frame = pd.DataFrame({"time": stamps, "x": np.arange(6.0) ** 2, "y": 1.0})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    frame.to_parquet(tmp_path / "a.parquet")
+    np.savez(tmp_path / "a.npz", times=stamps, positions=frame[["x", "y"]].to_numpy())
+    (tmp_path / "a.json").write_text(json.dumps(frame.to_dict("list")))
+    for ending in ("csv", "parquet", "npz", "json"):
+        times = kineme.read_recordings(tmp_path / f"a.{ending}").demonstrations.times
+        np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-6)

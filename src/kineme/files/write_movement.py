@@ -18,6 +18,7 @@ from kineme.movements.segmentation.segment import as_recording
 from kineme.movements.trajectories.movements import axis_names
 from kineme.movements.trajectories.movements_like import MovementsLike
 from kineme.output.atomic import write_atomically
+from kineme.output.text import as_cell
 from kineme.units import split_head
 from kineme.validation import Array, as_numbers, as_path
 
@@ -144,7 +145,7 @@ def _csv(columns: Columns, names: ColumnNames | None) -> bytes:
 
 def _cell(text: str) -> str:
     """A head of CSV, quoted where it must be; a line is a sample, so that no head has line breaks."""
-    text = " ".join(text.splitlines())
+    text = as_cell(" ".join(text.splitlines()))
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"') else text
 
 

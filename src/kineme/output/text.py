@@ -6,6 +6,7 @@ characters at all. All of them are escaped, as ``\x1b`` or ``\u202e``. Very long
 
 from __future__ import annotations
 
+import re
 from html import escape
 from typing import Any
 
@@ -13,8 +14,20 @@ from typing import Any
 _INVISIBLE = frozenset("\u034f\u115f\u1160\u17b4\u17b5\u2800\u3164\uffa0")
 
 
+_FORMULA = re.compile(r"'*[=+\-@\t\r]")  # what makes a cell a formula, also behind quotes that `as_cell` wrote
+
 #: Longest text that is shown whole: anywhere, and in a column of a table.
 _LONGEST, LONGEST_CELL = 4000, 120
+
+
+def as_cell(text: str) -> str:
+    """A text as a cell of a CSV file that a spreadsheet takes for text: no formula, whatever it begins with."""
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def text_in(cell: str) -> str:
+    """The inverse of `as_cell`."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def printable(name: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 
@@ -187,3 +188,34 @@ def test_pandas_writes_a_table_that_is_read(tmp_path):
     pandas.DataFrame(SPANS, columns=["start", "end", "label"]).to_csv(text)
     (tmp_path / "l.csv").write_text(text.getvalue())
     assert [(one.start, one.end, one.label) for one in read_labels(tmp_path / "l.csv").rows] == SPANS
+
+
+def test_a_name_that_two_recordings_have_is_said_and_labels_neither(tmp_path, recordings):
+    for name in ("s1", "s2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.csv").write_bytes((tmp_path / "long.csv").read_bytes())
+    (tmp_path / "long.csv").unlink()
+    several = read_recordings(tmp_path)
+    labels = tmp_path / "labels" / "l.csv"
+    labels.parent.mkdir()
+    labels.write_text("recording,start,end,label\na.csv,1000.5,1001.75,wave\ns2/a.csv,1002,1004,nod\n")
+    pieces = labeled_pieces(several, read_labels(labels))
+    assert [(one.path, one.label) for one in pieces.sources] == [("s2/a.csv", "nod")]
+    (problem,) = pieces.problems
+    assert problem.what.startswith("line 2: expected one recording a.csv, got s1/a.csv, s2/a.csv; write its folder")
+    labels.write_text("recording,start,end,label\n/home/anna/s1/a.csv,1000.5,1001.75,wave\n")
+    assert [one.path for one in labeled_pieces(several, read_labels(labels)).sources] == ["s1/a.csv"]
+
+
+FORMULAS = ["=cmd|'/c calc'!A1", "+1+1", "-wave", "@SUM(A1)", "'=quoted", "''-", "=1,2", "plain", "'plain'", "-"]
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_names_are_no_formulas_in_what_is_written_and_come_back(tmp_path, text):
+    written = [Annotation(f"{text}.csv", text, 1.0, 2.0, text, 0.5, 0.5, -1.0)]
+    (path,) = write_annotations(tmp_path / "out.csv", written, [tmp_path / "long.csv"])
+    cells = [cell for row in csv.reader(path.read_text().splitlines()) for cell in row]
+    assert not [cell for cell in cells if cell[:1] in {"=", "+", "-", "@", "\t"}]
+    assert "0.5" in cells, "numbers stay numbers"
+    (row,) = read_labels(path).rows
+    assert (row.recording, row.place, row.label) == (f"{text}.csv", text, None if text == "-" else text)

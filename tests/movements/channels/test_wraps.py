@@ -91,3 +91,13 @@ def test_a_thousandth_of_a_turn_beyond_the_range_is_rounding(beyond, period):
 )
 def test_angles_of_no_unit_pass_a_turn_by_a_thousandth(largest, period):
     assert period_of(np.array([0.0, largest]), None) == period
+
+
+@pytest.mark.parametrize("high", [360.0, -360.0, 2 * np.pi])
+def test_a_switch_between_whole_turns_is_no_constant_angle(high):
+    wave = np.repeat([0.0, high, 0.0, high, 0.0], 20)
+    offsets = np.array([0, 50, 100])
+    assert wrap_period(wave, offsets) is None
+    assert without_wraps(wave, offsets, period_of(wave, None)) is wave
+    assert period_of(np.zeros(9), None) == 2 * np.pi
+    assert period_of(wave, "deg") == 360.0

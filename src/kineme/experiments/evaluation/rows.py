@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from kineme.experiments.evaluation.data import DataSet
 from kineme.experiments.evaluation.protocols import PROTOCOLS
 from kineme.experiments.evaluation.score_split import Scores
+from kineme.output.text import as_cell
 
 
 class Row(NamedTuple):
@@ -61,5 +62,5 @@ def to_csv(rows: Sequence[Row]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Row._fields)
-    writer.writerows(rows)
+    writer.writerows([as_cell(one) if isinstance(one, str) else one for one in row] for row in rows)
     return text.getvalue()

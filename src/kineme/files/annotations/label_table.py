@@ -10,6 +10,7 @@ from typing import NamedTuple
 from kineme.errors import DataError
 from kineme.files.annotations.audacity import UNKNOWN
 from kineme.movements.tables.time_stamps import TIME_UNITS
+from kineme.output.text import text_in
 from kineme.units import UNITS, converted, split_head, unit_named
 
 _TIMES = "|".join(sorted(map(re.escape, TIME_UNITS), key=len, reverse=True))
@@ -118,9 +119,9 @@ def row_of(cells: Sequence[str], heads: Heads, line: int) -> LabelRow:
             f"line {line}: expected a start and an end after it, got {cells[heads.start]!r} and {cells[heads.end]!r}"
         )
     recording, place = (
-        "" if k is None or k >= len(cells) else cells[k].strip() for k in (heads.recording, heads.place)
+        "" if k is None or k >= len(cells) else text_in(cells[k].strip()) for k in (heads.recording, heads.place)
     )
-    label = cells[heads.label].strip()
+    label = text_in(cells[heads.label].strip())
     return LabelRow(start, end, None if label.lower() in _NOTHING else label, recording, place, line)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,10 +41,14 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
         )
     stretches: list[tuple[int, int]] = []
     sources: list[Source] = []
-    problems = [*recordings.problems, *_of_none(table, recordings.sources)]
+    paths = {source.path for source in recordings.sources}
+    meant = {name: _paths_of(name, paths) for name in dict.fromkeys(row.recording for row in rows)}
+    problems = [*recordings.problems, *_of_none(table, recordings.sources, meant), *_of_several(table, meant)]
     for i, source in enumerate(recordings.sources):
         first, last = demos.offsets[i : i + 2]
-        own = [row for row in rows if _is_of(row, source)]
+        own = [
+            row for row in rows if (not row.recording or len(meant[row.recording]) == 1) and _is_of(row, source, meant)
+        ]
         times = demos.movements.stamps[first:last]
         since = table.since_start or _counts_from_start(own, times)
         lines: dict[tuple[int, int], int] = {}  # stretch -> line that labels it
@@ -69,9 +73,9 @@ def labeled_pieces(recordings: Recordings, table: LabelTable) -> Recordings:
     )
 
 
-def _of_none(table: LabelTable, sources: Sequence[Source]) -> list[Problem]:
+def _of_none(table: LabelTable, sources: Sequence[Source], meant: Mapping[str, Sequence[str]]) -> list[Problem]:
     """The rows of recordings that are not there, as one problem."""
-    lost = [row for row in table.rows if not any(_is_of(row, source) for source in sources)]
+    lost = [row for row in table.rows if not any(_is_of(row, source, meant) for source in sources)]
     if not lost:
         return []
     wanted = f"{lost[0].recording} {lost[0].place}".strip()
@@ -81,12 +85,32 @@ def _of_none(table: LabelTable, sources: Sequence[Source]) -> list[Problem]:
     ]
 
 
-def _is_of(row: LabelRow, source: Source) -> bool:
+def _of_several(table: LabelTable, meant: Mapping[str, Sequence[str]]) -> list[Problem]:
+    """The rows of which several recordings may be meant, one problem for each name."""
+    first = {row.recording: row.line for row in reversed(table.rows)}
+    return [
+        Problem(
+            table.name,
+            first[name],
+            f"expected one recording {name}, got {', '.join(paths)}; write its folder in the column recording too",
+        )
+        for name, paths in meant.items()
+        if name and len(paths) > 1
+    ]
+
+
+def _paths_of(recording: str, paths: Collection[str]) -> list[str]:
+    """The recordings that a name may mean: itself, else those in folders below, else the end of a longer path."""
+    if recording in paths:
+        return [recording]
+    below = sorted(path for path in paths if path.endswith(f"/{recording}"))
+    return below or sorted((path for path in paths if recording.endswith(f"/{path}")), key=len)[-1:]
+
+
+def _is_of(row: LabelRow, source: Source, meant: Mapping[str, Sequence[str]]) -> bool:
     if row.place and row.place != source.place:
         return False
-    return not row.recording or any(
-        a == b or a.endswith(f"/{b}") for a, b in ((row.recording, source.path), (source.path, row.recording))
-    )
+    return not row.recording or source.path in meant[row.recording]
 
 
 def _counts_from_start(rows: Sequence[LabelRow], times: Array) -> bool:

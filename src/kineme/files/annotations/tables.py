@@ -11,6 +11,7 @@ from typing import Any
 
 from kineme.files.annotations.annotation import Annotation
 from kineme.output.atomic import write_atomically
+from kineme.output.text import as_cell
 
 HEADS = ("recording", "place", "start", "end", "symbol", "p_value", "confidence", "unknown")
 
@@ -43,4 +44,4 @@ def write_json(path: Path, annotations: Sequence[Annotation], source: Path | Non
 def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    return "" if value is None else str(value)
+    return as_cell(value) if isinstance(value, str) else "" if value is None else str(value)

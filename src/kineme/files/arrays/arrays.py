@@ -16,7 +16,7 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Block, Detected, Parsed, distinct, listed
 from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by_size, unit_in_head
 from kineme.movements.trajectories.movements import axis_names
-from kineme.validation import Array
+from kineme.validation import ROUNDED, Array, too_long_integer
 
 #: Entries that name the columns of positions, and those of velocities and accelerations.
 COLUMNS, RATES = "columns", "rates"
@@ -162,8 +162,8 @@ class _Joined(Mapping[str, Any]):
         return len(self._names)
 
 
-def numbers_of(values: Any) -> Array:
-    """An array as float64; dates and durations as nanoseconds."""
+def numbers_of(values: Any, of_time: bool = False) -> Array:
+    """An array as float64; dates and durations as nanoseconds. Integers are rounded in stamps, `of_time`, alone."""
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -172,6 +172,8 @@ def numbers_of(values: Any) -> Array:
         raise DataError(f"expected real numbers, got {array.dtype}; save both parts as columns")
     if array.dtype.kind in "mM":
         return nanoseconds(array)
+    if not of_time and (integer := too_long_integer(array)) is not None:
+        raise DataError(f"expected positions that floats can hold, got {integer}{ROUNDED}")
     try:
         return array.astype(np.float64, copy=False)
     except (ValueError, TypeError) as error:
@@ -194,7 +196,7 @@ def _named(arrays: Mapping[str, Any], names: Sequence[str]) -> str | None:
 
 def _of_one(arrays: Mapping[str, Any], x: Array, layout: Layout) -> tuple[list[Array], list[Array] | None, str]:
     key = _named(arrays, TIMES)
-    t = None if key is None else numbers_of(arrays[key])
+    t = None if key is None else numbers_of(arrays[key], of_time=True)
     if x.ndim == 3:
         if t is not None and t.shape not in (x.shape[1:2], x.shape[:2]):
             raise DataError(f"expected times of shape {x.shape[1:2]} or {x.shape[:2]}, got {t.shape}")
@@ -234,7 +236,7 @@ def _numbered(arrays: Mapping[str, Any]) -> tuple[list[Array], list[Array] | Non
     if clock is None:
         return xs, None, "numbered"
     try:
-        return xs, [numbers_of(arrays[f"{clock}_{k}"]).ravel() for k in range(count)], "numbered"
+        return xs, [numbers_of(arrays[f"{clock}_{k}"], of_time=True).ravel() for k in range(count)], "numbered"
     except KeyError as error:
         raise DataError(f"expected times for each of the {count} movements, got no entry {error}") from error
 

@@ -61,8 +61,8 @@ def tree_movements(tree: Any, layout: Layout, kind: str, style: Style = NAMES, m
             "in the shell --columns"
         )
     roles = choose_roles(heads, kinds, layout)
-    others = [roles.time, roles.nanoseconds, roles.label]
-    needed = {owners[k] for k in chain(roles.positions, roles.movement, others) if k is not None}
+    others = [roles.time, roles.nanoseconds, roles.label, *roles.clocks]
+    needed = {owners[k]: k in roles.positions for k in chain(roles.movement, others, roles.positions) if k is not None}
     parsed = table_movements(_table(found, first, (heads, owners), needed), roles, layout, kind)
     static = tuple(name for name in first.entries if name not in names)
     return parsed._replace(detected=parsed.detected._replace(ignored=(*parsed.detected.ignored, *static)))
@@ -124,9 +124,12 @@ def _is_text(entry: Any) -> bool:
 
 
 def _table(
-    found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: set[str]
+    found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
 ) -> Table:
-    """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row."""
+    """The arrays that are needed, one movement after the other; what a movement lacks is a fault of its first row.
+
+    `needed` says of each whether it holds coordinates, which are not rounded.
+    """
     heads, owners = columns
     lengths = [one.length for one in found]
     widths = Counter(owners)
@@ -134,11 +137,11 @@ def _table(
     offsets = np.concatenate(([0], np.cumsum(lengths))).astype(np.intp)
     faults: dict[int, str] = {}
     arrays: dict[str, Any] = {}
-    for name in needed:
+    for name, is_coordinate in needed.items():
         parts = []
         of_texts = name in first.entries and _is_text(first.entries[name])
         for one, length, start in zip(found, lengths, offsets, strict=False):
-            part, fault = _part(one, name, length, (widths[name], of_texts))
+            part, fault = _part(one, name, length, (widths[name], of_texts, not is_coordinate))
             parts.append(part)
             if fault:
                 faults[int(start)] = fault
@@ -153,9 +156,9 @@ def _table(
     return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, segments=whole)
 
 
-def _part(one: Found, name: str, length: int, kind: tuple[int, bool]) -> tuple[Any, str]:
+def _part(one: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:
     """An array of a movement as columns (T, d), of numbers or of texts, and what is wrong with it."""
-    width, of_texts = kind
+    width, of_texts, of_time = kind
     if name == STAMP:
         return (np.arange(length) / (one.rate or 1.0))[:, None], "" if one.rate else "expected a rate, got none"
     entry = one.entries.get(name)
@@ -168,7 +171,7 @@ def _part(one: Found, name: str, length: int, kind: tuple[int, bool]) -> tuple[A
     if entry.shape[0] != length or int(np.prod(entry.shape[1:])) != width:
         got = f"expected {name!r} of shape {(length, width)}, got {tuple(entry.shape)}"
         return np.full((length, width), np.nan), got
-    return numbers_of(np.asarray(entry)).reshape(length, width), ""
+    return numbers_of(np.asarray(entry), of_time=of_time).reshape(length, width), ""
 
 
 def nested(arrays: Mapping[str, Any]) -> Any:

@@ -176,7 +176,7 @@ def _notes_on_channels(demos: Demonstrations) -> list[str]:
 
 def _notes_on_still_columns(demos: Demonstrations) -> list[str]:
     """Columns of many that have one value throughout every movement: they tell nothing of what moves."""
-    names, x, starts = recorded_names(demos.channels or ()), demos.recorded, demos.offsets[:-1]
+    names, x, starts = columns_recorded(demos.channels or ()).heads, demos.recorded, demos.offsets[:-1]
     if len(names) < _MANY:
         return []
     still = (np.maximum.reduceat(x, starts, axis=0) == np.minimum.reduceat(x, starts, axis=0)).all(axis=0)

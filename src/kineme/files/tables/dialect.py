@@ -11,6 +11,7 @@ from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.time_stamps import is_date
+from kineme.output.text import text_in
 from kineme.units import unit_named
 
 COMMENTS = ("#", "%", "//")
@@ -37,21 +38,25 @@ class Dialect(NamedTuple):
     kinds: tuple[str, ...]  # "number", "date" or "text" per column
     measured_in: tuple[str, ...] = ()  # per column, from a row of units below the heads
     end: int | None = None  # line after the last sample; None: the end of the file
+    names_rows: bool = False  # whether the first column tells movements or labels apart, be these numbers
 
     def is_sample(self, line: str) -> bool:
         """Whether a line holds a sample. A comment does not, but a name may begin like a comment.
 
         A line that begins with one of `COMMENTS` is a sample where the first column holds names, the line has as many
-        cells as there are columns, and those of numbers hold numbers.
+        cells as there are columns, and those of numbers hold numbers. Where most of the names are numbers, as 1 and
+        2, ``%d`` is a name, and ``#1`` a row that was commented out.
         """
         if not is_skipped(line):
             return True
-        if self.kinds[0] != "text" or not line.strip():
+        if not (self.names_rows or self.kinds[0] == "text") or not line.strip():
             return False
         cells = split(line, self.separator)
+        if self.kinds[0] == "number" and is_number(cells[0].lstrip("#%/ "), self.decimal_comma):
+            return False
         return len(cells) == len(self.kinds) and all(
             is_number(cell, self.decimal_comma)
-            for cell, kind in zip(cells, self.kinds, strict=True)
+            for cell, kind in zip(cells[1:], self.kinds[1:], strict=True)
             if kind == "number"
         )
 
@@ -135,7 +140,7 @@ def detect_dialect(text: Iterable[str]) -> Dialect:
     body = cells[named + bool(units) or numbered :]
     kinds = tuple(_kind([row[k] for row in body if k < len(row)], comma) for k in range(len(cells[0])))
     if heads:
-        return Dialect(separator, comma, tuple(heads), True, first, kinds, units)
+        return Dialect(separator, comma, tuple(map(text_in, heads)), True, first, kinds, units)
     return Dialect(separator, comma, tuple(f"column {k}" for k in range(len(kinds))), False, first, kinds)
 
 

@@ -17,6 +17,7 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import no_lines
 from kineme.movements.tables.table import Table
 from kineme.movements.tables.time_stamps import nanoseconds
+from kineme.validation import ROUNDED, too_long_integer
 
 _ROWS = 2**18  # rows that are decompressed at a time
 _WIDEST = 1000  # numbers in a list; images have more
@@ -61,6 +62,9 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         raise DataError(f"expected a Parquet file, got something foreign, truncated or damaged ({error})") from error
     if table.num_rows == 0:
         raise DataError("expected samples, got a table without rows")
+    for k in {owners[k] for k in roles.positions if not is_list(types[owners[k]])}:
+        if (integer := too_long_integer(table.column(names[k]).to_numpy())) is not None:
+            raise DataError(f"expected numbers in {names[k]!r} that floats can hold, got {integer}{ROUNDED}")
     parts = {owner: iter(read[owner].T if read[owner].ndim > 1 else (read[owner],)) for owner in read}
     columns = [next(parts[owner]) if owner in parts else None for owner in owners]
     dated = roles.time is not None and kinds[roles.time] == "date"

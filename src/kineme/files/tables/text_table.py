@@ -15,15 +15,18 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.files.motion_capture.export_heads import ExportHead
-from kineme.files.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect
+from kineme.files.tables.dialect import COMMENTS, LONGEST, Dialect, detect_dialect, split
 from kineme.files.tables.exports import export_head, export_table, with_times
 from kineme.files.tables.tolerant_table import quotes_are_plain, read_slowly, try_rows
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import Table
 from kineme.movements.tables.time_stamps import seconds_of_dates
+from kineme.validation import ROUNDED
 
 _POSITION = re.compile(r"(.*)position(\d+)")  # of a joint
+_EXACT_TO = 2.0**53
+_INTEGER, _DIGITS = re.compile(r"[-+]?\d{16,}"), 300
 _NUMBER, _TEXT, _COLUMN = 8, 64, 1000  # bytes of a number, a text and a column
 
 
@@ -48,8 +51,12 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     roles = choose_roles(dialect.heads, dialect.kinds, layout, dialect.named)
     dated = roles.time is not None and dialect.kinds[roles.time] == "date"
     texts = {k for k in (*roles.movement, roles.label, *roles.ignored, roles.time if dated else None) if k is not None}
+    if 0 in {roles.label, *roles.movement}:
+        dialect = dialect._replace(names_rows=True)
     rows, faults = _rows(data, encoding, dialect, texts)
     columns = [rows[name] for name in rows.dtype.names or ()]
+    if long := [k for k in roles.positions if (np.abs(columns[k]) >= _EXACT_TO).any()]:
+        faults |= _rounded(_samples(data, encoding, dialect), dialect, long)
     if dated and roles.time is not None:
         columns[roles.time], others = seconds_of_dates(columns[roles.time].tolist())
         head = dialect.heads[roles.time]
@@ -60,6 +67,19 @@ def read_text_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     dates_in = "s" if dated else None
     heads = _with_names_of_joints(dialect.heads, columns)
     return Table(heads, columns, len(rows), line_of, faults, dates_in, dialect.measured_in), roles
+
+
+def _rounded(samples: Iterator[tuple[int, str]], dialect: Dialect, columns: Sequence[int]) -> dict[int, str]:
+    """Row -> the first integer in some columns that a number of 64 bits would round."""
+    faults: dict[int, str] = {}
+    for row, (_, line) in enumerate(samples):
+        cells = split(line, dialect.separator)
+        for k in columns if len(cells) == len(dialect.heads) else ():
+            if _INTEGER.fullmatch(cells[k]) and (len(cells[k]) > _DIGITS or int(cells[k]) != int(float(cells[k]))):
+                faults[row] = (
+                    f"expected a number in {dialect.heads[k]!r} that a float can hold, got {cells[k]}{ROUNDED}"
+                )
+    return faults
 
 
 def _with_names_of_joints(heads: tuple[str, ...], columns: Sequence[Any]) -> tuple[str, ...]:

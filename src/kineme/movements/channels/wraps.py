@@ -12,6 +12,7 @@ _TURN = 2.0 * np.pi
 #: Where recorded angles lie: between minus and plus half a turn, or from 0 to a whole one.
 _RANGES = ((-np.pi, np.pi), (0.0, _TURN), (-180.0, 180.0), (0.0, 360.0))
 _SLACK = 1e-3  # of a period, beyond the range
+_ROUNDING = 1e-9  # of a period
 _SPARSE = 0.25  # of a period: with longer steps between the jumps no rule could tell
 _UNSTEADY = 3.0  # a step through the border is at most so many times the longest other one
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
@@ -29,7 +30,7 @@ def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
         if low - _SLACK * period <= least and most <= high + _SLACK * period and jump > 0.9 * period:
             jumps = steps > _JUMP * period
             other = float(steps[~jumps].max(initial=0.0))
-            if other < _SPARSE * period and float(np.abs(period - steps[jumps]).max()) <= _UNSTEADY * other:
+            if 0.0 < other < _SPARSE * period and float(np.abs(period - steps[jumps]).max()) <= _UNSTEADY * other:
                 return period
     return None
 
@@ -44,12 +45,16 @@ def period_of(angles: Array, unit: str | None) -> float:
     """The period of an angle: by its unit, or, where that says nothing, by its values.
 
     These are taken for radians within one turn, else for degrees; beyond a turn of those nothing wraps, and the period
-    is infinite.
+    is infinite. So it is where whole turns are all that moves: a switch between 0 and 360.
     """
     if (period := period_by_unit(unit)) is not None:
         return period
     largest = float(np.abs(angles).max(initial=0.0))
-    return next((period for period in (_TURN, 360.0) if largest <= period * (1 + _SLACK)), np.inf)
+    period = next((period for period in (_TURN, 360.0) if largest <= period * (1 + _SLACK)), np.inf)
+    if not np.isfinite(period) or not np.any(angles != angles[:1]):
+        return period
+    turns = (angles - angles[:1]) / period
+    return np.inf if np.all(np.abs(turns - np.round(turns)) < _ROUNDING) else period
 
 
 def without_wraps(angles: Array, offsets: NDArray[np.intp], period: float) -> Array:

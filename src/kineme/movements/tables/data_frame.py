@@ -18,6 +18,7 @@ from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed, no_lines
 from kineme.movements.tables.table import Table, table_movements
 from kineme.movements.tables.time_stamps import nanoseconds, seconds_of_dates
+from kineme.validation import ROUNDED, too_long_integer
 
 _KINDS = {"i": "number", "u": "number", "f": "number", "M": "date", "m": "date"}  # of NumPy -> of `choose_roles`
 _NUMBERS = (Real, Decimal)
@@ -115,6 +116,8 @@ def _by_role(heads: tuple[str, ...], arrays: list[NDArray[Any]], roles: Roles) -
         columns[k] = _texts(arrays[k].tolist())
     for k in (*roles.positions, *roles.clocks, *(() if roles.nanoseconds is None else (roles.nanoseconds,))):
         columns[k] = _numbers(heads[k], arrays[k])
+        if k in roles.positions and (integer := too_long_integer(arrays[k])) is not None:
+            raise DataError(f"expected numbers in the column {heads[k]!r} that floats can hold, got {integer}{ROUNDED}")
     dates_in, k = None, roles.time
     if k is not None and arrays[k].dtype.kind in "Mm":
         columns[k], dates_in = nanoseconds(arrays[k]), "ns"

@@ -17,6 +17,7 @@ from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.validation import (
     MIN_SAMPLES,
+    ROUNDED,
     Array,
     as_positions,
     as_times,
@@ -25,6 +26,7 @@ from kineme.validation import (
     check_times,
     describe,
     refuse_lossy,
+    too_long_integer,
 )
 
 #: What to do with a block (n, d, T), as libraries for time series have it, and with a list of arrays (d, T).
@@ -126,6 +128,8 @@ def _from_block(block: NDArray[Any], copy: bool) -> tuple[Array, NDArray[np.intp
             f"expected an array of shape (n, T, d), movements by samples by dimensions, got shape {block.shape}; "
             f"{_TIME_LAST}"
         )
+    if (integer := too_long_integer(block)) is not None:
+        raise TrajectoryError(f"the block: expected positions that floats can hold, got {integer}{ROUNDED}")
     as_positions(block[0], "every movement of the block" if is_many else "the movement")
     n, n_samples, n_dims = block.shape
     flat = np.array(block, dtype=np.float64, order="C", copy=True if copy else None)
