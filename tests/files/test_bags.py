@@ -266,6 +266,13 @@ def test_a_quaternion_that_is_none_costs_the_movement_or_its_sample(tmp_path):
     movement, _, problems = only(path, skip="sample")
     np.testing.assert_array_equal(movement.recorded, np.delete(rows, [7, 9], axis=0))
     assert problems == [said]
+    for columns in (["position"], ["position.x", "position.y", "position.z"], ["pos*"]):
+        movement, _, problems = only(path, columns=columns)
+        np.testing.assert_array_equal(movement.recorded, rows[:, :3])
+        assert problems == []
+    for columns in (["position", "orientation"], ["position.x", "orientation.w"], [0, 1]):
+        with pytest.raises(kineme.DataError, match=said):
+            read_recordings(path, columns=columns)
 
 
 def test_a_topic_of_another_type_is_named(tmp_path):
@@ -273,7 +280,7 @@ def test_a_topic_of_another_type_is_named(tmp_path):
     path = write_bag(tmp_path, "mcap", [("/chat", START + k, m.string("x")) for k in range(5)])
     with pytest.raises(kineme.DataError, match=r"a topic of movements, got /chat \(std_msgs/msg/String, 5 messages\)"):
         read_recordings(path)
-    with pytest.raises(kineme.DataError, match=r"/chat: expected a type of movements, got std_msgs/msg/String; known"):
+    with pytest.raises(kineme.DataError, match=r"/chat: expected numbers in messages of std_msgs/msg/String, got none"):
         read_recordings(path, topic="/chat")
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 from kineme.errors import DataError
 from kineme.files.contents import Contents
 from kineme.files.ros.bags import Bag, Topic, open_bag
-from kineme.files.ros.choose import FRAMES_LOOKED_AT, can_be_read
+from kineme.files.ros.choose import FRAMES_LOOKED_AT, PLAIN, can_be_read, holds_samples
 from kineme.files.ros.frames import Edge, edge_of, transform_topics, transforms_in
 from kineme.files.ros.message_types import TRANSFORMS, TYPES, Row, transform_row
+from kineme.files.ros.number_fields import number_fields
+from kineme.output.text import counted
 
 
 def bag_contents(path: Path) -> list[Contents]:
@@ -22,16 +24,20 @@ def bag_contents(path: Path) -> list[Contents]:
         The bag cannot be opened.
     """
     with open_bag(path) as bag:
-        rows = tuple((one.name, one.type, one.n_messages, _read_as(one)) for one in bag.topics)
+        rows = tuple((one.name, one.type, one.n_messages, _read_as(bag, one)) for one in bag.topics)
         topics = Contents("topics", ("topic", "type", "messages", "read as"), rows)
         return [topics, _frames(bag)] if transform_topics(bag) else [topics]
 
 
-def _read_as(topic: Topic) -> str:
+def _read_as(bag: Bag, topic: Topic) -> str:
     if topic.type in TRANSFORMS:
         return "frames" if topic.n_messages else "nothing: empty"
     if topic.type not in TYPES:
-        return "nothing: not a type of movements"
+        try:
+            n = len(number_fields(bag, topic).heads)
+        except DataError:
+            return "nothing: no numbers"
+        return f"{counted(n, 'number')}: {PLAIN}" if holds_samples(topic) else "nothing: too few messages"
     if not can_be_read(topic):
         return "nothing: too few messages"
     return "a movement for each message" if TYPES[topic.type].path else "a movement"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import NamedTuple
 
@@ -10,12 +11,15 @@ from kineme.errors import DataError
 from kineme.files.ros.bags import Bag, Topic
 from kineme.files.ros.frames import Edge, connected_graph, transform_topics
 from kineme.files.ros.message_types import TRANSFORMS, TYPES
+from kineme.files.ros.number_fields import number_fields
 from kineme.files.ros.topic_columns import fitting_topics
 from kineme.movements.tables.layout import Known, Layout
 from kineme.output.text import counted
 from kineme.validation import MIN_SAMPLES
 
 _SHOWN = 20  # topics in a message
+_OF_ROS = ("rosgraph_msgs", "rcl_interfaces", "diagnostic_msgs", "dynamic_reconfigure", "bond", "actionlib_msgs")
+PLAIN = "a movement, by --topic"  # how topics of numbers are read
 FRAMES_LOOKED_AT = 50_000  # transforms that are read to list the frames
 
 
@@ -53,6 +57,8 @@ def choose(bag: Bag, layout: Layout) -> Choice:
         return Choice((candidates[0],))
     if layout.known is not None and (known := _as_known(bag, layout.known, candidates)):
         return known._replace(as_known=True)
+    if not candidates and not transforms and len(others := _topics_of_numbers(bag)) == 1:
+        return Choice((others[0],))
     if transforms and not candidates:
         return Choice((), (_only_frames(bag, transforms),), transforms)
     if candidates:
@@ -61,7 +67,8 @@ def choose(bag: Bag, layout: Layout) -> Choice:
             f"expected one topic that can be read, got {listed_topics([*candidates, *transforms])}; say which with "
             f"topic=, in the shell --topic {candidates[0].name}{frame}"
         )
-    raise DataError(f"expected a topic of movements, got {listed_topics(bag.topics)}")
+    say = f"; of numbers, say which with topic=, in the shell --topic {others[0].name}" if others else ""
+    raise DataError(f"expected a topic of movements, got {listed_topics(bag.topics)}{say}")
 
 
 def _as_known(bag: Bag, known: Known, candidates: Sequence[Topic]) -> Choice | None:
@@ -79,10 +86,26 @@ def _as_known(bag: Bag, known: Known, candidates: Sequence[Topic]) -> Choice | N
     return choices[0] if len(choices) == 1 else None
 
 
+def _topics_of_numbers(bag: Bag) -> list[Topic]:
+    """Topics of other types with numbers, which are read if they are asked for or alone; not those of ROS itself."""
+    topics = [one for one in bag.topics if one.type not in (*TYPES, *TRANSFORMS) and holds_samples(one)]
+    found = []
+    for one in topics:
+        with suppress(DataError):
+            if one.type.partition("/")[0] not in _OF_ROS and number_fields(bag, one):
+                found.append(one)
+    return found
+
+
+def holds_samples(topic: Topic) -> bool:
+    """Whether a topic has as many messages as a movement needs samples."""
+    return topic.n_messages >= MIN_SAMPLES
+
+
 def can_be_read(topic: Topic) -> bool:
     """Whether a topic by itself holds a movement."""
     kind = TYPES.get(topic.type)
-    return kind is not None and topic.n_messages >= (1 if kind.path else MIN_SAMPLES)
+    return kind is not None and (topic.n_messages >= 1 if kind.path else holds_samples(topic))
 
 
 def listed_topics(topics: Sequence[Topic]) -> str:
@@ -110,12 +133,7 @@ def _named(bag: Bag, name: str) -> Topic:
         alike = get_close_matches(name, [one.name for one in bag.topics], 3)
         meant = f" (did you mean {' or '.join(alike)}?)" if alike else ""
         raise DataError(f"expected a topic {name!r}{meant}, got {listed_topics(bag.topics)}")
-    known = [one for one in same if one.type in TYPES or one.type in TRANSFORMS]
-    if not known:
-        raise DataError(
-            f"topic {same[0].name}: expected a type of movements, got {' and '.join(one.type for one in same)}; known "
-            f"are {', '.join(sorted(TYPES))}; convert the topic to CSV"
-        )
+    known = [one for one in same if one.type in TYPES or one.type in TRANSFORMS] or same
     if not (full := [one for one in known if one.n_messages]):
         raise DataError(f"topic {same[0].name}: expected samples of {known[0].type}, got no messages")
     return max(full, key=lambda one: one.n_messages)

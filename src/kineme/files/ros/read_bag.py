@@ -35,7 +35,7 @@ def read_bag(path: Path, layout: Layout) -> Parsed:
     """
     with open_bag(path) as bag:
         choice = choose(bag, layout)
-        paths = [topic for topic in choice.topics if TYPES[topic.type].path]
+        paths = [one for one in choice.topics if one.type in TYPES and TYPES[one.type].path]
         if not paths:
             parsed = _streamed(bag, choice, layout)
             return parsed._replace(left_out=(*parsed.left_out, *logs_beside(path)))
@@ -53,7 +53,7 @@ def _streamed(bag: Bag, choice: Choice, layout: Layout) -> Parsed:
     if choice.frames:
         streams, left_out = read_transforms(bag, choice.transforms, choice.frames, layout.skip)
     if choice.topics:
-        others, lost = read_streams(bag, choice.topics, layout.skip)
+        others, lost = read_streams(bag, choice.topics, layout.skip, layout.coordinates)
         streams, left_out = [*streams, *others], [*left_out, *lost]
     of_headers, reason = clock_of(streams)
     if str(layout.time) in _CLOCKS:
@@ -89,8 +89,9 @@ def _whole(bag: Bag, paths: Paths, layout: Layout) -> Parsed:
 
 
 def _roles(heads: tuple[str, ...], time: int, layout: Layout) -> Roles:
-    """All columns are coordinates but those of stamps, unless the caller chooses: the names of joints are any words."""
-    positions = tuple(range(2, len(heads)))
+    """All columns but stamps and covariances are coordinates, or those chosen: the names of joints are any words."""
+    measured = tuple(k for k in range(2, len(heads)) if "covariance" not in heads[k])
+    positions = measured or tuple(range(2, len(heads)))
     if layout.time is not None:
         time = column_numbers(heads, [layout.time])[0]
     if layout.coordinates is not None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,9 @@ from kineme.files.limits import check_expanded
 from kineme.files.ros.bags import Bag, Topic, messages_of
 from kineme.files.ros.decode import decoder_of
 from kineme.files.ros.message_types import TYPES, Heads, nanoseconds_of
+from kineme.files.ros.number_fields import number_fields
 from kineme.files.ros.rotations import are_rotations
+from kineme.movements.tables.layout import Column
 from kineme.movements.tables.parsed import listed
 from kineme.output.text import counted
 from kineme.validation import Array
@@ -75,15 +78,17 @@ class _Open(NamedTuple):
 
     decode: Any
     row: Any
-    has_header: bool
+    stamp: Any  # message -> [ns]; None if messages do not tell their own time
     groups: dict[Heads, tuple[Samples, list[int] | None]]  # heads -> their samples, and their order in these
     first: dict[Heads, Heads]  # sorted heads -> those that came first
     bad: list[str]
     counts: list[int]  # messages, those without a sample
 
 
-def read_streams(bag: Bag, topics: Sequence[Topic], skip: str) -> tuple[list[Stream], list[str]]:
-    """The samples of topics, and what was left out.
+def read_streams(
+    bag: Bag, topics: Sequence[Topic], skip: str, columns: Sequence[Column] | None = None
+) -> tuple[list[Stream], list[str]]:
+    """The samples of topics, and what was left out; `columns` are those that are asked for.
 
     Messages of one topic may have different columns, as the states of joints that several nodes publish. They are
     streams of their own where they share no column; of those that do, the most frequent are read.
@@ -106,7 +111,10 @@ def read_streams(bag: Bag, topics: Sequence[Topic], skip: str) -> tuple[list[Str
     streams: list[Stream] = []
     for topic, one in zip(topics, opened, strict=True):
         left_out += _losses(topic, one, skip)
-        streams += _streams(topic, one, skip, left_out)
+        streams += [
+            with_rotations(stream, f"topic {topic.name}: ", skip, left_out, columns)
+            for stream in _streams(topic, one, left_out)
+        ]
     return streams, left_out
 
 
@@ -114,14 +122,19 @@ _TO_KEEP = "; to keep the others, say skip='sample', in the shell --skip sample"
 
 
 def _open(bag: Bag, topic: Topic) -> _Open:
-    kind = TYPES[topic.type]
-    return _Open(decoder_of(bag, topic), kind.row, kind.has_header, {}, {}, [], [0, 0])
+    kind = TYPES.get(topic.type)
+    if kind is None:
+        fields = number_fields(bag, topic)
+        heads, stamp = fields.heads, (lambda message: message.stamp) if fields.has_header else None
+        return _Open(fields.decode, lambda message: (heads, message.row), stamp, {}, {}, [], [0, 0])
+    stamp = (lambda message: nanoseconds_of(message.header.stamp)) if kind.has_header else None
+    return _Open(decoder_of(bag, topic), kind.row, stamp, {}, {}, [], [0, 0])
 
 
 def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None:
     n = 0
     for k, recorded, raw in messages_of(bag, topics):
-        decode, row_of, has_header, groups, _, bad, counts = opened[k]
+        decode, row_of, stamp_of, groups, _, bad, counts = opened[k]
         counts[0] += 1
         try:
             message = decode(raw)
@@ -135,8 +148,8 @@ def _collect(bag: Bag, topics: Sequence[Topic], opened: Sequence[_Open]) -> None
         samples, order = groups.get(heads) or _group(opened[k], heads)
         samples.values.extend(row if order is None else [row[i] for i in order])
         samples.recorded.append(recorded)
-        if has_header:
-            samples.stamped.append(nanoseconds_of(message.header.stamp))
+        if stamp_of is not None:
+            samples.stamped.append(stamp_of(message))
         n += 1
         if not n % _CHECKED:
             check_kept([one for each in opened for one, _ in each.groups.values()])
@@ -178,7 +191,7 @@ def _losses(topic: Topic, one: _Open, skip: str) -> list[str]:
     return losses
 
 
-def _streams(topic: Topic, one: _Open, skip: str, left_out: list[str]) -> list[Stream]:
+def _streams(topic: Topic, one: _Open, left_out: list[str]) -> list[Stream]:
     """Streams of one topic, the longest first."""
     whole = [(heads, samples) for heads, (samples, order) in one.groups.items() if order is None]
     whole.sort(key=lambda group: -len(group[1].recorded))
@@ -190,8 +203,7 @@ def _streams(topic: Topic, one: _Open, skip: str, left_out: list[str]) -> list[S
             left_out.append(f"topic {topic.name}: {n} with other columns {listed(heads)}, which share {min(shared)!r}")
             continue
         taken |= set(heads)
-        stream = stream_of(topic.name, heads, samples, one.has_header)
-        streams.append(with_rotations(stream, f"topic {topic.name}: ", skip, left_out))
+        streams.append(stream_of(topic.name, heads, samples, one.stamp is not None))
     return streams
 
 
@@ -209,18 +221,21 @@ def rotations_in(heads: Heads) -> list[int]:
     return [k for k in starts if all(heads[k + i].endswith(end) for i, end in enumerate(ends))]
 
 
-def with_rotations(stream: Stream, where: str, skip: str, left_out: list[str]) -> Stream:
+def with_rotations(
+    stream: Stream, where: str, skip: str, left_out: list[str], columns: Sequence[Column] | None = None
+) -> Stream:
     """The stream without quaternions that are none.
 
-    Those that are zero in every sample were never set: their columns are left out. Others cost their sample or, where
-    `skip` is ``"movement"``, the movement.
+    Those that are zero in every sample were never set: their columns are left out, and so are those that `columns`, if
+    given, does not ask for. Others cost their sample or, where `skip` is ``"movement"``, the movement.
     """
     unset = [k for k in rotations_in(stream.heads) if not stream.values[:, k : k + 4].any()]
     if unset:
         dropped = [k + i for k in unset for i in range(4)]
         left_out.append(f"{where}{', '.join(stream.heads[k] for k in dropped)}, which are 0 in every message")
-        kept = [k for k in range(len(stream.heads)) if k not in dropped]
-        stream = replace(stream, heads=tuple(stream.heads[k] for k in kept), values=stream.values[:, kept])
+        stream = _without(stream, unset)
+    wrong = [k for k in rotations_in(stream.heads) if not are_rotations(stream.values[:, k : k + 4]).all()]
+    stream = _without(stream, [k for k in wrong if not _is_asked(stream, range(k, k + 4), columns)])
     good = np.ones(len(stream.values), dtype=bool)
     for k in rotations_in(stream.heads):
         good &= are_rotations(stream.values[:, k : k + 4])
@@ -237,3 +252,23 @@ def with_rotations(stream: Stream, where: str, skip: str, left_out: list[str]) -
     left_out.append(reason)
     stamped = None if stream.stamped is None else stream.stamped[good]
     return replace(stream, values=stream.values[good], recorded=stream.recorded[good], stamped=stamped)
+
+
+def _without(stream: Stream, rotations: Sequence[int]) -> Stream:
+    """The stream without the quaternions that begin at these columns."""
+    if not rotations:
+        return stream
+    dropped = {k + i for k in rotations for i in range(4)}
+    kept = [k for k in range(len(stream.heads)) if k not in dropped]
+    return replace(stream, heads=tuple(stream.heads[k] for k in kept), values=stream.values[:, kept])
+
+
+def _is_asked(stream: Stream, numbers: Iterable[int], columns: Sequence[Column] | None) -> bool:
+    """Whether one of the columns with these numbers is asked for: by its name, the beginning of it, or a pattern.
+
+    A column that is asked for by its number may be any.
+    """
+    if columns is None or any(not isinstance(one, str) or one.isdecimal() for one in columns):
+        return True
+    names = [name for k in numbers for name in (stream.heads[k], f"{stream.name}.{stream.heads[k]}")]
+    return any(fnmatchcase(name, str(one)) or name.startswith(f"{one}.") for name in names for one in columns)

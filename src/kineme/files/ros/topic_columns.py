@@ -28,7 +28,7 @@ def fitting_topics(bag: Bag, topics: Sequence[Topic], known: Known) -> list[Topi
 
 def _first_sample(bag: Bag, topic: Topic) -> tuple[Heads, Sequence[float]]:
     """The columns and numbers of the first sample of a topic; nothing if it has none soon."""
-    row_of = TYPES[topic.type].row
+    row_of = TYPES[topic.type].row if topic.type in TYPES else None
     if row_of is None:
         return (), ()
     try:
