@@ -16,6 +16,7 @@ from kineme.output.figures import FORMATS as FIGURES
 #: Endings that are read together -> what they are, and the extra that reading them takes.
 _READ = {
     ".csv .tsv .txt": ("tables of text, wide and long; exports of OptiTrack, Vicon, Qualisys by their heads", ""),
+    ".ts": ("series of time-series archives, one on a line", ""),
     ".parquet": ("tables of Apache Parquet, of lists too", "parquet"),
     ".npz .npy": ("arrays of NumPy: ragged movements, equal ones, trees by name", ""),
     ".json .jsonl": ("objects with positions, or one on a line; trees by name", ""),

@@ -29,7 +29,7 @@ WORDS = (
     "nan", "inf", "-inf", "1e308", "-1e400", "1e-320", "null", "", " ", "-0", "wave", "é", "\0", "#", "//", '"', "'",
     ",", ";", "\n", "\r", "\t", "[", "]", "{", "}", "True", "0x1", "1_0", "²", "2024-01-01T00:00:00Z", "9" * 400,
 )  # fmt: skip
-_TEXTS = (".csv", ".tsv", ".txt", ".json", ".jsonl", ".bvh", ".eaf", ".mot", ".sto", ".mvnx")
+_TEXTS = (".csv", ".tsv", ".txt", ".ts", ".json", ".jsonl", ".bvh", ".eaf", ".mot", ".sto", ".mvnx")
 NUMBERS = (0, 1, 2, 7, 127, 128, 255, 256, 65535, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
 
 
@@ -291,6 +291,7 @@ def samples():
         "timed.npz": _npz(t=t, q=x, gripper=t),
         "amass.npz": _npz(poses=np.tile(x, (1, 78)), trans=np.tile(t[:, None], 3), betas=t[:5], mocap_framerate=120.0),
         "robot.npz": _npz(qpos=np.tile(x, (1, 4)), qvel=x, joint_names=["a", "b"], fps=np.array([50])),
+        "series.ts": b"@timeStamps false\n@classLabel true a b\n@data\n1,2,3,4:4,?,2,1:a\n2,2,3,5,6:1,2,1,2,1:b\n",
         "one.npy": _npy(np.stack((x, x))),
         "samples.json": json.dumps([{"t": a, "x": b} for a, b in zip(t.tolist(), t.tolist(), strict=True)]).encode(),
         "keyed.json": _json(wave=x, nod=x),

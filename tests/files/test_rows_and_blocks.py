@@ -142,3 +142,17 @@ def test_blocks_of_any_format_and_a_rest_that_is_no_block_is_refused(tmp_path):
         kineme.read_recordings(tmp_path / "a.npz", every=9)
     with pytest.raises(kineme.SpecificationError, match="expected every to be"):
         Layout(every=3)
+
+
+def test_a_line_may_have_more_columns_than_samples():
+    text = SERIES.format(timed="false") + ":".join(f"{k},1,{k},2" for k in range(7)) + ":wave\n"
+    assert read(text, "a.ts").demonstrations.n_dims == 7
+
+
+def test_a_log_without_heads_and_times_has_no_time_where_all_columns_are_chosen():
+    log = "\n".join(f"{k},{100 - k * k},{k % 5}" for k in range(24))
+    found = read(log, every=12, units=0.01, columns=(0, 1, 2))
+    assert (found.demonstrations.n_dims, found.detected[0][0].time) == (3, None)
+    np.testing.assert_allclose(found.demonstrations.durations, 0.11)
+    with pytest.raises(kineme.DataError, match="expected a column of times"):
+        read(log, every=12, columns=(0, 1, 2))

@@ -81,3 +81,15 @@ def test_a_data_set_that_is_written_in_parts_of_little_is_read(tmp_path):
         file.create_dataset("wave/x", (20_000,), "f8", chunks=(100,), compression="gzip")[:5000] = t[:5000]
     (one,) = kineme.read_recordings(tmp_path / "a.h5")
     np.testing.assert_array_equal(one.positions[:5000, 0], t[:5000])
+
+
+def test_rows_that_are_all_alike_are_not_expanded(child, tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    zeros = np.zeros(10**7)
+    parquet.write_table(pa.table({"time": zeros, "x": zeros}), tmp_path / "a.parquet", compression="zstd")
+    assert (tmp_path / "a.parquet").stat().st_size < MIB
+    outcome = child.call("kineme:read_recordings", tmp_path / "a.parquet")
+    assert outcome.how == "refused", outcome
+    assert "which cannot differ" in outcome.what

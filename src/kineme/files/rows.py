@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.arrays.arrays import Named, parsed_arrays
+from kineme.files.arrays.arrays import ROWS, Named, parsed_arrays
 from kineme.files.limits import check_expanded
 from kineme.files.tables.dialect import is_number, is_skipped, separator_of, split
 from kineme.files.tables.text_table import lines_of
@@ -233,5 +233,5 @@ def _parsed(series: _Series, names: Sequence[str], layout: Layout, kind: str, ti
     xs = [series.positions[k] for k in kept]
     places = [f"line {series.lines[k]}" for k in kept]
     named = Named([series.labels[k] for k in kept], "times", places, names)
-    parsed = parsed_arrays(xs, [series.times[k] for k in kept] if timed else None, named, layout, (kind, "rows"))
+    parsed = parsed_arrays(xs, [series.times[k] for k in kept] if timed else None, named, layout, (kind, ROWS))
     return parsed._replace(left_out=(*series.left_out, *left_out))

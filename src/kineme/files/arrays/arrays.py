@@ -18,6 +18,8 @@ from kineme.movements.tables.time_stamps import in_seconds, nanoseconds, unit_by
 from kineme.movements.trajectories.movements import axis_names
 from kineme.validation import ROUNDED, Array, too_long_integer
 
+#: The layout of texts of which each line is a movement.
+ROWS = "rows"
 #: Entries that name the columns of positions, and those of velocities and accelerations.
 COLUMNS, RATES = "columns", "rates"
 POSITIONS, TIMES, LABELS = ("positions", "x", "pos"), ("times", "t", "time"), ("labels", "label", "y")
@@ -92,7 +94,8 @@ def parsed_arrays(
         stamps = np.concatenate([np.arange(len(x)) * float(units) for x in xs])
     else:
         units, known = "s", "no times: one second each"
-        if wide := [x.shape for x in xs if x.shape[0] < x.shape[1]]:
+        wide = [x.shape for x in xs if x.shape[0] < x.shape[1]]
+        if wide and detected[1] != ROWS:  # a line says which of its numbers are one sample
             raise DataError(
                 f"expected samples along the first axis of each movement, got shape {wide[0]}, more dimensions than "
                 "samples; if time runs along the last axis, as in (n, d, T), save np.moveaxis(array, 1, 2), of one "

@@ -24,6 +24,9 @@ _WIDEST = 1000  # numbers in a list; images have more
 _STATE, _COMMANDS = "observation.state", frozenset({"action"})  # of LeRobot's episodes
 
 
+_LARGE, _EXPANDED = 2**26, 1000  # bytes from which on packing is looked at; times as many as repeated rows alone give
+
+
 def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """Read the columns that have a role. Dates and durations are nanoseconds; missing values are NaN.
 
@@ -46,7 +49,12 @@ def read_parquet_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
         heads, kinds, owners = _expanded(names, types, _lists_to_read(file, layout), file)
         roles = choose_roles(_told(heads, kinds, [types[k] for k in owners], layout), kinds, layout)
         needed = sorted({owners[k] for k in range(len(heads)) if k not in roles.ignored})
-        check_expanded(8 * max(file.metadata.num_rows, 0) * (len(heads) - len(roles.ignored)))
+        check_expanded(n_bytes := 8 * max(file.metadata.num_rows, 0) * (len(heads) - len(roles.ignored)))
+        if n_bytes > _LARGE and n_bytes > _EXPANDED * len(data):
+            raise DataError(
+                f"expected samples that move, got {file.metadata.num_rows:,} rows in {len(data):,} bytes, which cannot "
+                "differ; write the rows that were recorded"
+            )
         _refuse_twins(names, needed)
         texts = {owners[k] for k in (*roles.movement, roles.label) if k is not None}
         if nested := [k for k in needed if k in texts and pa.types.is_nested(types[k])]:

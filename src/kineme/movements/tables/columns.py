@@ -203,6 +203,8 @@ def _times(
     if layout.time is not None:
         return [_number(heads, layout.time)]
     free = [k for k in range(len(heads)) if k not in taken]
+    if not named and layout.coordinates is not None:  # nothing but the choice says that the first column is no time
+        free = [k for k in free if k not in column_numbers(heads, layout.coordinates)]
     of_time = _of_time(heads, kinds, free) if named else [k for k in free if kinds[k] != "text"][:1]
     dates = [k for k in of_time if kinds[k] == "date"]
     if of_time and len(dates) <= 1 and (len(of_time) == 1 or all(kinds[k] != "text" for k in of_time)):
