@@ -200,3 +200,20 @@ def test_numbers_that_are_written_as_texts_are_refused_and_codes_are_not():
         kineme.Demonstrations.of(frame.astype({"time": str, "x": float}))
     codes = frame.assign(x=range(6), subject="07")
     assert kineme.Demonstrations.of(codes).dimensions == ("x", "y")
+
+
+def test_movements_of_the_same_columns_in_other_orders_and_units_are_put_together():
+    plain = {"t": T, "x [mm]": 1000 * X, "y [mm]": 1000 * Y}
+    turned = {"t": T, "y [m]": Y, "x [m]": X}
+    first, second = (kineme.Demonstrations.of(pd.DataFrame(one))[0] for one in (plain, turned))
+    both = kineme.Demonstrations([first, second])
+    assert both.channels == first.channels
+    np.testing.assert_allclose(both[1].positions, both[0].positions, rtol=1e-12)
+    np.testing.assert_allclose(kineme.Demonstrations.of([second, first])[1].recorded, second.recorded, rtol=1e-12)
+    other = kineme.Demonstrations.of(pd.DataFrame({"t": T, "x [V]": X, "y [mm]": Y}))[0]
+    with pytest.raises(TrajectoryError, match=r"expected 'x \[V\]' in 'mm'"):
+        kineme.Demonstrations([first, other])
+    assert (
+        kineme.Demonstrations([first, kineme.Demonstrations.of(pd.DataFrame({"t": T, "a": X, "b": Y}))[0]]).channels
+        is None
+    )

@@ -78,8 +78,8 @@ def moving_kinds(channels: Channels) -> tuple[str, ...]:
 
 def same_columns(channels: Channels | None, others: Channels | None) -> bool:
     """Whether channels are equal, but for the periods that were told by values."""
-    if channels is None or others is None:
-        return channels is others
+    if channels is None or others is None or channels == others:
+        return channels == others
     return [one._replace(period=None) for one in channels] == [one._replace(period=None) for one in others]
 
 

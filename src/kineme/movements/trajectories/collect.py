@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from kineme.errors import TrajectoryError
 from kineme.movements.channels.channel import Channels, is_plain, learned_names, recorded_names
+from kineme.movements.channels.column_match import Columns, columns_like, columns_recorded
+from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.labels import label_array
 from kineme.movements.trajectories.movements import Movements, Names
 from kineme.movements.trajectories.plain_arrays import plain_block, plain_stamps
@@ -43,6 +45,7 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
                 f"expected a sequence of Trajectory, got {type(one).__name__} at index {i}; "
                 "use Demonstrations.from_arrays for arrays"
             )
+    trajectories = _in_columns_of_first(trajectories)
     names = tuple(one.name for one in trajectories)
     positions, offsets = _concatenate([one.positions for one in trajectories], names)
     times = np.concatenate([one.times for one in trajectories])
@@ -60,6 +63,38 @@ def collect_trajectories(trajectories: Sequence[Trajectory]) -> Movements:
         channels,
         recorded,
     )
+
+
+def _in_columns_of_first(trajectories: list[Trajectory]) -> list[Trajectory]:
+    """Trajectories whose columns have the names of the first one's in its order and units; the others as they are.
+
+    Raises
+    ------
+    TrajectoryError
+        Columns of the same names in units that cannot be converted.
+    """
+    every = {id(one.channels): one.channels for one in trajectories}
+    channels = trajectories[0].channels if trajectories else None
+    if len(every) < 2 or channels is None:
+        return trajectories
+    wanted = columns_recorded(channels)
+    ours = {key: columns_recorded(other or ()) for key, other in every.items()}
+    other = {key for key, one in ours.items() if one != wanted and {*one.names} == {*wanted.names}}
+    return [
+        _as_first(one, ours[id(one.channels)], channels, wanted) if id(one.channels) in other else one
+        for one in trajectories
+    ]
+
+
+def _as_first(one: Trajectory, ours: Columns, channels: Channels, wanted: Columns) -> Trajectory:
+    columns = np.ascontiguousarray(columns_like(one.recorded, ours, wanted, known_units=False))
+    made = of_channels(Movements(columns, np.array([0, len(columns)]), np.array([one.duration]), one.times), channels)
+    new = object.__new__(Trajectory)
+    values = {"times": one.times, "positions": made.positions, "label": one.label, "name": one.name}
+    recorded = made.positions if made.recorded is None else made.recorded
+    for name, value in (values | {"channels": channels, "recorded": recorded}).items():
+        object.__setattr__(new, name, value)
+    return new
 
 
 def _names_of(channels: Channels, n_dims: int) -> tuple[str, ...]:
