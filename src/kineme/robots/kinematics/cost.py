@@ -9,7 +9,7 @@ from kineme.validation import Array
 
 _TOLERATED = 1e-4  # distance from the path that costs nothing [m]
 _PER_METER = 1e3
-_AT_A_STOP = 5.0  # cost of a joint that comes to a stop: it does so suddenly, and the others have to do its part
+AT_A_STOP = 5.0  # cost of a joint that comes to a stop: it does so suddenly, and the others have to do its part
 _STOP = 0.99  # share of the range of a joint from which on it is at a stop
 
 
@@ -24,4 +24,4 @@ def costs_of(robot: Robot, times: Array, joints: Array, errors: Array) -> Array:
     speed = np.abs(np.diff(joints, axis=0)) / np.diff(times)[:, None, None] / robot.velocity
     middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
     stops = (np.abs(joints - middle) / half).max(axis=(0, 2))
-    return np.asarray(missed + speed.max(axis=(0, 2)) + stops**4 + _AT_A_STOP * (stops > _STOP))
+    return np.asarray(missed + speed.max(axis=(0, 2)) + stops**4 + AT_A_STOP * (stops > _STOP))

@@ -16,6 +16,7 @@ from kineme.validation import Array
 #: Cost of leaving the rest posture [1/rad], besides 1 per meter: decides where the pose leaves the joints free.
 POSTURE_COST = 1e-4
 _DAMPING = 1e-3  # of a step, per squared distance from the pose: far away the step is one of gradient descent
+_ROUNDS = 4  # of finding the joints that come to a stop within a step
 _LARGEST = 0.7  # change of a joint in one step [rad, m]
 
 
@@ -32,7 +33,7 @@ def descend(
     """Steps of damped least squares (Levenberg and Marquardt) towards poses of the tip.
 
     A step minimizes ``|p - p*|^2 + |c log(R' R*)|^2 + (0.0001 |q - rest|)^2`` to first order, as those of
-    `InverseKinematics` do; a joint at a stop stays there while it is pushed outwards.
+    `InverseKinematics` do; joints that come to a stop stay there, and the others do their part.
 
     Parameters
     ----------
@@ -49,19 +50,66 @@ def descend(
     weights = np.concatenate((np.ones(3), turn_costs))
     for _ in range(n_steps):
         at, turned, jacobians = kinematics(robot, q)
-        back = turned.transpose(0, 2, 1)
-        away = np.einsum("mij,mj->mi", back, positions - at)
-        turn = Rotation.from_matrix(back @ rotations).as_rotvec()
-        error = np.concatenate((away, turn), axis=1) * weights
-        slope = np.einsum("mij,mi->mj", jacobians * weights[:, None], error) + POSTURE_COST**2 * (robot.rest - q)
-        stopped = ((q <= robot.lower) & (slope < 0)) | ((q >= robot.upper) & (slope > 0))
-        free = np.where(stopped[:, None], 0.0, jacobians * weights[:, None])
-        damping = POSTURE_COST**2 + _DAMPING * np.einsum("mi,mi->m", error, error)
-        curvature = free.transpose(0, 2, 1) @ free + damping[:, None, None] * np.eye(robot.n_joints)
-        change = np.linalg.solve(curvature, np.where(stopped, 0.0, slope)[:, :, None])[:, :, 0]
+        error = distances((at, turned), (positions, rotations), turn_costs) * weights
+        damping = _DAMPING * np.einsum("mi,mi->m", error, error)
+        pull = np.full(len(q), POSTURE_COST**2)
+        range_left = robot.lower - q, robot.upper - q
+        change = step_within(jacobians * weights[:, None], error, (robot.rest - q, pull, damping), range_left)
         change *= np.minimum(1.0, _LARGEST / np.maximum(np.abs(change).max(axis=1, keepdims=True), 1e-12))
         q = np.clip(q + change, robot.lower, robot.upper)
     return Reached(q, np.linalg.norm(kinematics(robot, q)[0] - positions, axis=1))
+
+
+def step_within(
+    slopes: Array, error: Array, costs: tuple[Array, Array, Array], range_left: tuple[Array, Array]
+) -> Array:
+    """Minimize ``|A x - error|^2 + pull |x - drift|^2 + damping |x|^2`` within limits, for m postures at once.
+
+    Joints that would pass a limit stop there, and the others are solved again.
+
+    Parameters
+    ----------
+    slopes : ndarray of shape (m, 6, n)
+        A
+    error : ndarray of shape (m, 6)
+    costs : drift of shape (m, n), pull and damping of shape (m,)
+    range_left : two ndarrays of shape (m, n)
+        The least and the largest change x.
+    """
+    drift, pull, damping = costs
+    diagonal = (pull + damping)[:, None, None] * np.eye(drift.shape[1])
+    stopped, change = np.zeros(drift.shape, dtype=bool), np.zeros_like(drift)
+    for _ in range(_ROUNDS):
+        free = np.where(stopped[:, None], 0.0, slopes)
+        left = error - np.einsum("mij,mj->mi", slopes, np.where(stopped, change, 0.0))
+        slope = np.einsum("mij,mi->mj", free, left) + np.where(stopped, 0.0, pull[:, None] * drift)
+        moved = np.linalg.solve(free.transpose(0, 2, 1) @ free + diagonal, slope[:, :, None])[:, :, 0]
+        change = np.where(stopped, change, moved)
+        beyond = ~stopped & ((change < range_left[0]) | (change > range_left[1]))
+        change = np.clip(change, *range_left)
+        if not beyond.any():
+            break
+        stopped |= beyond
+    return np.asarray(change)
+
+
+def distances(here: tuple[Array, Array], wanted: tuple[Array, Array], turn_costs: Array) -> Array:
+    """Positions and rotation vectors (m, 6) from poses to others, in the axes of the former.
+
+    Where turning about z costs nothing, the shortest turn that brings the z axes together: that of the whole rotation
+    changes with the turn about z.
+    """
+    back = here[1].transpose(0, 2, 1)
+    away = np.einsum("mij,mj->mi", back, wanted[0] - here[0])
+    if turn_costs[2] == 0:
+        x, y, z = (back @ wanted[1][..., 2:])[..., 0].T
+        sine = np.hypot(x, y)
+        angle = np.arctan2(sine, z) / np.where(sine > 0, sine, 1.0)
+        turn = np.column_stack((-y * angle, x * angle, np.zeros_like(x)))
+        turn[(sine == 0) & (z < 0), 0] = np.pi
+    else:
+        turn = Rotation.from_matrix(back @ wanted[1]).as_rotvec()
+    return np.concatenate((away, turn), axis=1)
 
 
 def kinematics(robot: Robot, joints: Array) -> tuple[Array, Array, Array]:
@@ -75,6 +123,6 @@ def kinematics(robot: Robot, joints: Array) -> tuple[Array, Array, Array]:
     for i, q in enumerate(joints):
         pinocchio.computeJointJacobians(model, data, q)
         pose = pinocchio.updateFramePlacement(model, data, tip)
-        jacobians[i] = pinocchio.getFrameJacobian(model, data, tip, local)
+        jacobians[i] = pinocchio.getFrameJacobian(model, data, tip, local).reshape(6, n)  # it has (6,) of one joint
         positions[i], rotations[i] = pose.translation, pose.rotation
     return positions, rotations, jacobians

@@ -17,13 +17,13 @@ _STARTS = 16
 _TOLERANCE = 1e-4  # from the pose [m]
 
 
-def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array) -> Reached:
-    """Joint positions that bring the tip to one pose, from the rest posture and from 15 others spread over the limits.
+def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, n_starts: int = _STARTS) -> Reached:
+    """Joint positions that bring the tip to one pose, from the rest posture and from others spread over the limits.
 
     Two that differ by less than 0.3 rad in every joint count as one. The most exact comes first; if none comes within
     0.1 mm, it is alone.
     """
-    found = descend(robot, _starts(robot), position, rotation, turn_costs, _STEPS)
+    found = descend(robot, _starts(robot, n_starts), position, rotation, turn_costs, _STEPS)
     order = np.argsort(found.errors, kind="stable")
     kept = [int(order[0])]
     for i in order[1:]:
@@ -34,11 +34,11 @@ def postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array) 
 
 
 @lru_cache(maxsize=8)
-def _starts(robot: Robot) -> Array:
+def _starts(robot: Robot, n: int) -> Array:
     """The same every time, so that the same question has the same answer.
 
     A Halton sequence within the limits, at most half a turn to each side.
     """
     lower, upper = np.clip((-np.pi, np.pi), robot.lower[:, None], robot.upper[:, None]).T
-    spread = qmc.Halton(robot.n_joints, scramble=False).random(_STARTS)[1:]
+    spread = qmc.Halton(robot.n_joints, scramble=False).random(n)[1:]
     return np.vstack((robot.rest, lower + spread * (upper - lower)))

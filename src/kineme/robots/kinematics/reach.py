@@ -12,11 +12,16 @@ from kineme.robots.models.robot import Robot
 from kineme.validation import Array
 
 _REACHED = 1e-3  # farther from its pose than this, a posture does not reach it [m]
-_MOST_CHECKED = 20  # poses whose distance is sought, of those that are missed
+_SEEDS = 48  # starts from which a posture is sought before a pose is said to be out of reach
+_MOST_CHECKED = 8  # poses whose distance is sought, of those that are missed
 _FAR = 3.0  # from an arm [m]: farther than that, it is rather the unit that is wrong
 _REMEDY = (
     "choose another place (--at), free the orientation (follow=, --follow axis), or make the movement smaller (--scale)"
 )
+
+
+class OutOfReachError(TrajectoryError):
+    """A pose that no posture of an arm reaches."""
 
 
 def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs: Array, what: str) -> Array:
@@ -24,12 +29,14 @@ def reaching_postures(robot: Robot, position: Array, rotation: Array, turn_costs
 
     Raises
     ------
-    TrajectoryError
+    OutOfReachError
         There is none: where, and by how far.
     """
     found = postures(robot, position, rotation, turn_costs)
     if found.errors[0] > _REACHED:
-        raise TrajectoryError(_unreachable(robot, what, float(found.errors[0])))
+        found = postures(robot, position, rotation, turn_costs, _SEEDS)
+    if found.errors[0] > _REACHED:
+        raise OutOfReachError(_unreachable(robot, what, float(found.errors[0])))
     return found.joints
 
 
@@ -38,19 +45,20 @@ def check_reached(robot: Robot, path: TaskPath, joints: Array, turn_costs: Array
 
     Raises
     ------
+    OutOfReachError
+        The pose that is farthest out of reach: at which time, where and by how far.
     TrajectoryError
-        The pose that is farthest out of reach: at which time, where and by how far; or, if every pose is within reach,
-        from when to when the tip does not keep up.
+        Every pose is within reach, but the tip does not keep up: from when to when.
     """
     errors = np.linalg.norm(kinematics(robot, joints)[0] - path.positions, axis=1)
     missed = np.flatnonzero(~(errors <= tolerance))
     if len(missed) == 0:
         return
     checked = missed[np.unique(np.linspace(0, len(missed) - 1, _MOST_CHECKED).astype(int))]
-    nearest = [postures(robot, path.positions[t], path.rotations[t], turn_costs).errors[0] for t in checked]
+    nearest = [postures(robot, path.positions[t], path.rotations[t], turn_costs, _SEEDS).errors[0] for t in checked]
     worst = int(np.argmax(nearest))
     if nearest[worst] > tolerance:
-        raise TrajectoryError(_unreachable(robot, pose_in_words(path, int(checked[worst])), float(nearest[worst])))
+        raise OutOfReachError(_unreachable(robot, pose_in_words(path, int(checked[worst])), float(nearest[worst])))
     raise TrajectoryError(
         f"{robot.name} reaches every pose of this movement, but not one after the other: from "
         f"{path.times[missed[0]]:.2f} to {path.times[missed[-1]]:.2f} s its tip stays up to {errors.max():.3f} m away, "

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from kineme.errors import SpecificationError, TrajectoryError
 from kineme.movements.rotations.matrices import matrices_of
@@ -25,10 +25,12 @@ class TaskPath(NamedTuple):
     rotations: Array  # (T, 3, 3)
 
     def at(self, times: Array) -> TaskPath:
-        """The poses at other times: cubic between positions, along the shortest turn between orientations."""
+        """The poses at other times: cubic between positions and between orientations."""
+        positions = CubicSpline(self.times, self.positions)(times)
+        if np.ptp(self.rotations, axis=0).max() == 0:
+            return TaskPath(times, positions, np.broadcast_to(self.rotations[0], (len(times), 3, 3)))
         rotations = Rotation.from_matrix(np.array(self.rotations))  # SciPy 1.14 takes no read-only array
-        turns = Slerp(self.times, rotations)
-        return TaskPath(times, CubicSpline(self.times, self.positions)(times), turns(times).as_matrix())
+        return TaskPath(times, positions, RotationSpline(self.times, rotations)(times).as_matrix())
 
 
 def task_path(

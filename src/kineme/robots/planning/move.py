@@ -12,11 +12,11 @@ from scipy.interpolate import CubicSpline
 from kineme.errors import TrajectoryError
 from kineme.robots.checks.tracking import TRACKED
 from kineme.robots.kinematics.inverse import InverseKinematics
-from kineme.robots.kinematics.reach import check_reached
-from kineme.robots.kinematics.task_path import PLANES
+from kineme.robots.kinematics.reach import OutOfReachError, check_reached
+from kineme.robots.kinematics.task_path import PLANES, TaskPath
 from kineme.robots.models.robot import Robot, check_robot, check_start
-from kineme.robots.planning.joint_path import PLACES, joints_along, path_of_the_tip
-from kineme.robots.planning.refusal import refuse_failed
+from kineme.robots.planning.joint_path import PLACES, path_of_the_tip, ways_along
+from kineme.robots.planning.refusal import loses_its_path, refuse_failed, refuse_outside
 from kineme.robots.planning.request import request_of
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.roles import JOINT_UNITS, SPACES
@@ -108,19 +108,60 @@ def move(  # noqa: PLR0913 - one parameter per option
     check_switch("force", force)
     request = request_of(movement, robot, space, steps, continuous, joint_units)
     stands = robot.rest if start is None else _posture(start, robot)
+    untimed = Untimed(
+        robot,
+        CubicSpline(request.times, request.positions),
+        None,
+        stands,
+        rate,
+        request.times,
+        request.steps,
+        follow,
+        request.continuous,
+    )
     if request.space == "joints":
-        joints, path = CubicSpline(request.times, request.positions), None
-    else:
-        ik = InverseKinematics(robot, follow)
-        joints, path = joints_along(ik, path_of_the_tip(ik, request, orientation, plane), place, stands)
         if not force:
-            check_reached(robot, path, joints(path.times), ik.costs, TRACKED)
-    untimed = Untimed(robot, joints, path, stands, rate, request.times, request.steps, follow, request.continuous)
+            refuse_outside(robot, request.times, request.positions)
+        made = _timed(untimed, timing)
+        if not force:
+            refuse_failed(made, untimed, timing)
+        return made
+    ik = InverseKinematics(robot, follow)
+    return _along(ik, path_of_the_tip(ik, request, orientation, plane), place, untimed, timing, force)
+
+
+def _along(
+    ik: InverseKinematics, path: TaskPath, place: str, untimed: Untimed, timing: str, force: bool
+) -> RobotMovement:
+    """Return the first way along the path that passes its checks; with `force`, the first."""
+    failed: list[tuple[RobotMovement, Untimed]] = []
+    errors: list[TrajectoryError] = []
+    for way in ways_along(ik, untimed.follow):
+        lost = any(not isinstance(error, OutOfReachError) for error in errors)
+        if way.sought and not (lost or any(loses_its_path(made) for made, _ in failed)):
+            break
+        try:
+            joints, placed = way.joints(path, place, untimed.start)
+            if not force:
+                check_reached(ik.robot, placed, joints(placed.times), way.ik.costs, TRACKED)
+            solved = untimed._replace(joints=joints, path=placed)
+            made = _timed(solved, timing)
+        except TrajectoryError as error:
+            errors.append(error)
+            continue
+        if force or made.preflight.passed:
+            return made
+        failed.append((made, solved))
+    if not failed:
+        raise errors[0]
+    refuse_failed(*failed[0], timing)
+    return failed[0][0]
+
+
+def _timed(untimed: Untimed, timing: str) -> RobotMovement:
+    """The movement with its timing, and the units of the arm's joints beside it."""
     made = with_timing(untimed, timing)
-    made = replace(made, trajectory=replace(made.trajectory, units=robot.units))
-    if not force:
-        refuse_failed(made, untimed, timing)
-    return made
+    return replace(made, trajectory=replace(made.trajectory, units=untimed.robot.units))
 
 
 def _posture(start: ArrayLike, robot: Robot) -> Array:

@@ -7,10 +7,14 @@ import numpy as np
 from kineme.errors import TrajectoryError
 from kineme.robots.checks.check import Check, Preflight
 from kineme.robots.kinematics.reach import point_in_words
-from kineme.robots.planning.remedy import remedy
+from kineme.robots.models.robot import Robot
+from kineme.robots.planning.remedy import OTHER_JOINTS, remedy
 from kineme.robots.planning.robot_movement import RobotMovement
 from kineme.robots.planning.timed_movement import Untimed
+from kineme.validation import Array
 
+_FAR = 0.5  # outside its limits, a joint is not checked further [rad, m]
+_LOST = ("tracking", "turned away", "jump", "position")  # checks of what another way may mend
 _NAMED = 4  # checks that the message names, the worst first
 
 
@@ -20,6 +24,29 @@ class InfeasibleError(TrajectoryError):
     def __init__(self, message: str, preflight: Preflight | None = None) -> None:
         super().__init__(message)
         self.preflight = preflight
+
+
+def refuse_outside(robot: Robot, times: Array, joints: Array) -> None:
+    """Refuse a movement of the joints (T, n) that is far outside their limits, before anything is computed.
+
+    Raises
+    ------
+    InfeasibleError
+        The joint that is farthest outside: when, its position and its limit.
+    """
+    beyond = np.maximum(robot.lower - joints, joints - robot.upper)
+    t, j = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    if beyond[t, j] > _FAR:
+        limit = robot.lower[j] if joints[t, j] < robot.lower[j] else robot.upper[j]
+        raise InfeasibleError(
+            f"{robot.name} cannot execute this: position of {robot.joints[j]} at {times[t]:.2f} s: {joints[t, j]:.3g}, "
+            f"limit {limit:.3g} {robot.units[j]}. {OTHER_JOINTS}"
+        )
+
+
+def loses_its_path(made: RobotMovement) -> bool:
+    """Whether the joints left their path or jumped, so that another way along it may be better."""
+    return any(check.what in _LOST for check in made.preflight.failed)
 
 
 def refuse_failed(made: RobotMovement, untimed: Untimed, timing: str) -> None:

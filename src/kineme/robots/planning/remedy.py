@@ -11,7 +11,7 @@ from kineme.robots.planning.timed_movement import FASTEST_RATE, Untimed, with_ti
 
 _OF_SAMPLING = ("jump", "tracking", "turned away", "steps")  # may be mended by more samples
 _ELSEWHERE = "No speed helps: choose another place (--at), orientation (--orientation, --follow) or posture (--rest)"
-_OTHER_JOINTS = "No speed helps: choose another goal (--goal) or start (--at) of the joints"
+OTHER_JOINTS = "No speed helps: choose another goal (--goal) or start (--at) of the joints"
 _TRIED = 20_000  # samples, at most, of the movement slowed down
 _ENOUGH = 1_000.0  # samples per second to learn by how much; more of them pass as well
 _MORE = 10  # times the samples, where they are too few
@@ -39,7 +39,7 @@ def remedy(made: RobotMovement, untimed: Untimed, timing: str) -> str:
 
 
 def _elsewhere(made: RobotMovement) -> str:
-    return _OTHER_JOINTS if made.path is None else _ELSEWHERE
+    return OTHER_JOINTS if made.path is None else _ELSEWHERE
 
 
 def _tried(untimed: Untimed, timing: str) -> float | None:

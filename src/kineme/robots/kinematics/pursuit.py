@@ -1,0 +1,99 @@
+"""Ways along a whole path from many postures at once: for paths that the joints lose if they look one step ahead."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.robots.kinematics.cost import AT_A_STOP, costs_of
+from kineme.robots.kinematics.descent import distances, kinematics, step_within
+from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.task_path import TaskPath
+from kineme.robots.models.robot import Robot
+from kineme.validation import Array
+
+_DENSE = 400  # poses at least: between two of them, a step of Newton's method is nearly exact
+_SEEDS = 48  # starts from which the postures at one pose are sought
+_BEGINS = (0.0, 1.0, 0.5)  # of the path: postures are few where a joint is at a stop, and surest to be found from there
+_PULLS = (0.0, 0.01)  # of the way to the rest posture, at each pose: so far go joints that the pose leaves free
+_LARGEST_PULL = 0.01  # [rad, m]
+_AWAY = (
+    0.05  # of the way to the middle of its range, so far goes a joint at a stop; less by the 7th power farther from it
+)
+_INSIDE = 0.9995  # of its range: between samples a joint goes a little beyond
+_WAYS = 18  # postures at most that are followed together, once for each pull
+_STEPS = 2  # of Newton's method at each pose
+_DAMPING = 1e-8  # of a step, besides the squared distance from the pose
+_LARGEST = 0.15  # change of a joint in one step [rad, m]: more is a jump to another posture
+_LOST = 1e-3  # from its pose [m, rad], from which on a way is given up
+_FOLLOWED = 1e-5  # the same, of a way that is followed
+_NEARLY = 1e-4  # the same, if there is none: arms of few joints turn as far as the position allows
+
+
+def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, TaskPath] | None:
+    """Find joint positions (T, n) along a path, and return them with the path at T poses; None if there is no way.
+
+    Postures at the beginning, the end and the middle of the path are followed to both ends, all at once, by Newton's
+    method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
+    is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
+    that of least cost; the end and the middle are begun at only if a joint comes to a stop on all the others.
+
+    The parameters are those of `choose_posture`.
+    """
+    path = path if len(path.times) >= _DENSE else path.at(np.linspace(0.0, path.times[-1], _DENSE))
+    last = len(path.times) - 1
+    least, best = np.inf, None
+    for share in _BEGINS:
+        begin = round(share * last)
+        found = postures(robot, path.positions[begin], path.rotations[begin], turn_costs, _SEEDS)
+        starts = np.repeat(found.joints[found.errors <= _NEARLY][:_WAYS], len(_PULLS), axis=0)
+        joints = np.tile(starts, (last + 1, 1, 1))
+        errors = np.full(joints.shape[:2], np.inf)
+        for order in (range(begin, last + 1), range(begin, -1, -1)):
+            _follow(robot, path, turn_costs, order, joints, errors)
+        worst = errors.max(axis=0)
+        good = np.flatnonzero(worst <= min(_NEARLY, max(_FOLLOWED, min(worst, default=np.inf))))
+        costs = costs_of(robot, path.times, joints[:, good], errors[:, good]) if len(good) else np.array([np.inf])
+        if costs.min() < least:
+            least, best = float(costs.min()), joints[:, good[int(np.argmin(costs))]]
+        if least < AT_A_STOP:
+            break
+    return None if best is None else (best, path)
+
+
+def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joints: Array, errors: Array) -> None:
+    """Fill `joints` (T, m, n) and `errors` (T, m) in place, in that order of poses; ways that are lost end."""
+    middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
+    lower, upper = middle - _INSIDE * half, middle + _INSIDE * half
+    ways = np.arange(joints.shape[1])
+    pulls = np.resize(_PULLS, joints.shape[1])[:, None]
+    before = q = joints[order[0]] if len(order) else joints[0]
+    for t in order:
+        away = ((q - middle) / half) ** 7 * half  # from the stops
+        pull = np.clip(pulls[ways] * (robot.rest - q) - _AWAY * away, -_LARGEST_PULL, _LARGEST_PULL)
+        ahead = np.clip(2 * q - before, lower, upper)
+        pose = path.positions[t], path.rotations[t]
+        moved, off = _newton(robot, ahead, pull, pose, (turn_costs, lower, upper))
+        joints[t, ways], errors[t, ways] = moved, off
+        kept = off <= _LOST
+        ways, before, q = ways[kept], q[kept], moved[kept]
+        if len(ways) == 0:
+            return
+
+
+def _newton(
+    robot: Robot, q: Array, pull: Array, pose: tuple[Array, Array], limits: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """Postures (m, n) brought to one pose, and how far they are from it (m,) [m, rad]."""
+    turn_costs, lower, upper = limits
+    weights = np.concatenate((np.ones(3), turn_costs))
+    counted = weights >= 1  # less is what arms of few joints follow as far as they can
+    for step in range(_STEPS + 1):
+        at, turned, jacobians = kinematics(robot, q)
+        error = distances((at, turned), pose, turn_costs)
+        if step < _STEPS:
+            near = np.einsum("mi,mi->m", error * weights, error * weights) + _DAMPING
+            drift = pull if step == 0 else np.zeros_like(q)
+            costs, range_left = (drift, near, np.zeros(len(q))), (lower - q, upper - q)
+            change = step_within(jacobians * weights[:, None], error * weights, costs, range_left)
+            q = q + change * np.minimum(1.0, _LARGEST / np.maximum(np.abs(change).max(axis=1, keepdims=True), 1e-12))
+    return q, np.linalg.norm(error[:, counted], axis=1)
