@@ -29,6 +29,7 @@ SUBJECTS = (
     "spotting",
     "by_others",
     "one_shot",
+    "pauses",
     "open_set",
     "outliers",
     "defaults",

@@ -32,3 +32,18 @@ def turn(angle, d, seed=0):
         return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     axis = np.random.default_rng(seed).normal(size=3)
     return Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+
+
+def interrupted(demos, seconds, at_rest, noise=0.0, seed=0):
+    """Each movement with a pause somewhere: samples at rest, or no samples."""
+    arrays, times = [], []
+    for i, one in enumerate(demos):
+        rng, t = np.random.default_rng([seed, i]), np.asarray(one.times)
+        at = int(rng.uniform(0.05, 0.95) * (len(t) - 1)) + 1
+        n_rest = max(1, int(seconds / np.median(np.diff(t)))) if at_rest else 0
+        rest = t[at - 1] + seconds / max(1, n_rest) * np.arange(1, n_rest + 1)
+        x = one.positions
+        still = x[at - 1] + noise * np.ptp(x, axis=0).max() * rng.uniform(-1, 1, (n_rest, x.shape[1]))
+        times.append(np.concatenate((t[:at], rest, t[at:] + seconds)))
+        arrays.append(np.concatenate((x[:at], still, x[at:])))
+    return Demonstrations.from_arrays(arrays, demos.labels, times)

@@ -54,6 +54,19 @@ def perturbed(demos, seed=0):
     return kineme.Demonstrations.from_arrays(arrays, demos.labels, times)
 
 
+def interrupted(demos, seed=0):
+    """With a rest of two seconds, and three without samples, each somewhere."""
+    arrays, times = [], []
+    for i, one in enumerate(demos):
+        rng, t = np.random.default_rng([seed, i]), one.times.copy()
+        t[int(rng.uniform(0.1, 0.9) * len(t)) :] += 3.0
+        at, n_rest = int(rng.uniform(0.05, 0.95) * len(t)), int(2.0 / np.median(np.diff(t)))
+        rest = t[at] + (np.arange(n_rest) + 1) * 2.0 / n_rest
+        times.append(np.concatenate((t[: at + 1], rest, t[at + 1 :] + 2.0)))
+        arrays.append(np.insert(one.positions, [at + 1] * n_rest, one.positions[at], axis=0))
+    return kineme.Demonstrations.from_arrays(arrays, demos.labels, times)
+
+
 def one_in(n, demos, first=0):
     """A mask of the first demonstrations of each shape of LASA."""
     return (np.arange(len(demos)) - first) % 7 < n
@@ -177,6 +190,14 @@ def test_close_and_uneven_stamps_are_treated_as_in_python():
     close = kineme.Demonstrations.from_arrays(arrays, None, times)
     for cutoff in (None, 10.0):
         assert compare_answers(answers_of(kineme.Recognizer(cutoff=cutoff).fit(demos), close)) <= SIMILAR
+
+
+def test_pauses_are_cut_short_as_in_python():
+    demos = kineme.load_lasa(["CShape", "Sine", "WShape"])
+    recognizer = kineme.Recognizer().fit(demos[one_in(1, demos)])
+    paused = interrupted(kineme.Demonstrations(every_tenth(demos[one_in(2, demos, 2)])))
+    assert compare_answers(answers_of(recognizer, paused)) <= SIMILAR
+    assert compare_states(states_of(recognizer, paused)) <= 2 * SIMILAR
 
 
 ENDS = [3, 6, 12, 30, 50, 70, 90, 100]  # samples of a movement after which it is asked what it is

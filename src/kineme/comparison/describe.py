@@ -14,6 +14,7 @@ from kineme.comparison.specification import Compares, ComparisonSpecification, s
 from kineme.errors import TrajectoryError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import shapes_of
+from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations
@@ -156,7 +157,12 @@ def _precision(how: ComparisonSpecification) -> DTypeLike:
 
 
 def even_paths(demos: Demonstrations, start: int, stop: int, cutoff: float | None) -> Array:
-    """Movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T)."""
+    """Movements start:stop, smoothed, at even times, minus their first recorded position, (stop - start, d, T).
+
+    Pauses are cut short first, see `cut_pauses`.
+    """
+    if (shorter := without_pauses(demos, start, stop)) is not None:
+        demos, start, stop = shorter, 0, stop - start
     if cutoff is None:
         return relative_rows(demos, start, stop, N_POINTS)
     return smooth_rows(demos, start, stop, cutoff, N_POINTS)

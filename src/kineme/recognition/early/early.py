@@ -12,6 +12,7 @@ from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import even_paths
 from kineme.errors import SpecificationError
 from kineme.movements.preparation.arc_length import arc_length_phase
+from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.trajectories.demonstrations import Demonstrations, check_labels
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -33,6 +34,7 @@ def partial_shares(comparison: Comparison, stored: Hypotheses, X: MovementsLike)
 
 
 def _shares(comparison: Comparison, stored: Hypotheses, demos: Demonstrations) -> Array:
+    demos = without_pauses(demos, 0, len(demos)) or demos
     paths = even_paths(demos, 0, len(demos), comparison.cutoff)
     starts = demos.positions[demos.offsets[:-1]]
     return stored.shares(log_evidence(stored, describe_begun(stored, paths, starts, demos.durations)))

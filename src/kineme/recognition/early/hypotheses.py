@@ -15,6 +15,7 @@ from kineme.comparison.references import References
 from kineme.comparison.widths import SHARE, beginning_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
+from kineme.movements.preparation.pauses import without_pauses
 from kineme.recognition.early.ending import Ending, ending
 from kineme.recognition.early.prefixes import Prefixes, beginnings, describe_prefixes, smooth_paths
 from kineme.validation import Array, check_count, check_number
@@ -153,6 +154,7 @@ def hypotheses(comparison: Comparison, references: References, early: Early) -> 
     procrustes = beginning_procrustes(comparison.procrustes, early.max_angle)
     progress = np.arange(1, early.n_progress + 1) / early.n_progress
     demos = references.all_movements()
+    demos = without_pauses(demos, 0, len(demos)) or demos
     paths = smooth_paths(demos, comparison.cutoff)
     prefixes = beginnings(paths, progress)
     described = describe_prefixes(prefixes, procrustes)

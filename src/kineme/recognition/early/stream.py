@@ -13,6 +13,7 @@ from kineme.comparison.comparison import Comparison
 from kineme.comparison.describe import N_POINTS
 from kineme.comparison.references import References
 from kineme.movements.channels.channel import Channels, is_plain
+from kineme.movements.preparation.pauses import cut_pauses
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer
@@ -131,14 +132,16 @@ class Live:
 
     def _estimate(self, kept: Array, status: LiveStatus) -> LiveState:
         elapsed = float(kept[-1, 0] - kept[0, 0])
-        so_far = describe_begun(self._hypotheses, self._smooth(kept), kept[:1, 1:], np.array([elapsed]))
+        times, positions = _without_pauses(kept)
+        even = self._smooth(times, positions)
+        so_far = describe_begun(self._hypotheses, even, kept[:1, 1:], times[-1:] - times[0])
         evidence = log_evidence(self._hypotheses, so_far)
         shares = self._hypotheses.shares(evidence)[0]
         order = np.argsort(-shares[:-1], kind="stable")
         leader = int(order[0])
         decided = self._decision.update(elapsed, leader, float(shares[leader]))
         shown = leader if decided is None else decided
-        ahead = forecast(self._hypotheses, evidence[0], shown, so_far.prefixes, elapsed)
+        ahead = forecast(self._hypotheses, evidence[0], shown, so_far.prefixes, float(so_far.durations[0]))
         self._progress = max(ahead.progress, self._progress if shown == self._leader else 0.0)
         self._leader = shown
         path = kept[-1, 1:] + ahead.path
@@ -154,13 +157,20 @@ class Live:
             status | (LiveStatus.UNDECIDED if decided is None else LiveStatus.DECIDED),
         )
 
-    def _smooth(self, kept: Array) -> Array:
+    def _smooth(self, times: Array, positions: Array) -> Array:
         """The samples so far, at even times and smoothed like the stored movements: (1, d, T)."""
-        times = np.linspace(kept[0, 0], kept[-1, 0], N_POINTS)
-        even = np.stack([np.interp(times, kept[:, 0], column - column[0]) for column in kept[:, 1:].T])
+        targets = np.linspace(times[0], times[-1], N_POINTS)
+        even = np.stack([np.interp(targets, times, column - column[0]) for column in positions.T])
         cutoff = self._comparison.cutoff
         return np.asarray(even if cutoff is None else even @ smoother(float(cutoff)).T)[None]
 
     def _nothing(self, status: LiveStatus) -> LiveState:
         status |= LiveStatus.UNDECIDED
         return LiveState((), 1.0, None, 0.0, None, None, math.nan, self.skipped, status)
+
+
+def _without_pauses(kept: Array) -> tuple[Array, Array]:
+    """Times and positions of samples (k, 1 + d), as those of stored movements are described."""
+    times, positions = np.ascontiguousarray(kept[:, 0]), np.ascontiguousarray(kept[:, 1:])
+    cut = cut_pauses(times, positions, np.array([0, len(kept)]))
+    return (times, positions) if cut is None else cut[:2]

@@ -1,6 +1,7 @@
 // What movements are compared by: rows of numbers, segments and points; in single precision, as stored ones are.
 
 import { arcLengthPhase, evenPath } from "./preparation.js";
+import { withoutPauses } from "./pauses.js";
 import { interpolate, linspace } from "./arrays.js";
 
 const FLAT = 1e-6; // share of the whole extent; flatter dimensions are not scaled up
@@ -185,7 +186,7 @@ function angle(vectors, p, q, d) {
  * @param {Object} arrays
  */
 export function describeMovement(one, how, arrays) {
-  return describePath(evenPath(one, how.cutoff, N_POINTS), one.positions, how, arrays);
+  return describePath(evenPath(withoutPauses(one), how.cutoff, N_POINTS), one.positions, how, arrays);
 }
 
 /** The same of a smooth path relative to a first position. */

@@ -4,6 +4,7 @@ import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js"
 import { N_POINTS } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
 import { beginnings } from "./hypotheses.js";
+import { withoutPauses } from "./pauses.js";
 import { evenPath, movement } from "./preparation.js";
 import { bestRotation } from "./rotation.js";
 
@@ -71,18 +72,21 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
   return (times, positions) => {
     const n = times.length;
     if (n < 4 || positions.every((x) => x.every((value, k) => value === positions[0][k]))) return null;
-    const even = linspace(times[0], times[n - 1], N_POINTS);
-    const rows = Array.from({ length: d }, (_, k) => interpolate(even, times, positions.map((x) => x[k] - positions[0][k])));
+    const active = withoutPauses(movement(times, positions, d));
+    const duration = active.times[active.times.length - 1] - active.times[0];
+    const even = linspace(active.times[0], active.times[0] + duration, N_POINTS);
+    const column = (k) => Float64Array.from(active.times, (_, j) => active.positions[j * d + k] - positions[0][k]);
+    const rows = Array.from({ length: d }, (_, k) => interpolate(even, active.times, column(k)));
     const samples = Float64Array.from({ length: d * N_POINTS }, (_, j) => rows[j % d][Math.floor(j / d)]);
     const path = smooth(movement(linspace(0, 1, N_POINTS), samples, d), cutoff, rows);
     const begun = beginnings(path, d, WHOLE, stored.known.header.early.shapes);
     const elapsed = times[n - 1] - times[0];
-    const evidence = logEvidence(stored, begun, path, positions[0], elapsed);
+    const evidence = logEvidence(stored, begun, path, positions[0], duration);
     const share = shares(stored, evidence);
     const order = descending(share.subarray(0, classes.length));
     const decided = decide(elapsed, order[0], share[order[0]]);
     const shown = decided ?? order[0];
-    const ahead = forecast(stored, evidence, shown, begun, elapsed);
+    const ahead = forecast(stored, evidence, shown, begun, duration);
     furthest = Math.max(ahead.progress, shown === leader ? furthest : 0);
     leader = shown;
     return {

@@ -13,6 +13,7 @@ from kineme.comparison.representation import PAIR_QUANTITIES, Representation, fo
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.shapes import Shapes
+from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.spline import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
@@ -51,7 +52,7 @@ def recognition_parts(known: KnownClasses) -> Snapshot:
     arrays: dict[str, NDArray[Any]] = {
         "paths": paths.astype(np.float32),
         "starts": _starts(demos),
-        "durations": np.asarray(demos.durations, dtype=np.float64),
+        "durations": np.asarray((without_pauses(demos, 0, len(demos)) or demos).durations, dtype=np.float64),
         **comparison_arrays,
         **calibration_arrays,
     }

@@ -1,0 +1,127 @@
+"""Compiled twin of the search for pauses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kineme.movements.preparation.pauses import (
+    EQUAL,
+    FEWEST,
+    GAP,
+    LAST_REST,
+    PAUSE,
+    RADIUS,
+    ROUNDS,
+    SHORTEST,
+    WHOLE,
+    WINDOWS,
+)
+from kineme.runtime.compiled import jit
+
+
+@jit
+def fill_cut(samples, offsets, cut, ends):  # type: ignore[no-untyped-def]
+    """Movements with their pauses cut short, one after the other from 0 on; whether any had one, see `cut_pauses`."""
+    times, positions = samples
+    cut_times, cut_positions = cut
+    steps, kept, changes = np.empty(len(times)), np.empty(len(times), np.bool_), False
+    ends[0] = 0
+    for i in range(len(offsets) - 1):
+        begin, n = ends[i], offsets[i + 1] - offsets[i]
+        own_times, own = cut_times[begin : begin + n], cut_positions[begin : begin + n]
+        for j in range(n):
+            own_times[j] = times[offsets[i] + j]
+            for k in range(positions.shape[1]):
+                own[j, k] = positions[offsets[i] + j, k]
+        for _ in range(ROUNDS):
+            is_capped = _fill_capped(own_times[:n], steps)
+            if not (_fill_rests(own[:n], steps, kept) or is_capped):
+                break
+            changes, elapsed, left = True, 0.0, 0
+            for j in range(n):
+                if kept[j]:
+                    own_times[left] = elapsed
+                    for k in range(positions.shape[1]):
+                        own[left, k] = own[j, k]
+                    left += 1
+                elapsed += steps[j]
+            n = left
+        ends[i + 1] = begin + n
+    return changes
+
+
+@jit
+def _fill_capped(times, steps):  # type: ignore[no-untyped-def]
+    """Steps of one movement, as far as they count; whether any is a gap."""
+    last, least, most = len(times) - 1, np.inf, 0.0
+    for j in range(last):
+        steps[j] = times[j + 1] - times[j]
+        least, most = min(least, steps[j]), max(most, steps[j])
+    steps[last] = 0.0
+    if most <= GAP * least:  # the median is no smaller
+        return False
+    longest = GAP * np.sort(steps[:last])[last // 2]
+    motion = 0.0
+    for j in range(last):
+        motion += min(steps[j], longest)
+    longest = max(longest, PAUSE * motion)
+    for j in range(last):
+        steps[j] = min(steps[j], longest)
+    return most > longest
+
+
+@jit
+def _fill_rests(positions, steps, kept):  # type: ignore[no-untyped-def]
+    """Shorten the rests of one movement, and tell which samples are left; whether there are long rests."""
+    n, window, size = len(positions), SHORTEST, 0.0
+    while 2 * WINDOWS * window <= n:
+        window *= 2
+    for k in range(positions.shape[1]):
+        low = high = positions[0, k]
+        for j in range(n):
+            low, high = min(low, positions[j, k]), max(high, positions[j, k])
+        size = max(size, high - low)
+    until, motion, count = 0, 0.0, 0
+    for j in range(n):
+        kept[j] = True
+        if j + window <= n and _is_still(positions, j, window, RADIUS * size):
+            until = j + window - 1
+        if j < until:
+            kept[j] = False  # for now: it rests
+            count += 1
+        else:
+            motion += steps[j]
+    if count == 0:
+        return False
+    most, changes, j = PAUSE * motion, False, 0
+    while j < n:
+        begin, total = j, 0.0
+        while not kept[j]:  # the last sample is kept
+            total += steps[j]
+            kept[j] = True
+            j += 1
+        limit = most * (LAST_REST / PAUSE) if j == n - 1 else most
+        if total > EQUAL * limit and limit > 0:
+            changes, count, share = True, j - begin, limit / total
+            left = max(FEWEST, int(np.ceil(share * count - WHOLE)))
+            for p in range(count):
+                steps[begin + p] *= share
+                kept[begin + p] = p == 0 or p * left // count != (p - 1) * left // count
+        j += 1
+    return changes
+
+
+@jit
+def _is_still(positions, begin, window, radius):  # type: ignore[no-untyped-def]
+    """Whether the samples of a window stay within the radius; ends that are apart settle it for most."""
+    end = begin + window - 1
+    for k in range(positions.shape[1]):
+        if abs(positions[end, k] - positions[begin, k]) > radius:
+            return False
+    for k in range(positions.shape[1]):
+        low = high = positions[begin, k]
+        for j in range(begin + 1, end + 1):
+            low, high = min(low, positions[j, k]), max(high, positions[j, k])
+        if high - low > radius:
+            return False
+    return True

@@ -1,0 +1,136 @@
+"""Pauses within a movement, cut short: stamps far apart, and rests."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.movements.trajectories.movements import Movements
+from kineme.runtime.compiled import compiled_module, use_compiled
+from kineme.validation import Array
+
+#: A rest stays within this share of the movement's extent. Of hands the noise at rest is below, and corners are above.
+RADIUS = 0.015
+#: Longer steps than so many median ones are gaps.
+GAP = 3.0
+#: A gap or a rest counts as at most this share of the time in motion: as long as people take at a start, a corner, an
+#: end. With pauses of 1 to 30 s, one-shot accuracy stays within 0.01.
+PAUSE = 0.1
+#: A rest at the end counts as at most this share: that a movement comes to rest tells that it is over.
+LAST_REST = 0.25
+#: Samples of a window: at least so many, and the largest power of two with so many windows in the movement.
+SHORTEST, WINDOWS = 4, 32
+FEWEST = 3  # steps that a rest is left, at least
+EQUAL, WHOLE = 1 + 1e-9, 1e-6  # of times, and of numbers of samples: differences that are rounding
+ROUNDS = 3  # what is cut makes windows narrower, so that a shorter rest is seen
+_OPERATIONS_PER_SAMPLE = 10
+
+Parts = tuple[Array, Array, NDArray[np.intp]]
+
+
+def without_pauses(demos: Demonstrations, start: int, stop: int) -> Demonstrations | None:
+    """Movements start:stop with their pauses cut short, see `cut_pauses`; None if they have none, the usual case."""
+    offsets = demos.offsets[start : stop + 1]
+    rows = slice(int(offsets[0]), int(offsets[-1]))
+    cut = cut_pauses(demos.movements.spread[rows], demos.positions[rows], offsets - offsets[0])
+    if cut is None:
+        return None
+    times, positions, ends = cut
+    durations = times[ends[1:] - 1] - times[ends[:-1]]
+    return Demonstrations.of_movements(Movements(positions, ends, durations, times))
+
+
+def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Parts | None:
+    """Cut short the time in which a movement does not move, or in which nothing was recorded of it.
+
+    So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
+    of a movement and representations over time divide by its duration. A gap is a step longer than three median ones; a
+    rest is a run of windows, of about a 32nd of the samples each, that stay within 0.015 of the largest extent. Each
+    counts as at most a tenth of the time in motion, a rest at the end as a quarter. A rest keeps as many samples as fit
+    into that, evenly spaced.
+
+    Parameters
+    ----------
+    times, positions : ndarray of shape (total,) and (total, d)
+        Samples of all movements.
+    offsets : ndarray of shape (n + 1,)
+        Where each movement begins.
+
+    Returns
+    -------
+    times, positions, offsets
+        Times from 0 in each movement; first and last samples stay. None if there is no pause.
+    """
+    if use_compiled(_OPERATIONS_PER_SAMPLE * positions.size):
+        cut_times, cut_positions, ends = np.empty(len(times)), np.empty(positions.shape), np.empty_like(offsets)
+        fill = compiled_module("kineme.movements.preparation._pauses").fill_cut
+        if not fill((times, positions), offsets, (cut_times, cut_positions), ends):
+            return None
+        return cut_times[: ends[-1]], cut_positions[: ends[-1]], ends
+    cut: Parts | None = None
+    for _ in range(ROUNDS):
+        steps, kept = np.empty(len(times)), np.ones(len(times), dtype=np.bool_)
+        if not _fill_shortened(times, positions, offsets, steps, kept):
+            break
+        elapsed = np.append(0.0, np.cumsum(steps)[:-1])
+        elapsed -= np.repeat(elapsed[offsets[:-1]], np.diff(offsets))
+        ends = np.append(0, np.cumsum(np.add.reduceat(kept, offsets[:-1], dtype=np.intp)))
+        times, positions, offsets = cut = elapsed[kept], positions[kept], ends
+    return cut
+
+
+def _fill_shortened(
+    times: Array, positions: Array, offsets: NDArray[np.intp], steps: Array, kept: NDArray[np.bool_]
+) -> bool:
+    """Write the time that each step counts, 0 after last samples, and which samples are kept; whether any changes."""
+    first, last, lengths = offsets[:-1], offsets[1:] - 1, np.diff(offsets)
+    owner = np.repeat(np.arange(len(lengths)), lengths)
+    steps[:] = np.diff(times, append=times[-1])
+    steps[last] = np.inf
+    ordered = np.lexsort((steps, owner))
+    longest = GAP * steps[ordered[first + (lengths - 1) // 2]]
+    steps[last] = 0.0
+    longest = np.maximum(longest, PAUSE * np.add.reduceat(np.minimum(steps, longest[owner]), first))
+    changes = bool((steps > longest[owner]).any())
+    np.minimum(steps, longest[owner], out=steps)
+    resting = _resting(positions, offsets, owner)
+    most = PAUSE * np.add.reduceat(np.where(resting, 0.0, steps), first)
+    begins = np.flatnonzero(resting & ~np.append(False, resting[:-1]))
+    n_steps = np.flatnonzero(resting & ~np.append(resting[1:], False)) + 1 - begins
+    if not len(begins):
+        return changes
+    total = np.add.reduceat(np.where(resting, steps, 0.0), begins)  # until the next rest begins
+    limit = most[owner[begins]]
+    limit[begins + n_steps == last[owner[begins]]] *= LAST_REST / PAUSE
+    long = (total > EQUAL * limit) & (limit > 0)
+    begins, n_steps, shares = begins[long], n_steps[long], limit[long] / total[long]
+    run, place = np.repeat(np.arange(len(begins)), n_steps), np.arange(n_steps.sum())
+    place -= np.repeat(np.cumsum(n_steps) - n_steps, n_steps)
+    left = np.maximum(FEWEST, np.ceil(shares * n_steps - WHOLE).astype(np.intp))
+    at = begins[run] + place
+    steps[at] *= shares[run]
+    kept[at] = (place == 0) | (place * left[run] // n_steps[run] != (place - 1) * left[run] // n_steps[run])
+    return changes or bool(long.any())
+
+
+def _resting(positions: Array, offsets: NDArray[np.intp], owner: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether the step after each sample belongs to a window of samples that stays in its place."""
+    first, last, total = offsets[:-1], offsets[1:] - 1, len(positions)
+    extents = np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first)
+    radius = (RADIUS * extents.max(axis=1))[owner]
+    windows = np.full(len(first), SHORTEST)
+    while (wider := 2 * WINDOWS * windows <= np.diff(offsets)).any():
+        windows[wider] *= 2
+    own = windows[owner]
+    high, low = positions.copy(), positions.copy()  # largest and smallest of the next `width` samples
+    marks, width = np.zeros(total + 1), 1
+    while width < windows.max():
+        high[:-width] = np.maximum(high[:-width], high[width:])
+        low[:-width] = np.minimum(low[:-width], low[width:])
+        width *= 2
+        inside = (own == width) & (np.arange(total) + width - 1 <= last[owner])
+        still = np.flatnonzero(inside & ((high - low).max(axis=1) <= radius))
+        np.add.at(marks, still, 1)
+        np.add.at(marks, still + width - 1, -1)
+    return np.asarray(np.cumsum(marks[:-1]) > 0)

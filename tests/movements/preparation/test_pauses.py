@@ -1,0 +1,71 @@
+"""Pauses: what is cut of them, by the compiled loop and by its plain twin, and what is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import kineme
+from kineme.movements.preparation.pauses import LAST_REST, PAUSE, cut_pauses, without_pauses
+from movement_samples import draw_shapes, interrupted
+
+pauses = given(
+    seed=st.integers(0, 10**6),
+    seconds=st.floats(0.3, 30.0),
+    at_rest=st.booleans(),
+    noise=st.sampled_from([0.0, 0.003]),
+    d=st.integers(1, 4),
+)
+
+
+def cut(demos):
+    return cut_pauses(demos.times, demos.positions, demos.offsets)
+
+
+@pauses
+def test_compiled_and_plain_cut_the_same(seed, seconds, at_rest, noise, d):
+    demos = interrupted(draw_shapes([2, 3], d, seed, n_samples=60 + seed % 90), seconds, at_rest, noise, seed)
+    found = []
+    for choice in ("always", "never"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("KINEME_COMPILED", choice)
+            found.append(cut(demos))
+    assert (found[0] is None) == (found[1] is None)
+    for compiled, plain in zip(*(one or () for one in found), strict=True):
+        np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9)
+
+
+@pauses
+def test_a_pause_takes_little_time_and_no_place(seed, seconds, at_rest, noise, d):
+    plain = draw_shapes([1, 1, 1], d, seed, n_samples=100)
+    paused = interrupted(plain, seconds, at_rest, noise, seed)
+    times, positions, ends = cut(paused)
+    durations = times[ends[1:] - 1]
+    most = 1 + PAUSE + LAST_REST
+    assert (durations <= 1e-9 + most).all()
+    for k in (0, -1):
+        rows = ends[:-1] if k == 0 else ends[1:] - 1
+        np.testing.assert_array_equal(positions[rows], [one.positions[k] for one in paused])
+    assert (np.diff(times) > 0).sum() == len(times) - len(durations)  # rising in each
+
+
+def test_steady_movements_are_as_they_were():
+    """At even stamps, with jitter, and slow at a corner."""
+    u = np.linspace(0, 1, 200)
+    rng = np.random.default_rng(0)
+    for stamps in (u, np.cumsum(rng.uniform(0.5, 1.4, 200)), u + 0.02 * np.sin(2 * np.pi * u)):
+        circle = np.column_stack((np.cos(6 * u), np.sin(6 * u)))
+        assert cut(kineme.Demonstrations.from_arrays([circle], times=[stamps])) is None
+    still = kineme.Demonstrations.from_arrays([np.zeros((20, 2))])
+    assert cut(still) is None
+
+
+def test_some_of_many_movements_are_cut_as_they_are_alone():
+    demos = interrupted(draw_shapes([3, 3], n_samples=80), 5.0, True, 0.0, 1)
+    every = without_pauses(demos, 0, 6)
+    for i in range(6):
+        alone, among = without_pauses(demos, i, i + 1), every[i]
+        np.testing.assert_allclose(alone[0].times, among.times, atol=1e-9)
+        np.testing.assert_array_equal(alone[0].positions, among.positions)
