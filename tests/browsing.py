@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 
-def wait_until(page, expression, *arguments, seconds=60):
+def wait_until(page, expression, *arguments, seconds=300):
     """Playwright's own waiting evaluates texts in the page, which its policy forbids."""
     deadline = time.monotonic() + seconds
     while not page.evaluate(expression, *arguments):
@@ -43,6 +43,7 @@ class Pages:
     def new(self, width=1440, height=900, tolerated=(), **options):
         """An empty page; messages of its console with one of the tolerated texts are no errors."""
         self.contexts.append(self.browser.new_context(viewport={"width": width, "height": height}, **options))
+        self.contexts[-1].set_default_timeout(300_000)  # [ms]: a busy machine is no fault
         page = self.contexts[-1].new_page()
 
         def hear(message):

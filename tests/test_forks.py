@@ -123,8 +123,8 @@ def test_a_fork_waits_for_locks_and_leaves_none(monkeypatch):
         taken.wait()
 
         def free(lock=lock):
-            assert compiled._loading.acquire(timeout=1)
-            assert parallel._blas_lock.acquire(timeout=1)
+            assert compiled._loading.acquire(timeout=60)
+            assert parallel._blas_lock.acquire(timeout=60)
 
         assert fork(free)
         thread.join()

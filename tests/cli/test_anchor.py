@@ -116,7 +116,7 @@ class Terminal:
         os.close(slave)
         self.seen = ""
 
-    def until(self, text, seconds=60):
+    def until(self, text, seconds=300):
         """Read until the text has come since the last answer; all that came."""
         deadline = time.monotonic() + seconds
         while text not in self.seen:
@@ -136,7 +136,7 @@ class Terminal:
 
     def close(self):
         """The exit status."""
-        status = self.process.wait(30)
+        status = self.process.wait(300)
         os.close(self.master)
         return status
 

@@ -64,7 +64,7 @@ def test_closing_waits_for_the_threads_that_read(folder):
         with library.store.reading() as again:  # who reads may go on
             assert again is connection
             assert again.execute("SELECT count(*) FROM movement").fetchone() == (300,)
-    closing.join(10)
+    closing.join(300)
     assert not closing.is_alive()
 
 

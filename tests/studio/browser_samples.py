@@ -36,7 +36,7 @@ def make_letters(folder, shapes=LETTERS, shown=SHOWN):
     return folder
 
 
-def wait_for_text(page, selector, text, seconds=60):
+def wait_for_text(page, selector, text, seconds=300):
     """Wait until an element has a text."""
     deadline = time.monotonic() + seconds
     while (now := page.inner_text(selector)) != text:

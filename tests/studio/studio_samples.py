@@ -70,7 +70,7 @@ class Running:
             text=True,
             start_new_session=True,
         )
-        guard = threading.Timer(60, self.process.kill)
+        guard = threading.Timer(300, self.process.kill)
         guard.start()
         self.line = self.process.stdout.readline() + self.process.stdout.readline()  # its address, and how to stop it
         guard.cancel()
@@ -81,7 +81,7 @@ class Running:
     def end(self, how=signal.SIGINT):
         """Stop it; the exit code and what it wrote."""
         self.process.send_signal(how)
-        out, err = self.process.communicate(timeout=20)
+        out, err = self.process.communicate(timeout=300)
         return self.process.returncode, self.line + out, err
 
 
@@ -98,7 +98,7 @@ class Served:
     def end(self):
         """Stop it."""
         self._server.should_exit = True
-        self._thread.join(20)
+        self._thread.join(300)
         self._socket.close()
 
 

@@ -46,9 +46,9 @@ def test_hundreds_of_heads_that_never_end_lock_nobody_out_and_fill_no_log(folder
             for _ in range(300):
                 _open(stack, studio.address)
             for _ in range(3):  # each in a connection of its own
-                assert httpx.get(f"{studio.address}/api/library", headers=BEARER, timeout=60).status_code == 200
+                assert httpx.get(f"{studio.address}/api/library", headers=BEARER, timeout=300).status_code == 200
             page.send(json.dumps({"samples": samples(2)}))  # a websocket that is open stays
-            assert page.recv(30)
+            assert page.recv(300)
         _, _, written = studio.end()
         assert len(written) < 10_000
 
@@ -85,7 +85,7 @@ def test_a_websocket_outlives_the_time_limit_of_heads(studio):
         with pytest.raises((ConnectionResetError, StopIteration)):
             next(iter(lambda: client.recv(1), b""))
         page.send(json.dumps({"samples": samples(2)}))
-        assert page.recv(30)
+        assert page.recv(300)
 
 
 def test_limits_follow_the_file_descriptors(monkeypatch):

@@ -381,7 +381,7 @@ def test_a_library_in_space(tmp_path, open_studio):
 
 
 def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, folder):
-    client.app.state.studio.library.store.wait = 5.0
+    client.app.state.studio.library.store.wait = 300.0
     other = sqlite3.connect(folder / "library.sqlite", isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     versions = []
@@ -392,10 +392,9 @@ def test_while_another_process_writes_changes_wait_and_reading_goes_on(client, f
     waiting = [threading.Thread(target=learn, args=(k,)) for k in range(9)]
     for one in waiting:
         one.start()
-    time.sleep(0.5)
-    start = time.perf_counter()
+    time.sleep(0.5)  # until they wait
     assert client.get("/api/library/history").status_code == 200
-    assert time.perf_counter() - start < 3
+    assert all(one.is_alive() for one in waiting)  # reading has not waited for them
     other.execute("ROLLBACK")
     for one in waiting:
         one.join()

