@@ -146,6 +146,22 @@ def test_patterns_name_columns_and_names_that_are_there_stand_for_themselves():
         read(data, exclude=["q*"])
 
 
+def test_patterns_take_no_times_and_brackets_stand_for_themselves():
+    t = np.arange(50) / 50
+    data = table(t, np.column_stack([t, t**2, t**3]), ("tx", "q[0]", "q[1]"))
+    assert read(data, exclude="t*").demonstrations.dimensions == ("q[0]", "q[1]")
+    assert read(data, columns="q[*]").demonstrations.dimensions == ("q[0]", "q[1]")
+
+
+def test_files_that_are_read_but_for_samples_are_not_listed_as_not_read(tmp_path):
+    x = points()
+    x[60:100, 1] = np.nan
+    write_c3d(tmp_path / "a.c3d", x)
+    shown = CliRunner().invoke(main, ["inspect", str(tmp_path), "--skip", "sample"]).output
+    assert "not read:" not in shown
+    assert "read but for samples:\n  a.c3d: expected a number in 'RASI', got nothing in 20 % of the samples" in shown
+
+
 def test_a_second_clock_is_excluded():
     t = np.arange(50) / 50
     data = table(t, np.column_stack([t + 3, t**2]), ("timestamp [s]", "x"))
@@ -193,7 +209,7 @@ def test_gaps_are_filled_up_to_the_limit_alone_whatever_the_rate():
         filled = read(table(t, lost, ("x", "y")), fill_gaps=seconds)
         np.testing.assert_allclose(filled.demonstrations.positions, x, atol=6e-3)
         with pytest.raises(DataError, match=f"--fill-gaps {seconds:g}"):
-            read(table(t, lost, ("x", "y")), fill_gaps=0.9 * seconds)
+            read(table(t, lost, ("x", "y")), fill_gaps=0.97 * seconds)
     with pytest.raises(SpecificationError, match="expected fill_gaps to be a number of at least 0, got -1"):
         read(b"t,x\n", fill_gaps=-1)
 

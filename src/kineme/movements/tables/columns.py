@@ -118,11 +118,12 @@ def column_numbers(
     exact, plain = _places(heads), _places(map(_plain, heads))
     numbers: list[int] = []
     for column in columns:
-        if isinstance(column, int) or column in exact or _plain(column) in plain:
+        is_pattern = isinstance(column, str) and bool({"*", "?"} & {*column})
+        if isinstance(column, int) or column in exact or (_plain(column) in plain and not is_pattern):
             numbers.append(_place(heads, column, exact, plain))
         elif group := [k for k, head in enumerate(heads) if head.startswith(f"{column}.")]:
             numbers += group
-        elif {"*", "?"} & {*column}:
+        elif is_pattern:
             matching = _matching(heads, column)
             free = matching if among is None else [k for k in matching if k in among]
             if not free:
