@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kineme.errors import SpecificationError
+from kineme.errors import ExtrapolationWarning, SpecificationError, heard_warnings, warn
 from kineme.files.write_movement import ColumnNames, Columns
 from kineme.movements.channels.coordinates import columns_of
 from kineme.movements.rotations.quaternions import NORM_TOLERANCE
@@ -20,6 +20,8 @@ from kineme.primitives.recorded_as import in_primitive, in_recording
 from kineme.validation import LARGEST, Array
 
 _LONGEST = 10.0  # durations after which a movement around obstacles is given up
+_AIMED = 8  # times that it is aimed beside the via points so that obstacles lead it through them
+_MET = 0.01  # of the extent: a via point that is missed by more is said
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ class MovementOptions:
         Whether the movement ends exactly at its goal, with the velocity that it has at the demonstrated one. Otherwise
         it comes as close as the primitive brings it, to some hundredths of the way between the two goals.
     via : tuple of (share, ndarray of shape (d,))
-        Points to pass, and when as shares of the duration, between 0 and 1; as start and goal.
+        Points to pass, and when as shares of the duration, between 0 and 1; as start and goal. Obstacles lead away
+        from them; the movement is aimed beside them for it, and what is missed all the same is said.
     avoidance : ObstacleAvoidance, optional
         How strongly it steers around obstacles.
     """
@@ -76,6 +79,11 @@ def generate(learned: Learned, options: MovementOptions) -> Generated:
     SpecificationError
         An option that cannot be met; among them obstacles that keep the movement from its goal, more samples than fit
         into memory, and numbers that are not finite: a robot gets no movement that was not checked.
+
+    Warns
+    -----
+    ExtrapolationWarning
+        A via point that obstacles make the movement miss by more than 1 % of its extent: which, and by how much.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         start, goal = (checked_point(learned, getattr(options, name), name) for name in ("start", "goal"))
@@ -175,6 +183,56 @@ def _around_obstacles(primitive: Primitives | PosePrimitives, options: MovementO
         raise SpecificationError(
             f"expected obstacles in the {n_dims} dimensions of the movement, two or more, got shape {obstacles.shape}"
         )
+    made = _steered(primitive, options, obstacles)
+    return _through(primitive, options, obstacles, made) if options.via else made
+
+
+def _through(
+    primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array, made: Columns
+) -> Columns:
+    """The movement around obstacles that comes nearest to its via points, aimed as far beside them as it missed."""
+    n = obstacles.shape[1]
+    tolerance = _MET * float(np.ptp(made["positions"][:, :n], axis=0).max())
+    best, least = made, _missing(primitive, options, made, n)
+    missing, beside = least, np.zeros_like(least)
+    with heard_warnings():  # of what it is aimed at, which nobody asked for
+        for _ in range(_AIMED):
+            if _largest(least) <= tolerance:
+                break
+            beside = beside + missing
+            aimed = tuple(
+                (share, np.append(point[:n] + off, point[n:]))
+                for (share, point), off in zip(options.via, beside, strict=True)
+            )
+            made = _steered(primitive, replace(options, via=aimed), obstacles)
+            missing = _missing(primitive, options, made, n)
+            if _largest(missing) < _largest(least):
+                best, least = made, missing
+    for (share, point), off in zip(options.via, np.linalg.norm(least, axis=1), strict=True):
+        if not off <= tolerance:
+            warn(
+                f"the via point {np.round(point[:n], 6).tolist()} at {share:g} of the duration is missed by {off:.3g}: "
+                "obstacles lead the movement away; move one of them, or ask for another time",
+                ExtrapolationWarning,
+                stacklevel=4,
+            )
+    return best
+
+
+def _missing(primitive: Primitives | PosePrimitives, options: MovementOptions, made: Columns, n: int) -> Array:
+    """From the movement to each of the k via points, at its time (k, n)."""
+    duration = float(primitive.durations[0]) if options.duration is None else options.duration
+    at = duration * np.array([share for share, _ in options.via])
+    reached = np.column_stack([np.interp(at, made["times"], x) for x in made["positions"][:, :n].T])
+    return np.array([point[:n] for _, point in options.via]) - reached
+
+
+def _largest(missing: Array) -> float:
+    return float(np.linalg.norm(missing, axis=1).max())
+
+
+def _steered(primitive: Primitives | PosePrimitives, options: MovementOptions, obstacles: Array) -> Columns:
+    """The movement under control, with the obstacles where they are."""
     duration = float(primitive.durations[0]) if options.duration is None else options.duration
     steps = primitive.rollout(duration=duration, rate=options.rate).times.shape[1] - 1
     control = primitive.controller(
