@@ -37,10 +37,32 @@ def test_no_sample_is_outside_and_the_ends_stay(formulation, gating, fit):
 
 def test_the_change_is_the_smoothest_there_is(learned):
     """Not more than the limits ask for: via points at the touched samples alone give the same path."""
-    inside = learned[0].rollout(position_limits=(-17.0, np.inf)).positions[0]
-    touched = np.flatnonzero(np.isclose(inside[:, 0], -17.0, atol=1e-6))
-    via = [(k / 199, [inside[k, 0], np.nan]) for k in touched]
-    np.testing.assert_allclose(learned[0].rollout(via=via).positions[0, :, 0], inside[:, 0], atol=1e-5)
+    fine = 16 * 199 + 1
+    inside = learned[0].rollout(position_limits=(-17.0, np.inf), n_samples=fine).positions[0]
+    x = inside[:, 0]
+    touched = np.flatnonzero((x[1:-1] <= np.minimum(x[:-2], x[2:])) & np.isclose(x[1:-1], -17.0, atol=1e-4)) + 1
+    via = [(k / (fine - 1), [x[k], np.nan]) for k in touched]
+    assert len(via) > 0
+    np.testing.assert_allclose(learned[0].rollout(via=via, n_samples=fine).positions[0, :, 0], x, atol=1e-3)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_limits_are_kept_between_samples(formulation):
+    """Fifty times as many samples as it was asked for are inside, to a millionth."""
+    primitives = DMP(formulation).learn(kineme.load_lasa(["GShape"])[:2])
+    dense = primitives.rollout(position_limits=([-18.0, -17.0], [30.0, np.inf]), n_samples=10_000).positions
+    assert dense[:, :, 0].min() >= -18.0 * (1 + 1e-6)
+    assert dense[:, :, 1].min() >= -17.0 * (1 + 1e-6)
+    assert dense[:, :, 0].max() <= 30.0 * (1 + 1e-6)
+
+
+def test_a_path_that_leaves_the_limits_only_between_its_samples_is_kept_inside(learned):
+    path = learned[0].rollout(via=[]).positions[0, :, 0]
+    dense = learned[0].rollout(via=[], n_samples=10_000).positions[0, :, 0]
+    limit = (path.min() + dense.min()) / 2
+    assert dense.min() < limit * (1 + 1e-5) < path.min() < 0
+    made = learned[0].rollout(position_limits=([limit, -np.inf], np.inf), n_samples=10_000).positions[0, :, 0]
+    assert made.min() >= limit * (1 + 1e-6)
 
 
 def test_a_stretch_of_more_points_than_can_be_met_stays(learned):

@@ -1,10 +1,12 @@
 """Positions kept within limits: the smoothest change of the weights under inequalities, a small quadratic program.
 
 With z the change in the coordinates of a covariance factor, minimize |z| under ``low <= path + Phi F' z <= high`` at
-the specification's samples: least distance programming, which is a nonnegative least squares problem (C. L. Lawson,
-R. J. Hanson, "Solving Least Squares Problems", 1974, chapter 23), and solved by SciPy's. The factor is conditioned on
-no change at the via points, at the goal and of the velocity there. One problem for each dimension of each movement that
-leaves the limits, a few milliseconds each; all others cost nothing.
+the specification's samples, and between them where the path would leave the limits by more than 1e-7 of its extent:
+least distance programming, which is a nonnegative least squares problem (C. L. Lawson, R. J. Hanson, "Solving Least
+Squares Problems", 1974, chapter 23), and solved by SciPy's. The factor is conditioned on no change at the via
+points, at the goal and of the velocity there.
+A few problems for each dimension of each movement that leaves the limits, a few milliseconds each; all others cost
+nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from kineme.errors import SpecificationError
@@ -23,6 +25,9 @@ from kineme.validation import Array, as_numbers
 
 _ROUNDING = 1e-9  # of the extent: so far outside counts as at a limit
 _MISSED = 1e-6  # of the largest position: more than this is outside
+_FINER = 16  # instants for each sample of the specification, at which a path is looked at
+_BETWEEN = 1e-7  # of the extent: what may be outside at one of these instants
+_ROUNDS = 8  # of adding instants between samples; two or three are enough
 _INFEASIBLE = 1e-8  # residual of the nonnegative problem, 0 where no change is enough
 
 
@@ -51,20 +56,28 @@ def within_limits(
                 f"expected the {name} within the position limits, got {places[i, j, k]:g} in dimension {k} of movement "
                 f"{i}, where they are {low[k]:g} and {high[k]:g}"
             )
-    path = replace(movement, n_samples=dmp.n_points, end=1.0).positions  # (n, T, d)
-    leaves = ((path < low - rounding[:, None]) | (path > high + rounding[:, None])).any(axis=1)
-    if not leaves.any():
+    near = _near(movement, low, high, rounding)
+    if not near.any():
         return movement
-    smooth, Phi = smoothness_factor(dmp), decoder(dmp, dmp.n_points).Phi[0]
+    smooth, fine = smoothness_factor(dmp), _FINER * (dmp.n_points - 1) + 1
+    Phi = decoder(dmp, fine).Phi[0]
     deviation = slack * np.linalg.norm(held @ smooth.T, axis=1)
-    factors: dict[bytes, Array] = {}  # of the rows that are held: few, however many movements
+    factors: dict[bytes, tuple[Array, Array]] = {}  # of the rows that are held: few, however many movements
     dense = np.zeros((*movement.starts.shape, dmp.n_basis))
-    for i, k in np.argwhere(leaves):
-        known = np.append(~np.isnan(points[min(i, len(points) - 1), :, k]), np.ones(len(held) - points.shape[1], bool))
-        if known.tobytes() not in factors:
-            factors[known.tobytes()] = condition(smooth, held[known], deviation[known]).factor
-        factor = factors[known.tobytes()]
-        dense[i, k] = _inside(Phi @ factor.T, path[i, :, k], (low[k], high[k]), (int(i), int(k))) @ factor
+    for i in np.flatnonzero(near.any(axis=1)).tolist():
+        path = replace(movement[i : i + 1], n_samples=fine, end=1.0).positions[0]
+        for k in np.flatnonzero(near[i]).tolist():
+            known = np.append(
+                ~np.isnan(points[min(i, len(points) - 1), :, k]), np.ones(len(held) - points.shape[1], bool)
+            )
+            if known.tobytes() not in factors:
+                factor = condition(smooth, held[known], deviation[known]).factor
+                factors[known.tobytes()] = factor, Phi @ factor.T
+            factor, effect = factors[known.tobytes()]
+            tolerance = _BETWEEN * float(movement.primitives.extents[min(i, len(movement.primitives) - 1)].max())
+            dense[i, k] = _inside_between(effect, path[:, k], (low[k], high[k]), (i, k), tolerance) @ factor
+    if not dense.any():
+        return movement
     if movement.change is not None:
         dense += movement.change.coefficients @ movement.change.directions
     return replace(movement, change=Change(dense, np.eye(dmp.n_basis)))
@@ -87,6 +100,36 @@ def as_limits(limits: tuple[ArrayLike, ArrayLike], n_dims: int) -> tuple[Array, 
     if not (low < high).all():
         raise SpecificationError(f"expected position_limits with low below high, got {limits!r}")
     return low, high
+
+
+def _near(movement: Rollout, low: Array, high: Array, rounding: Array) -> NDArray[np.bool_]:
+    """Dimensions of movements (n, d) that leave the limits at a sample, or may do so between two of them.
+
+    Between samples h apart a path goes beyond both by ``h^2 |x''| / 8``; counted twice, from differences of samples.
+    """
+    path = replace(movement, n_samples=movement.primitives.dmp.n_points, end=1.0).positions  # (n, T, d)
+    beyond = np.abs(np.diff(path, 2, axis=1)).max(axis=1) / 4 - rounding
+    return np.asarray((path.min(axis=1) < low + beyond) | (path.max(axis=1) > high - beyond))
+
+
+def _inside_between(
+    effect: Array, path: Array, limits: tuple[float, float], where: tuple[int, int], tolerance: float
+) -> Array:
+    """The shortest z (r,) with which the path (T,) is inside at its samples and, but for a tolerance, between them."""
+    low, high = limits
+    if not (np.maximum(low - path, path - high) > tolerance).any():
+        return np.zeros(effect.shape[1])
+    asked = np.zeros(len(path), bool)
+    asked[::_FINER] = True
+    for _ in range(_ROUNDS):
+        z = _inside(effect[asked], path[asked], limits, where)
+        reached = path + effect @ z
+        beyond = np.maximum(low - reached, reached - high)
+        if not (beyond > tolerance).any():
+            break
+        tops = np.flatnonzero((beyond[1:-1] > tolerance) & (beyond[1:-1] >= np.maximum(beyond[:-2], beyond[2:]))) + 1
+        asked[np.concatenate((tops - 1, tops, tops + 1))] = True
+    return z
 
 
 def _inside(effect: Array, path: Array, limits: tuple[float, float], where: tuple[int, int]) -> Array:
