@@ -229,3 +229,13 @@ def test_tiny_p_values_are_shown_short_and_complete_as_data(tmp_path):
     assert one["ranked"][1]["p_value"] < 1e-3
     text = run("recognize", path, "-l", tmp_path / "actions").stdout
     assert "point <0.001" in text
+
+
+def test_a_library_of_one_movement_answers_and_says_that_it_guesses(tmp_path):
+    c, sine = kineme.load_lasa(["CShape"]), kineme.load_lasa(["Sine"])
+    for name, one in (("one", c[0]), ("other", c[4]), ("strange", sine[0])):
+        write_movement(tmp_path / f"{name}.csv", {"times": one.times, "positions": one.positions})
+    run("learn", tmp_path / "one.csv", "--label", "a", "-l", tmp_path / "l")
+    asked = (tmp_path / "other.csv", tmp_path / "strange.csv")
+    assert [one["symbol"] for one in answer("recognize", *asked, "-l", tmp_path / "l")["movements"]] == ["a", None]
+    assert "are a guess" in run("recognize", *asked, "-l", tmp_path / "l").stdout

@@ -204,9 +204,21 @@ def test_one_class_only_says_members_from_strangers():
     assert set(recognizer.predict(draw_shapes([1, 1], seed=5))) == {"kind 00"}
 
 
-def test_one_movement_alone_is_not_enough():
-    with pytest.raises(SpecificationError, match="movements that differ, got one movement"):
-        Recognizer().fit(draw_shapes([1]))
+@pytest.mark.parametrize("classifier", ["auto", "nearest", "prototype"])
+def test_one_movement_alone_gives_answers_that_are_marked_as_a_guess(classifier):
+    demos = kineme.load_lasa(["CShape", "Sine", "WShape", "Zshape"])
+    recognizer = Recognizer(classifier=classifier, weights="fitted").fit(demos[:1])
+    answers = recognizer.recognize(demos[1:])
+    labels = [one.label for one in answers]
+    assert labels == ["CShape"] * 6 + [None] * 21
+    assert all(one.rule == "guess" and not one.calibrated for one in answers)
+    state = recognizer.stream().update(demos[1].times, demos[1].positions)
+    assert state.ranked[0].label == "CShape"
+
+
+def test_one_movement_at_rest_is_refused():
+    with pytest.raises(SpecificationError, match="expected a training movement that moves"):
+        Recognizer().fit([np.zeros((20, 2))], ["a"])
 
 
 def test_classes_of_unequal_size():

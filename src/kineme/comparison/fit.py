@@ -15,8 +15,8 @@ from kineme.comparison.references import References
 from kineme.comparison.representation import rotating
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.specification import ComparisonSpecification
-from kineme.comparison.weights import WEIGHTS, given_weights
-from kineme.comparison.widths import impostor_widths
+from kineme.comparison.weights import WEIGHTS, given_weights, own_weights
+from kineme.comparison.widths import impostor_widths, lone_widths
 from kineme.errors import SpecificationError
 from kineme.movements.channels.channel import Channels
 from kineme.movements.channels.coordinates import with_periods
@@ -79,11 +79,14 @@ def fit_to_references(
     described, labels = references.described, references.labels
     representations = specification.representations
     with single_threaded_blas():
-        widths = impostor_widths(described, labels)
+        alone = len(references) == 1
+        quantities = [one.quantity for one in representations]
+        widths = lone_widths(described, quantities) if alone else impostor_widths(described, labels)
         similarity = AveragedSimilarity(described.procrustes, widths, specification.mean)
         if isinstance(weights, str):
             check_choice("weights", weights, list(WEIGHTS))
-            values = WEIGHTS[weights](similarity, described, labels, representations)
+            chosen = own_weights if alone else WEIGHTS[weights]  # nothing to fit to
+            values = chosen(similarity, described, labels, representations)
         else:
             if specification.mean != "arithmetic":
                 raise SpecificationError(

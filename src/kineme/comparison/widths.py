@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,9 @@ from kineme.validation import Array
 
 #: Width as a share of the typical distance to the nearest movement of another class, an impostor.
 SHARE = 0.4
+#: Quantity of a representation -> width as a share of the typical size, where there is one movement alone: about the
+#: median over eight sets of handwriting, gestures in space, signs, words and exercises.
+ALONE = {"positions": 0.2, "forcing": 0.3, "elastic": 0.16, "turning": 0.045, "cloud": 0.15}
 _LEAST = 0.01  # share of the typical size; smallest distance that is used
 _SAME = 1e-3  # share of the size; smaller distances are rounding errors of single precision
 _COPIES = 1e-4  # share of the size; unlabeled movements at smaller distances are copies
@@ -49,6 +54,20 @@ def impostor_widths(described: Described, labels: NDArray[np.generic]) -> Array:
         )
     # Movements that do not differ in one representation have a similarity of 1 there.
     return np.maximum([np.inf if width is None else width for width in widths], _LEAST * sizes)
+
+
+def lone_widths(described: Described, quantities: Sequence[str]) -> Array:
+    """Width sigma_r of each representation, (R,), of one movement alone: a share of its size, see `ALONE`.
+
+    Raises
+    ------
+    SpecificationError
+        The movement does not move.
+    """
+    sizes = described.sizes()
+    if not sizes[: len(described.blocks)].all():
+        raise SpecificationError("expected a training movement that moves, got one at rest; add demonstrations")
+    return np.array([ALONE[quantity] for quantity in quantities]) * sizes
 
 
 def beginning_widths(beginnings: Described, labels: NDArray[np.generic]) -> Array:

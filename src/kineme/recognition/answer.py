@@ -73,8 +73,9 @@ class Answer:
     rule : {"class", "pooled", "guess"}
         Which demonstrations `p_known` was calibrated on; `promise` says what follows.
     calibrated : bool
-        Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`. If not,
-        as with one demonstration of each class, p-values are a guess.
+        Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`: for
+        people who showed some; for others, of whom several times as many may be called unknown, only if `fit` was told
+        the groups. If not, as with one demonstration of each class, p-values are a guess.
     ranked : tuple of labels
         Best first, in the order of the classifier.
     nearest : tuple of Neighbor

@@ -37,8 +37,10 @@ _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenl
 
 #: Rule by which a movement is called known or unknown -> what it promises.
 RULES = {
-    "class": "Of known movements most like this class, about the error rate or less are called unknown.",
-    "pooled": "Of known movements of all classes together, about the error rate or less are called unknown.",
+    "class": "Of known movements most like this class, by people who showed some, about the error rate or less are "
+    "called unknown; by other people, only if groups told apart who showed what.",
+    "pooled": "Of known movements of all classes together, by people who showed some, about the error rate or less are "
+    "called unknown; by other people, only if groups told apart who showed what.",
     "guess": "Too few demonstrations tell the error rate: any share of known movements may be called unknown.",
 }
 
