@@ -9,9 +9,12 @@ import pytest
 from sklearn.base import clone
 
 from kineme import Recognizer, Representation
+from kineme.comparison.describe import describe
 from kineme.comparison.described import Described
 from kineme.comparison.representation import DEFAULT_REPRESENTATIONS, ROW_REPRESENTATIONS
-from kineme.comparison.weights import aligned_weights
+from kineme.comparison.similarity import AveragedSimilarity
+from kineme.comparison.weights import aligned_weights, fitted_weights
+from kineme.comparison.widths import impostor_widths
 from kineme.errors import SpecificationError
 from kineme.kernels.procrustes import Prepared, Procrustes
 from movement_samples import draw_shapes
@@ -155,3 +158,14 @@ def test_positions_are_kept_once_and_compared_once():
     whole = Recognizer().fit(draw_shapes([3] * 3)).references_.described
     for part in (whole, whole.take(slice(0, 2)), whole.empty(2), whole.select([0, 2])):
         assert part.pairs.positions is part.blocks[0]
+
+
+def test_half_of_a_fitted_weight_is_the_representations_own():
+    demos = draw_shapes([6] * 4, seed=3, spread=0.4)
+    described, labels = describe(demos), np.asarray(demos.labels)
+    similarity = AveragedSimilarity(described.procrustes, impostor_widths(described, labels))
+    aligned = aligned_weights(similarity, described, labels)
+    own = np.array([one.weight for one in DEFAULT_REPRESENTATIONS])
+    found = fitted_weights(similarity, described, labels, DEFAULT_REPRESENTATIONS)
+    assert np.abs(aligned - own / own.sum()).max() > 0.05
+    np.testing.assert_allclose(found, 0.5 * aligned + 0.5 * own / own.sum())
