@@ -6,7 +6,7 @@ import pytest
 from kineme.errors import DataError
 from kineme.files.inspection.inspect import inspect
 from kineme.files.inspection.report import as_words
-from kineme.files.recordings import read_recordings_from_bytes
+from kineme.files.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.channels.channel import recorded_names
 from kineme.movements.tables.layout import Layout
 
@@ -265,6 +265,27 @@ def test_bvh_channels_are_named_by_their_joints():
     assert found.detected[0][0].measured_in == ("", "", "", *["deg"] * 6)
     np.testing.assert_allclose(found.demonstrations.times, np.arange(N) * 0.0333333)
     assert read(BVH, "walk.bvh", columns="Lower Spine").demonstrations.n_dims == 3
+
+
+def test_bvh_files_that_turn_about_their_axes_in_another_order_are_not_mixed(tmp_path):
+    """The three angles of one turn are others in another order, though their names are the same."""
+    for k, order in enumerate(("Xrotation Yrotation Zrotation", *["Zrotation Xrotation Yrotation"] * 2)):
+        (tmp_path / f"{k}.bvh").write_text(BVH.replace("Zrotation Xrotation Yrotation", order))
+    found = read_recordings(tmp_path)
+    assert [one.path for one in found.sources] == ["1.bvh", "2.bvh"]
+    (problem,) = found.problems
+    assert (problem.file, "expected the rotations of 'hips' in the order zxy" in problem.reason) == ("0.bvh", True)
+    names = [f"Hips.{axis}rotation" for axis in "XYZ"]
+    with pytest.raises(DataError, match="in the order zxy, as the file has them, got xyz"):
+        read_recordings(tmp_path / "1.bvh", columns=names)
+
+
+@pytest.mark.parametrize("tail", ["\t", ""])
+def test_names_of_trc_may_end_in_more_tabs_than_samples(tail):
+    text = f"{trc()}\r\n".replace("\t\r\n", f"{tail}\r\n").replace("RASI\t\t" + tail, "RASI\t\t\t")
+    found = read(text, "walk.trc")
+    np.testing.assert_array_equal(found.demonstrations.positions, read(trc(), "walk.trc").demonstrations.positions)
+    assert found.problems == ()
 
 
 @pytest.mark.parametrize(

@@ -180,3 +180,13 @@ def test_velocities_and_efforts_without_positions_are_what_moves(tmp_path):
     rows = [f"{k / 50},{np.sin(k)},{k}" for k in range(20)]
     (tmp_path / "a.csv").write_text("\n".join(["time,field.velocity0,field.effort0", *rows]))
     assert kineme.read_recordings(tmp_path / "a.csv").demonstrations.dimensions == ("field.velocity0", "field.effort0")
+
+
+@pytest.mark.parametrize("clock", ["ros_time", "sensor_timestamp_ns", "device.stamp"])
+def test_the_time_of_another_clock_is_no_coordinate(tmp_path, clock):
+    rows = [f"{k / 50},{k},{k * k},{1.7e9 + k / 50 + 0.001 * (k % 3)}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join([f"time,x,y,{clock}", *rows]))
+    read = kineme.read_recordings(tmp_path / "a.csv")
+    assert read.demonstrations.dimensions == ("x", "y")
+    assert read.detected[0][0].ignored == (clock,)
+    assert kineme.read_recordings(tmp_path / "a.csv", columns=("x", clock)).demonstrations.n_dims == 2

@@ -51,7 +51,8 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
     exact = Counter(known for key, known in zip(keys, columns, strict=True) if key == most)
     units = Counter(frozenset(zip(known.names, known.units, strict=True)) for known in exact.elements())
     usual = units.most_common(1)[0][0]
-    ours = next(known for known in exact if frozenset(zip(known.names, known.units, strict=True)) == usual)
+    alike = [known for known in exact if frozenset(zip(known.names, known.units, strict=True)) == usual]
+    ours = max(alike, key=exact.__getitem__)  # of two orders that are equally frequent, the one met first
     result = ColumnSet([], [], [])
     for one, key, known in zip(files, keys, columns, strict=True):
         if key[0] != most[0] and (by_number or _is_nameless(one, known)):
@@ -73,9 +74,7 @@ def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
     if others := [known for known in several if known.names != ours.names]:
         moved = [[a, b] for a, b in zip(others[0].heads, ours.heads, strict=True) if a != b]
         theirs, here = (", ".join(names) for names in zip(*moved, strict=True))
-        notes.append(
-            f"some files have the columns {theirs} in this order: they are read as {here}, that of the first file"
-        )
+        notes.append(f"some files have the columns {theirs} in this order: they are read as {here}, that of most files")
     wanted = dict(zip(ours.names, ours.units, strict=True))
     pairs = {(a, wanted[name]) for known in several for name, a in zip(known.names, known.units, strict=True)}
     if other := sorted((a, b) for a, b in pairs if a and b and unit_named(a) != unit_named(b)):

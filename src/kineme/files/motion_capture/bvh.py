@@ -15,6 +15,7 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.limits import check_expanded
 from kineme.files.motion_capture.export_heads import positive
+from kineme.movements.channels.column_match import Columns
 from kineme.movements.tables.columns import Roles, choose_roles
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.table import Table
@@ -46,7 +47,22 @@ def read_bvh_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     columns = [np.arange(len(values)) * step, *values.T]
     numbered = [k for k in range(first, len(lines)) if lines[k].strip()]
     table = Table(heads, columns, len(values), lambda row: numbered[row] + 1, faults, measured_in=units, maker="")
-    return table, choose_roles(heads, ("number",) * len(heads), layout)
+    roles = choose_roles(heads, ("number",) * len(heads), layout)
+    _check_order(heads, roles)
+    return table, roles
+
+
+def _check_order(heads: Sequence[str], roles: Roles) -> None:
+    """Refuse rotations of a joint in another order than that of the file, which says which axis turns first."""
+    chosen, of_file = (
+        Columns(tuple(heads[k] for k in places), ()).rotations for places in (roles.positions, sorted(roles.positions))
+    )
+    for joint, axes in chosen.items():
+        if axes != of_file[joint]:
+            raise DataError(
+                f"expected the rotations of {joint!r} in the order {of_file[joint]}, as the file has them, got {axes}, "
+                "which are other angles of the same turns; export all files in one order"
+            )
 
 
 def _channels(lines: Sequence[str]) -> list[str]:

@@ -28,7 +28,9 @@ def trc_head(lines: Sequence[str], cells_of: Callable[[str, str], list[str]]) ->
     said = dict(zip((key.lower() for key in keys), values, strict=False))
     if [cell.lower() for cell in names[:2]] != ["frame#", "time"]:
         raise DataError(f"expected the heads 'Frame#', 'Time' and names in line 4 of a TRC file, got {names[:2]}")
-    n = max(len(axes), len(names))
+    n = max(
+        (k + 1 for k, cell in enumerate(axes) if cell), default=len(names)
+    )  # names may end in more tabs than samples
     plain, ends = list(filled((names + [""] * n)[:n])), (axes + [""] * n)[:n]
     columns = [
         f"{name}.{end[0].lower()}" if end[:1] in "XYZ" and end else "" for name, end in zip(plain, ends, strict=True)

@@ -21,6 +21,10 @@ _NAMELESS = re.compile(
 )
 
 
+#: A rotation of a joint about an axis, one of three whose order says which is turned first: ``Hips.Zrotation``.
+_ROTATION = re.compile(r"(?P<joint>.+)\.(?P<axis>[xyz])rotation", re.I)
+
+
 class Columns(NamedTuple):
     """The columns of a recording.
 
@@ -38,6 +42,14 @@ class Columns(NamedTuple):
     def names(self) -> tuple[str, ...]:
         """The heads in lower case without the units that they end in, or with them where two would be the same."""
         return _names_of(self.heads)
+
+    @property
+    def rotations(self) -> dict[str, str]:
+        """Joint -> the axes that it turns about, one after the other: ``hips`` -> ``zxy``."""
+        axes: dict[str, str] = {}
+        for match in filter(None, map(_ROTATION.fullmatch, self.names)):
+            axes[match["joint"]] = axes.get(match["joint"], "") + match["axis"]
+        return axes
 
     @property
     def are_nameless(self) -> bool:
@@ -79,12 +91,20 @@ def columns_like(positions: Array, ours: Columns, wanted: Columns, known_units: 
     Raises
     ------
     TrajectoryError
-        A name that is not there, or a unit that cannot be converted.
+        A name that is not there, a unit that cannot be converted, or rotations about the same axes one after the other
+        in another order, which are other angles of the same turn.
     """
     place = {name: k for k, name in enumerate(ours.names)}
     missing = [head for head, name in zip(wanted.heads, wanted.names, strict=True) if name not in place]
     if missing:
         raise TrajectoryError(f"expected the column {missing[0]!r}, got {', '.join(map(repr, ours.heads))}")
+    turned = ours.rotations
+    for joint, axes in wanted.rotations.items():
+        if (other := "".join(axis for axis in turned[joint] if axis in axes)) != axes:
+            raise TrajectoryError(
+                f"expected the rotations of {joint!r} in the order {axes}, as the others have them, got {other}, which "
+                "are other angles of the same turns; export all in one order, or read these apart"
+            )
     order = [place[name] for name in wanted.names]
     result = positions if order == list(range(positions.shape[1])) else positions[:, order]
     for k, (from_k, unit) in enumerate(zip(order, wanted.units, strict=True)):

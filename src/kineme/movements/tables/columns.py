@@ -23,6 +23,7 @@ MOVEMENT_WORDS = frozenset(
     }
 )  # fmt: skip
 LABEL_WORDS = frozenset({"label", "labels", "class", "action", "gesture", "activity", "symbol", "category"})
+_STAMPS = TIME_WORDS - {"t", "elapsed"}  # that end the name of a clock
 _BESIDE_TIME = TIME_UNITS | {"unix", "utc", "since", "start", "relative", "system"}
 _BESIDE_NAMES = frozenset({"id", "nr", "no", "number", "index", "idx", "name"})
 _COUNTERS = frozenset({"frame", "index", "idx", "row", "seq", "sample", "unnamed"})  # of samples
@@ -90,7 +91,11 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
         positions = column_numbers(heads, layout.coordinates, free)
     else:
         plain = set(map(_plain, heads))
-        clocks = {k for k in free if _is_stamp(heads[k])} if time is not None and is_time(heads[time]) else set()
+        clocks = {
+            k
+            for k in free
+            if time is not None and (_is_clock(heads[k]) or (is_time(heads[time]) and _is_stamp(heads[k])))
+        }
         positions = tuple(k for k in free if not (named and (k in clocks or _says_nothing_new(heads[k], plain))))
     if not positions:
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
@@ -264,6 +269,12 @@ def is_time(head: str) -> bool:
 def _is_stamp(head: str) -> bool:
     """Whether a head can name nothing but times: ``time`` beside ``seconds_elapsed``, but neither ``t`` nor ``s``."""
     return is_time(head) and bool(set(words_of(head)) & (TIME_WORDS - {"t"}))
+
+
+def _is_clock(head: str) -> bool:
+    """Whether a head names the time of another clock: ``ros_time``, ``sensor_timestamp_ns``."""
+    words = [word for word in words_of(split_head(head)[0]) if word not in TIME_UNITS]
+    return len(words) > 1 and words[-1] in _STAMPS
 
 
 def is_header_stamp(head: str) -> bool:
