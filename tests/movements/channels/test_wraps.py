@@ -51,6 +51,28 @@ def test_only_a_jump_through_the_whole_range_shows_a_period(angles, period):
     assert wrap_period(np.array(angles), np.array([0, 4])) == period
 
 
+K = np.arange(100)
+
+
+@pytest.mark.parametrize(
+    ("values", "period"),
+    [
+        (K % 7, None),  # a counter; 6 is nearly a turn in radians
+        (3 - K % 7, None),
+        ((K // 2 % 7), None),
+        (0.5 * (K % 13), None),
+        (0.1 * (K % 61), None),
+        (np.mod(0.1 * K, 2 * np.pi), 2 * np.pi),
+        (np.round(np.mod(0.1 * K, 2 * np.pi), 2), 2 * np.pi),
+        (np.mod(-0.5 * K + np.pi, 2 * np.pi) - np.pi, 2 * np.pi),
+        (np.mod(20 * K, 360), 360.0),
+        (np.mod(350 + 15 * np.sin(0.2 * K), 360), 360.0),
+    ],
+)
+def test_a_counter_that_begins_anew_is_no_angle(values, period):
+    assert wrap_period(values.astype(float), np.array([0, 50, 100])) == period
+
+
 def test_a_jump_from_one_movement_to_the_next_is_none():
     assert wrap_period(np.array([3.0, 3.1, -3.1, -3.0]), np.array([0, 2, 4])) is None
 

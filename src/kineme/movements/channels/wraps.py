@@ -15,23 +15,31 @@ _SLACK = 1e-3  # of a period, beyond the range
 _ROUNDING = 1e-9  # of a period
 _SPARSE = 0.25  # of a period: with longer steps between the jumps no rule could tell
 _UNSTEADY = 3.0  # a step through the border is at most so many times the longest other one
+_UNEVEN = 0.01  # of a period: by so much an angle that turns evenly steps differently through the border, if rounded
 _JUMP = 0.75  # of a period: a step at least this long is a wrap, and no motion
 
 
 def wrap_period(angles: Array, offsets: NDArray[np.intp]) -> float | None:
     """The period of a column (total,) that shows that it wraps by its range and by jumps through it; else None.
 
-    With these taken away it moves on as it moves elsewhere: a switch between two far values does not.
+    With these taken away it moves on as it moves elsewhere: a switch between two far values does not, nor does a
+    counter that begins anew after something else than a turn, as 0, 1, ..., 6, 0. Whole numbers are no radians.
     """
-    steps = np.abs(_steps(angles, offsets))
+    signed = _steps(angles, offsets)
+    steps = np.abs(signed)
     jump, least, most = float(steps.max(initial=0.0)), float(angles.min(initial=0.0)), float(angles.max(initial=0.0))
     for low, high in _RANGES:
         period = high - low
         if low - _SLACK * period <= least and most <= high + _SLACK * period and jump > 0.9 * period:
+            if period == _TURN and np.all(angles == np.round(angles)):
+                continue
             jumps = steps > _JUMP * period
-            other = float(steps[~jumps].max(initial=0.0))
-            if 0.0 < other < _SPARSE * period and float(np.abs(period - steps[jumps]).max()) <= _UNSTEADY * other:
-                return period
+            through, other = signed[jumps] - np.sign(signed[jumps]) * period, float(steps[~jumps].max(initial=0.0))
+            if 0.0 < other < _SPARSE * period and float(np.abs(through).max()) <= _UNSTEADY * other:
+                within = signed[~jumps & (steps > 0.0)]
+                room = 2.0 * float(np.ptp(within)) + _UNEVEN * period
+                if float(within.min()) - room <= through.min() and through.max() <= float(within.max()) + room:
+                    return period
     return None
 
 
