@@ -47,6 +47,18 @@ def test_start_goal_and_duration_are_met_in_every_format(recording, tmp_path, en
     np.testing.assert_allclose(made.positions[-1, :2], [-5.5, 8], atol=0.01)
 
 
+def test_a_goal_that_is_not_met_at_the_end_is_said_with_what_meets_it(recording, tmp_path):
+    done = run(recording, "--goal", "-30,40", "-o", tmp_path / "a.csv")
+    off = np.abs(read_recording(tmp_path / "a.csv").positions[-1, :2] - [-30, 40])
+    assert off.max() > 0.5
+    assert f"note: it ends {off.max():.3g} from its goal in " in done.stderr
+    settle = done.stderr.split("--settle ")[1].split()[0]
+    done = run(recording, "--goal", "-30,40", "--settle", settle, "-o", tmp_path / "b.csv")
+    assert "note" not in done.stderr
+    np.testing.assert_allclose(read_recording(tmp_path / "b.csv").positions[-1, :2], [-30, 40], atol=float(settle))
+    assert "note" not in run(recording, "-o", tmp_path / "c.csv").stderr
+
+
 def test_a_saved_primitive_does_the_same_as_its_recording(recording, tmp_path):
     first = run(recording, "--goal", "3,3", "--save", tmp_path / "g.kineme")
     second = run(tmp_path / "g.kineme", "--goal", "3,3", by=commands.start)

@@ -117,6 +117,6 @@ def test_inspect_says_how_files_on_one_clock_are_joined(folder, tmp_path):
     assert (data["movements"], {one["label"] for one in data["labels"]}) == (3, {"nod", "wave"})
     assert not any("one clock" in one for one in data["notes"])
     for k in range(4):  # repetitions that each begin at 0 are none
-        rows = [f"{i / 100},{i * k},{i * i}" for i in range(50 + k)]
-        (tmp_path / f"{k}.csv").write_text("\n".join(["time,x,y", *rows]))
+        rows = [f"{i / 100},{i * k},{i * i}" for i in range(50)]
+        (tmp_path / f"{k}.csv").write_text("\n".join([("time,x,y", "time,y,x", "time,x [mm],y [mm]")[k % 3], *rows]))
     assert "one clock" not in commands.run("inspect", tmp_path).stdout

@@ -240,7 +240,7 @@ def test_names_are_text_whatever_they_look_like():
 
 FAULTS = [
     ("oops", "expected a number in 'x', got 'oops'"),
-    ("NA", "expected a number in 'x', got 'NA'"),
+    ("NaK", "expected a number in 'x', got 'NaK'"),
     ("1_0", "expected a number in 'x', got '1_0'"),
     ("0x10", "expected a number in 'x', got '0x10'"),
     ("1,2", "expected 4 columns, got 5"),
@@ -263,7 +263,17 @@ def test_a_bad_cell_costs_its_movement_and_is_found_by_its_line(cell, reason, go
     assert kept.problems[0].reason == f"movement b: {reason}; this sample left out"
 
 
-@pytest.mark.parametrize("cell", ["", "nan"])
+@pytest.mark.parametrize("gap", ["", "nan", "NA", "null"])
+def test_a_column_without_values_at_the_beginning_is_not_taken_for_text(gap):
+    rows = [(k / 100, gap if k < 30 else k * k, k) for k in range(100)]
+    found = read(lines(rows, "time,x,y"))
+    assert found.demonstrations.dimensions == ("x", "y")
+    assert found.demonstrations.lengths.tolist() == [70]
+    states = [(k / 100, "none" if k < 30 else "moving", k) for k in range(100)]
+    assert read(lines(states, "time,state,y")).demonstrations.dimensions == ("y",)
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "NA", "<NA>", "null", "None"])
 @pytest.mark.parametrize("good", [6, 3000])
 def test_an_empty_cell_costs_its_movement_where_its_gap_is_too_long_to_be_filled(cell, good):
     rows = [("a", k, 10 + k, 20 - k) for k in range(good)] + [("b", k, 10 + k, 20 - k) for k in range(6)]

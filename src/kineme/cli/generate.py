@@ -25,6 +25,7 @@ from kineme.cli.source import read_source
 from kineme.output.text import printable
 
 _BAD_FIT = 0.05  # of the extent of the recording
+_MISSED = 0.01  # of the extent of a column
 
 
 @click.command(cls=GroupedCommand, short_help="Generate a movement from a symbol or a recording.")
@@ -76,6 +77,7 @@ def generate(**options: Any) -> None:
         checked_point(learned, getattr(wanted, name), f"--{name}")
     made = make(learned, wanted)
     _warn_of_bad_fit(learned)
+    _warn_of_missed_goal(learned, made, wanted)
     if options["save"]:
         learned.primitive.save(options["save"])
     if options["plot"]:
@@ -92,6 +94,27 @@ def _warn_of_bad_fit(learned: Any) -> None:
         write(
             f"warning: the fit is off the recording {of}by up to {off.largest:.3g}, {100 * off.share:.2g} % of its "
             "extent; see it with --plot, and try more basis functions with --n-basis",
+            err=True,
+        )
+
+
+def _warn_of_missed_goal(learned: Any, made: Any, wanted: Any) -> None:
+    """Say how far from a goal a movement ends that still moves there, orientations aside."""
+    if wanted.goal is None or wanted.settle is not None:
+        return
+    about = learned.primitive.to_recording
+    turned = {name for one in (about.moving if about else ()) if one.kind == "orientation" for name in one.columns}
+    misses = []
+    for name, goal in zip(learned.moving_columns, wanted.goal, strict=True):
+        column = made.columns["positions"][:, learned.columns.index(name)]
+        if name not in turned and (extent := float(column.max() - column.min())) > 0.0:
+            off = abs(float(column[-1]) - float(goal))
+            misses.append((off / extent, off, name, extent))
+    share, off, name, extent = max(misses, default=(0.0, 0.0, "", 0.0))
+    if share > _MISSED:
+        write(
+            f"note: it ends {off:.3g} from its goal in {printable(name)}, where it still moves; to go on until it is "
+            f"there, say for instance --settle {_MISSED * extent:.1g}",
             err=True,
         )
 

@@ -45,7 +45,7 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
         The caller chose the columns by their numbers: names do not matter.
     """
     columns = [_columns(one) for one in files]
-    keys = [(frozenset(known.names), _sensors(one.path)) for one, known in zip(files, columns, strict=True)]
+    keys = [(frozenset(known.names), sensors_of(one.path)) for one, known in zip(files, columns, strict=True)]
     named = [key for key, one, known in zip(keys, files, columns, strict=True) if not _is_nameless(one, known)]
     most = Counter(named or keys).most_common(1)[0][0]
     exact = Counter(known for key, known in zip(keys, columns, strict=True) if key == most)
@@ -98,11 +98,12 @@ def _otherness(path: str, known: Columns, ours: Columns, most: tuple[frozenset[s
             f"the columns {listed(known.heads)} where most files have {listed(ours.heads)}; choose columns of the same "
             "names with columns=, or by their numbers to take them in their order, in the shell --columns"
         )
-    here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (_sensors(path), most[1]))
+    here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (sensors_of(path), most[1]))
     return f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
 
 
-def _sensors(path: str) -> frozenset[str]:
+def sensors_of(path: str) -> frozenset[str]:
+    """Words in the name of a file that say which sensor of a device wrote it."""
     return _SENSORS.intersection(words_of(PurePosixPath(path).stem))
 
 

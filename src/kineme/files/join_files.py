@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from kineme.files.column_order import sensors_of
 from kineme.files.entries import Entry, name_of
 from kineme.files.folders import as_text
 from kineme.files.problem import Problem
 from kineme.files.read_file import FileRead
 from kineme.files.ros.rotations import interpolated
 from kineme.movements.channels.channel import Channels, recorded_names
+from kineme.movements.channels.column_match import Columns
 from kineme.movements.channels.coordinates import canonical, columns_of, in_order, off_norm
 from kineme.movements.channels.detect import Given, find_channels
 from kineme.movements.tables.parsed import Block, Detected, Repair
@@ -131,8 +133,10 @@ def _are_sensors(files: Sequence[FileRead]) -> bool:
     spans = np.array([_span(read) for read in files])
     if spans[:, 0].min() > _SINCE_1970:
         return True
-    heads = {read.detected.columns for read in files if read.detected}
-    return len(heads) > 1 and bool((np.ptp(spans, axis=0) <= _ALIKE * np.ptp(spans)).all())
+    of_files = [
+        (frozenset(Columns(read.detected.columns, ()).names), sensors_of(read.path)) for read in files if read.detected
+    ]
+    return len({*of_files}) == len(files) and bool((np.ptp(spans, axis=0) <= _ALIKE * np.ptp(spans)).all())
 
 
 def _joined(members: Sequence[Placed], together: Sequence[str], given: Given) -> Placed:

@@ -17,8 +17,9 @@ from kineme.files.file_channels import with_channels
 from kineme.files.problem import Problem, note_on_missing
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels
+from kineme.movements.channels.column_match import Columns
 from kineme.movements.channels.detect import Given
-from kineme.movements.tables.parsed import Block, Detected, Repair
+from kineme.movements.tables.parsed import Block, Detected, Repair, listed
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -162,27 +163,25 @@ def merge_files(
     DataError
         There is none.
     """
-    listed = [*problems, *(problem for one in files for problem in one.problems)]
+    reported = [*problems, *(problem for one in files for problem in one.problems)]
     full = [one for one in files if one.block is not None and len(one.block.labels)]
     if not full:
-        if len(listed) == 1 and listed[0].file == Path(where).name:  # one file alone: it is named once
-            raise DataError(str(listed[0]._replace(file=where)))
-        first = f"; {len(listed)} could not be read, the first {listed[0]}" if listed else ""
-        raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(listed)]))
+        if len(reported) == 1 and reported[0].file == Path(where).name:  # one file alone: it is named once
+            raise DataError(str(reported[0]._replace(file=where)))
+        first = f"; {len(reported)} could not be read, the first {reported[0]}" if reported else ""
+        raise DataError("; ".join([f"expected recordings in {where}, found none{first}", *note_on_missing(reported)]))
     dims: Counter[int] = Counter()
     for one in full:
         dims[_block(one).positions.shape[1]] += len(_block(one).labels)
     n_dims = dims.most_common(1)[0][0]
     odd = [one for one in full if _block(one).positions.shape[1] != n_dims]
-    listed += [
-        Problem(one.path, None, f"{_block(one).positions.shape[1]} dimensions where most have {n_dims}") for one in odd
-    ]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
+    reported += [Problem(one.path, None, _other_width(one, full[0])) for one in odd]
     understood = {one.path: one.detected for one in full}
     full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
-    listed += odd_channels
+    reported += odd_channels
     if not any(len(_block(one).labels) for one in full):
-        raise DataError(f"expected recordings in {where}, found none; the first that is none: {listed[0]}")
+        raise DataError(f"expected recordings in {where}, found none; the first that is none: {reported[0]}")
     sources = tuple(
         Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
         for one in full
@@ -191,7 +190,21 @@ def merge_files(
         )
     )
     detected = Counter(how for one in full if (how := understood[one.path]))
-    return Recordings(_demonstrations(full, sources, channels), sources, tuple(listed), tuple(detected.most_common()))
+    return Recordings(_demonstrations(full, sources, channels), sources, tuple(reported), tuple(detected.most_common()))
+
+
+def _other_width(one: FileRead, usual: FileRead) -> str:
+    """What is wrong with a file of more or fewer columns than most, with the names of these columns."""
+    width, most = (_block(read).positions.shape[1] for read in (one, usual))
+    reason = f"{width} dimensions where most have {most}"
+    if one.detected is None or usual.detected is None or not (one.detected.named and usual.detected.named):
+        return reason
+    ours, others = (Columns(read.detected.columns, ()) for read in (one, usual) if read.detected)
+    lost = [head for head, name in zip(others.heads, others.names, strict=True) if name not in ours.names]
+    more = [head for head, name in zip(ours.heads, ours.names, strict=True) if name not in others.names]
+    differing = [f"{word} {listed(heads)}" for word, heads in (("without", lost), ("with", more)) if heads]
+    way_out = "choose columns that all have with columns= or exclude=, in the shell --columns or --exclude"
+    return f"{reason}, {' and '.join(differing)}; {way_out}" if differing else reason
 
 
 def _people(one: FileRead) -> Sequence[str | None]:

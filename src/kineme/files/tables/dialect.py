@@ -23,6 +23,7 @@ _HEAD = 100_000  # lines among which they are
 _WIDEST, _SHORT = 100_000, 1000  # columns, at most; characters of a line that is not checked
 _CELL = 32  # memory of a cell in Python, per character [bytes]
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf(inity)?)", re.IGNORECASE)
+_MISSING = frozenset({"", "na", "n/a", "#n/a", "<na>", "null", "none"})  # as R, pandas and others write a gap
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 _COMMA_NUMBERS = re.compile(rf"\s*{COMMA_NUMBER.pattern}(\s+{COMMA_NUMBER.pattern})+\s*")  # between blanks
 
@@ -181,6 +182,11 @@ def separator_of(lines: Sequence[str]) -> str | None:
     return None
 
 
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no value: it is empty, ``NA``, ``null``."""
+    return cell.lower() in _MISSING
+
+
 def is_number(cell: str, comma: bool) -> bool:
     """Whether a cell reads as a number."""
     return bool(_NUMBER.fullmatch(cell) or (comma and COMMA_NUMBER.fullmatch(cell)))
@@ -207,7 +213,7 @@ def _commented_head(lines: Sequence[str], separator: str | None, n_columns: int)
 
 
 def _kind(cells: Sequence[str], comma: bool) -> str:
-    filled = [cell for cell in cells if cell]
+    filled = [cell for cell in cells if not is_missing(cell)] or [cell for cell in cells if cell.lower() == "none"]
     if filled and all(map(is_date, filled)):
         return "date"
     return "number" if 2 * sum(is_number(cell, comma) for cell in filled) >= len(filled) else "text"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kineme.errors import DataError
-from kineme.files.tables.dialect import Dialect, check_line, split
+from kineme.files.tables.dialect import Dialect, check_line, is_missing, split
 
 _STRETCH = 1000  # lines that are parsed at a time
 _FAULTS = 2_000_000  # lines with faults, at most: each takes a while and some memory
@@ -19,7 +19,7 @@ _EMPTY = 20_000  # lines without any number, after which none is expected
 def read_slowly(
     samples: Iterable[tuple[int, str]], dialect: Dialect, dtype: np.dtype[Any]
 ) -> tuple[Any, dict[int, str]]:
-    """All samples, NaN for missing numbers, and row -> what is wrong there; an empty cell is a gap, and no fault."""
+    """All samples, NaN for missing numbers, and row -> what is wrong there; an empty cell or NA is a gap."""
     stretches, faults, n_rows, has_numbers = [], dict[int, str](), 0, False
     numeric = [name for name in dtype.names or () if dtype[name].kind == "f"]
     samples = iter(samples)
@@ -106,7 +106,7 @@ def _read_line(line: str, dialect: Dialect, texts: list[bool]) -> tuple[tuple[An
         row.append(cell if text else _number(cell, dialect.decimal_comma))
         if row[-1] is None:
             row[-1] = np.nan
-            wrong = wrong or (f"expected a number in {head!r}, got {cell!r}" if cell else "")
+            wrong = wrong or (f"expected a number in {head!r}, got {cell!r}" if not is_missing(cell) else "")
     return tuple(row), wrong
 
 
