@@ -206,6 +206,8 @@ def _timed(part: str) -> tuple[Array, Array]:
 
 def _side_by_side(columns: Sequence[tuple[Array, Array]], timed: bool) -> tuple[Array, Array]:
     """The columns of a movement as times (T,) and positions (T, d), without padding at the end."""
+    if not columns:
+        raise ValueError("expected values of at least one dimension, got none")
     lengths = [len(x) for _, x in columns]
     if len({*lengths}) > 1:
         raise ValueError(f"expected columns of one length, got {listed(map(str, lengths))}")
