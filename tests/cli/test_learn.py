@@ -204,3 +204,27 @@ def test_a_label_that_is_not_taken_is_said(recordings, tmp_path):
     again = answer("learn", name, "--label", "other", "-l", tmp_path / "library")
     assert again["kept"] == [{"symbol": "wave", "label": "other", "movements": 1}]
     assert "no symbol" not in done.stdout
+
+
+def test_a_pause_in_which_one_movement_may_end_and_another_begin_is_said(tmp_path):
+    """Two demonstrations under one label, as a table has them where no column counts them, are one movement."""
+
+    def write(later):
+        rows = "".join(f"wave,{t + k / 50},{k},{k * k}\n" for t in (0, later) for k in range(40))
+        (tmp_path / "two.csv").write_text("label,time,x,y\n" + rows)
+
+    write(10)
+    (note,) = answer("learn", tmp_path / "two.csv", "-l", tmp_path / "actions")["notes"]
+    assert note.startswith("1 movement without samples for up to 9.22 s, the first two.csv; if these are several")
+    assert note in answer("inspect", tmp_path / "two.csv")["notes"]
+    write(1.6)
+    assert answer("learn", tmp_path / "two.csv", "-l", tmp_path / "others")["notes"] == []
+
+
+def test_units_that_are_converted_and_columns_put_in_order_are_said(tmp_path):
+    for name, heads in (("a", "x [m],y [m]"), ("b", "y [mm],x [mm]")):
+        rows = "".join(f"{k / 50},{k},{k * k}\n" for k in range(40))
+        (tmp_path / f"{name}.csv").write_text(f"time,{heads}\n{rows}")
+    ordered, converted = answer("learn", tmp_path, "--label", "wave", "-l", tmp_path / "actions")["notes"]
+    assert ordered.startswith("some files have the columns y [mm], x [mm] in this order")
+    assert converted == "units are converted: mm to m"

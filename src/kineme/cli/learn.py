@@ -52,8 +52,6 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
     Example: kineme learn recordings/ --library actions/
     """
     from kineme.files.entries import root_of
-    from kineme.files.inspection.extents import notes_on_extents
-    from kineme.files.inspection.gaps import notes_on_gaps
     from kineme.library.library import ActionLibrary
 
     as_json, label, no_labels = options.pop("as_json"), options.pop("label"), options.pop("no_labels")
@@ -80,9 +78,22 @@ def learn(recordings: tuple[Path, ...], folder: Path, **options: Any) -> None:
             "people": sorted({one for one in people or () if one is not None}),
             "version": report.version,
             "problems": list(map(str, parsed.problems)),
-            "notes": [*parsed.notes, *notes_on_gaps(parsed), *notes_on_extents(parsed.demonstrations)],
+            "notes": _notes(parsed),
         }
     say(as_json, data, lambda: _text(data, problem_lines(parsed.problems, "left out ")))
+
+
+def _notes(recordings: Any) -> list[str]:
+    """What a person should know of how recordings were read, before they rely on what is learned."""
+    from kineme.files.column_order import notes_on_order
+    from kineme.files.inspection.extents import notes_on_extents
+    from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
+    from kineme.movements.channels.column_match import columns_recorded
+
+    demos = recordings.demonstrations
+    ordered = notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
+    repaired = [*notes_on_gaps(recordings), *notes_on_pauses(recordings)]
+    return [*recordings.notes, *ordered, *repaired, *notes_on_extents(demos)]
 
 
 def _labeled(recordings: Any, table: Path | None) -> Any:

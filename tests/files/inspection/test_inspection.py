@@ -101,7 +101,9 @@ def test_gaps_and_odd_rates_are_noticed():
     text = "time,x\n" + "".join(f"{k},{k}\n" for k in (0, 1, 2, 3, 9, 10))
     found = inspect(read_recordings_from_bytes(text.encode(), "a.csv", Layout()))
     assert (found.labels[0].gaps, found.labels[0].longest_gap) == (1, 6)
-    assert found.notes == ("1 samples per second are unusual; if the unit of time is another, give --units",)
+    odd, pause = found.notes
+    assert odd == "1 samples per second are unusual; if the unit of time is another, give --units"
+    assert pause.startswith("1 movement without samples for up to 6 s, the first a.csv; if these are several movements")
     assert "1 (to 6 s)" in as_words(found)
 
 

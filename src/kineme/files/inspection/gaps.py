@@ -1,10 +1,15 @@
-"""Notes on missing values: what was filled and cropped in a set of recordings, and what would read the rest."""
+"""Notes on missing values and pauses: what was filled and cropped in recordings, and what would read the rest."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from kineme.files.inspection.sampling import sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import note_on_missing
 from kineme.output.text import counted
+
+_PAUSE = 1.0  # s without samples from which on a movement may be several
 
 
 def notes_on_gaps(recordings: Recordings) -> list[str]:
@@ -22,3 +27,18 @@ def notes_on_gaps(recordings: Recordings) -> list[str]:
             f"{max(cropped):.3g} s, {sum(cropped):.3g} s in all"
         )
     return notes + note_on_missing(recordings.problems)
+
+
+def notes_on_pauses(recordings: Recordings) -> list[str]:
+    """Say that there are no samples for so long that a movement may be several, one after the other."""
+    sampling = sampling_of(recordings.demonstrations)
+    paused = (sampling.gaps > 0) & (sampling.longest > _PAUSE)
+    if not paused.any():
+        return []
+    first = int(np.flatnonzero(paused)[0])
+    longest = sampling.longest[paused].max()
+    return [
+        f"{counted(int(paused.sum()), 'movement')} without samples for up to {longest:.3g} s, the first "
+        f"{recordings.short_names[first]}; if these are several movements, say which column tells them apart, "
+        "--movement, in Python movement=, or cut them by kineme segment"
+    ]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kineme.files.column_order import notes_on_order
 from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.extents import extents_of, notes_on_extents
-from kineme.files.inspection.gaps import notes_on_gaps
+from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
@@ -161,7 +161,8 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     unlabeled = sum(one.movements for one in labels if one.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    return notes + notes_on_gaps(recordings) + notes_on_extents(demos) + _notes_on_channels(demos)
+    notes += notes_on_gaps(recordings) + notes_on_pauses(recordings)
+    return notes + notes_on_extents(demos) + _notes_on_channels(demos)
 
 
 def _notes_on_channels(demos: Demonstrations) -> list[str]:
