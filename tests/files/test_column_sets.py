@@ -81,7 +81,10 @@ def test_columns_are_put_in_order_and_converted_by_their_names(tmp_path):
     ("heads", "reason"),
     [
         (["elbow_roll", "temp", "volt"], r"the columns ['elbow_roll', 'temp', 'volt'] where most files have ['hand_x"),
-        (["hand_x", "hand_y", "hand_w"], "where most files have"),
+        (
+            ["hand_x", "hand_y", "hand_w"],
+            "['hand_w'] where most files have ['hand_z [mm]']; say --exclude 'hand_z [mm],hand_w' ",
+        ),
         (["hand_x [V]", "hand_y [V]", "hand_z [V]"], "expected 'hand_x [V]' in 'mm', as the others have it, got 'V'"),
         (["hand_x [parsec]", "hand_y [mm]", "hand_z [mm]"], "got 'parsec', which cannot be converted"),
         (["hand_x", "hand_y", "hand_z"], "expected 'hand_x' in 'mm', as the others have it, got no unit"),

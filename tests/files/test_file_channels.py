@@ -67,7 +67,7 @@ def test_a_file_of_other_heads_is_no_company_for_orientations(tmp_path):
     write(tmp_path / "other.csv", gripper="claw")
     recordings = kineme.read_recordings(tmp_path)
     assert len(recordings) == 2
-    assert "'claw'] where most files have ['pose.position.x'" in recordings.problems[0].reason
+    assert "the columns ['claw'] where most files have ['gripper']; say --excl" in recordings.problems[0].reason
 
 
 def written(path, order, gripper, positions="xy"):

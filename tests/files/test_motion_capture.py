@@ -339,6 +339,33 @@ def test_c3d_points_are_named_and_lost_ones_are_gaps(c3d_bytes):
     assert some.demonstrations.lengths.tolist() == [N - 1]
 
 
+def test_the_marker_that_one_file_lacks_is_named(tmp_path):
+    pytest.importorskip("c3d", reason="the package c3d reads C3D")
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes the file")
+    for name, markers in (
+        ("a", ("M29", "M30")),
+        ("b", ("M29", "M30")),
+        ("c", ("M29",)),
+        ("d", ("M29", "M30", "EXTRA")),
+    ):
+        content = ezc3d.c3d()
+        content["parameters"]["POINT"]["RATE"]["value"] = [100]
+        content["parameters"]["POINT"]["LABELS"]["value"] = markers
+        points = np.ones((4, len(markers), N))
+        points[:3] += np.sin(np.arange(N)) * np.arange(3 * len(markers)).reshape(3, -1, 1)
+        content["data"]["points"] = points
+        content.write(str(tmp_path / f"{name}.c3d"))
+    found = read_recordings(tmp_path)
+    assert len(found) == 2
+    lacking, more = (one.reason for one in found.problems)
+    assert lacking.startswith(
+        "3 dimensions where most have 6: it lacks ['M30.x', 'M30.y', 'M30.z']; say --exclude M30 "
+    )
+    assert more.startswith("9 dimensions where most have 6: it has ['EXTRA.x', 'EXTRA.y', 'EXTRA.z'] besides; say --ex")
+    found = read_recordings(tmp_path, exclude=["M30", "EXTRA"])
+    assert (len(found), found.problems) == (4, ())
+
+
 def test_a_damaged_c3d_file_says_so(c3d_bytes):
     for data, words in ((c3d_bytes[:-600], "truncated"), (c3d_bytes[:600], "truncated"), (b"hello", "foreign")):
         with pytest.raises(DataError, match=words):

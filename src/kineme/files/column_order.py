@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from kineme.errors import TrajectoryError
-from kineme.files.problem import Problem
+from kineme.files.problem import Problem, in_shell
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.column_match import Columns, columns_like
 from kineme.movements.channels.detect import unit_of
@@ -67,6 +67,18 @@ def in_one_set(files: Sequence[FileRead], by_number: bool = False) -> ColumnSet:
     return result
 
 
+def dimensions_unlike(files: Sequence[FileRead], most: Sequence[FileRead]) -> list[Problem]:
+    """Say which columns files lack, or have besides, that have other numbers of columns than most."""
+    named = Counter(known for known in map(_columns, most) if not known.are_nameless)
+    ours, n_dims = (named or Counter(map(_columns, most))).most_common(1)[0][0], _width(most[0])
+    problems = []
+    for one in files:
+        known = _columns(one)
+        unlike = "" if _is_nameless(one, known) or not named else f": {_differences(known, ours)}"
+        problems.append(Problem(one.path, None, f"{_width(one)} dimensions where most have {n_dims}{unlike}"))
+    return problems
+
+
 def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
     """A sentence if files have the columns in another order, and one if they have them in other units."""
     several = [known for known in map(_columns_of, detected) if {*known.names} == {*ours.names}]
@@ -94,12 +106,43 @@ def _as(one: FileRead, known: Columns, ours: Columns) -> FileRead:
 def _otherness(path: str, known: Columns, ours: Columns, most: tuple[frozenset[str], frozenset[str]]) -> str:
     """What keeps a file from having the columns of most."""
     if {*known.names} != most[0]:
-        return (
-            f"the columns {listed(known.heads)} where most files have {listed(ours.heads)}; choose columns of the same "
-            "names with columns=, or by their numbers to take them in their order, in the shell --columns"
-        )
+        return _differences(known, ours)
     here, there = (" ".join(sorted(sensors)) or "no sensor" for sensors in (sensors_of(path), most[1]))
     return f"the file of another sensor by its name, {here} where most files are of {there}; read them apart"
+
+
+def _differences(known: Columns, ours: Columns) -> str:
+    """The columns of a file that most have not, and the other way round; and the options that read all files."""
+    here, there = (
+        [head for head, name in zip(one.heads, one.names, strict=True) if name not in other.names]
+        for one, other in ((known, ours), (ours, known))
+    )
+    said = f"the columns {listed(here)} where most files have {listed(there)}"
+    if not here:
+        said = f"it lacks {listed(there)}"
+    elif not there:
+        said = f"it has {listed(here)} besides"
+    if {*known.names}.isdisjoint(ours.names):
+        return (
+            f"{said}; choose columns of the same names with columns=, or by their numbers to take them in their order, "
+            "in the shell --columns"
+        )
+    shared = [head for head, name in zip(ours.heads, ours.names, strict=True) if name in known.names]
+    aside = dict.fromkeys(_stem(head, shared) for head in [*there, *here])
+    return (
+        f"{said}; say --exclude {in_shell([*aside])} to read all without, or --columns to choose others, in Python "
+        "exclude= or columns="
+    )
+
+
+def _stem(head: str, others: Sequence[str]) -> str:
+    """What a head begins with before a dot, where no other one begins so: M30 of M30.x."""
+    stem, dot, _ = head.rpartition(".")
+    return head if not dot or any(other.startswith(f"{stem}.") for other in others) else stem
+
+
+def _width(one: FileRead) -> int:
+    return 0 if one.block is None else one.block.positions.shape[1]
 
 
 def sensors_of(path: str) -> frozenset[str]:

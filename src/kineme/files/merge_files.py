@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kineme.errors import DataError
+from kineme.files.column_order import dimensions_unlike
 from kineme.files.file_channels import with_channels
 from kineme.files.problem import Problem, note_on_missing
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.channel import Channels
-from kineme.movements.channels.column_match import Columns
 from kineme.movements.channels.detect import Given
-from kineme.movements.tables.parsed import Block, Detected, Repair, listed
+from kineme.movements.tables.parsed import Block, Detected, Repair
 from kineme.movements.trajectories.channels import of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.labels import label_array
@@ -176,7 +176,7 @@ def merge_files(
     n_dims = dims.most_common(1)[0][0]
     odd = [one for one in full if _block(one).positions.shape[1] != n_dims]
     full = [one for one in full if _block(one).positions.shape[1] == n_dims]
-    reported += [Problem(one.path, None, _other_width(one, full[0])) for one in odd]
+    reported += dimensions_unlike(odd, full)
     understood = {one.path: one.detected for one in full}
     full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
     reported += odd_channels
@@ -191,20 +191,6 @@ def merge_files(
     )
     detected = Counter(how for one in full if (how := understood[one.path]))
     return Recordings(_demonstrations(full, sources, channels), sources, tuple(reported), tuple(detected.most_common()))
-
-
-def _other_width(one: FileRead, usual: FileRead) -> str:
-    """What is wrong with a file of more or fewer columns than most, with the names of these columns."""
-    width, most = (_block(read).positions.shape[1] for read in (one, usual))
-    reason = f"{width} dimensions where most have {most}"
-    if one.detected is None or usual.detected is None or not (one.detected.named and usual.detected.named):
-        return reason
-    ours, others = (Columns(read.detected.columns, ()) for read in (one, usual) if read.detected)
-    lost = [head for head, name in zip(others.heads, others.names, strict=True) if name not in ours.names]
-    more = [head for head, name in zip(ours.heads, ours.names, strict=True) if name not in others.names]
-    differing = [f"{word} {listed(heads)}" for word, heads in (("without", lost), ("with", more)) if heads]
-    way_out = "choose columns that all have with columns= or exclude=, in the shell --columns or --exclude"
-    return f"{reason}, {' and '.join(differing)}; {way_out}" if differing else reason
 
 
 def _people(one: FileRead) -> Sequence[str | None]:

@@ -47,7 +47,7 @@ def test_what_is_no_recording_is_left_out_with_the_reason(folder, make_movement)
     assert left_out["wave/broken.csv"] == "line 3: expected 2 columns, got 1"
     assert "at least 4 samples, got 2" in left_out["wave/short.csv"]
     assert left_out["top.csv"] == "no label: not in a folder of its own"
-    assert left_out["wave/space.csv"].startswith("3 dimensions where most have 2, with ['z']; choose columns")
+    assert left_out["wave/space.csv"].startswith("3 dimensions where most have 2: it has ['z'] besides")
     assert left_out["once/a.csv"] == "the only movement labeled 'once'"
 
 

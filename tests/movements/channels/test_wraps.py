@@ -60,6 +60,7 @@ K = np.arange(100)
         (K % 7, None),  # a counter; 6 is nearly a turn in radians
         (3 - K % 7, None),
         ((K // 2 % 7), None),
+        (np.tile([0, 1, 2, 1, 2, 3, 4, 5, 6, 6], 10), None),
         (0.5 * (K % 13), None),
         (0.1 * (K % 61), None),
         (np.mod(0.1 * K, 2 * np.pi), 2 * np.pi),
