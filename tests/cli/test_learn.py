@@ -222,9 +222,23 @@ def test_a_pause_in_which_one_movement_may_end_and_another_begin_is_said(tmp_pat
 
 
 def test_units_that_are_converted_and_columns_put_in_order_are_said(tmp_path):
-    for name, heads in (("a", "x [m],y [m]"), ("b", "y [mm],x [mm]")):
-        rows = "".join(f"{k / 50},{k},{k * k}\n" for k in range(40))
+    for name, heads, (x, y) in (("a", "x [m],y [m]", (1, 2)), ("b", "y [mm],x [mm]", (2000, 1000))):
+        rows = "".join(f"{k / 50},{k * x},{k * y}\n" for k in range(40))
         (tmp_path / f"{name}.csv").write_text(f"time,{heads}\n{rows}")
     ordered, converted = answer("learn", tmp_path, "--label", "wave", "-l", tmp_path / "actions")["notes"]
     assert ordered.startswith("some files have the columns y [mm], x [mm] in this order")
     assert converted == "units are converted: mm to m"
+
+
+@pytest.mark.parametrize(
+    ("factor", "heads"), [(57.3, "joint1,joint2"), (1000, "x,y"), (20, "x,y"), (1000, "x [mm],y [mm]")]
+)
+def test_movements_of_a_label_whose_sizes_differ_as_units_do_are_said(tmp_path, factor, heads):
+    (tmp_path / "set" / "wave").mkdir(parents=True)
+    for name, scale, columns in (("a", 1, heads.replace("mm", "m")), ("b", factor, heads)):
+        rows = "".join(f"{k / 50},{scale * k / 40},{scale * (k / 80) ** 2}\n" for k in range(40))
+        (tmp_path / "set" / "wave" / f"{name}.csv").write_text(f"time,{columns}\n{rows}")
+    for command in (["learn", "-l", tmp_path / "actions"], ["inspect"]):
+        said = [one for one in answer(*command, tmp_path / "set")["notes"] if "if these are two units" in one]
+        assert len(said) == (factor > 30 and "[" not in heads)
+        assert not said or "of wave extend from 0.975, wave/a.csv, to" in said[0]

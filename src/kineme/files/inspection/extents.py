@@ -12,6 +12,7 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
 _MORE = 10.0  # times the extent of all others
+_LARGER = 30.0  # times the extent of the smallest movement of a label: a degree and a radian are 57 apart
 _NAMED = 6  # columns that the sentence names
 _END = re.compile(r"[\W\d_]*([\[(][^\[\]()]*[\])]\s*)?$")  # number and unit
 
@@ -40,6 +41,25 @@ def notes_on_extents(demos: Demonstrations) -> list[str]:
     *_, second, widest = sorted(groups.values(), key=lambda group: max(group.values()))
     here, there = max(widest.values()), max(second.values())
     return [_note([*widest], here, there)] if there > 0 and here >= _MORE * there else []
+
+
+def notes_on_sizes(demos: Demonstrations) -> list[str]:
+    """A sentence if movements of one label differ in size as millimeters and meters do, whose unit no file says."""
+    extents = extents_of(demos).max(axis=1, initial=0.0)
+    labels = np.full(len(demos), None) if demos.labels is None else demos.labels
+    for label in dict.fromkeys(labels.tolist()):
+        chosen = np.flatnonzero((labels == label) & (extents > 0.0))
+        if not len(chosen):
+            continue
+        small, large = (int(chosen[k]) for k in (extents[chosen].argmin(), extents[chosen].argmax()))
+        if extents[large] >= _LARGER * extents[small]:
+            of_label = "" if label is None else f" of {label}"
+            names = demos.names or [f"movement {k}" for k in range(len(demos))]
+            return [
+                f"movements{of_label} extend from {extents[small]:.3g}, {names[small]}, to {extents[large]:.3g}, "
+                f"{names[large]}; if these are two units, as of mm and m or degrees and radians, say them in the heads"
+            ]
+    return []
 
 
 def _group(one: Channel) -> str:

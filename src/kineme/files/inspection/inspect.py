@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kineme.files.column_order import notes_on_order
 from kineme.files.inspection.duplicates import duplicates_among
-from kineme.files.inspection.extents import extents_of, notes_on_extents
+from kineme.files.inspection.extents import extents_of, notes_on_extents, notes_on_sizes
 from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
@@ -161,7 +161,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     unlabeled = sum(one.movements for one in labels if one.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    notes += notes_on_gaps(recordings) + notes_on_pauses(recordings)
+    notes += notes_on_gaps(recordings) + notes_on_pauses(recordings) + notes_on_sizes(demos)
     return notes + notes_on_extents(demos) + _notes_on_channels(demos)
 
 
