@@ -132,7 +132,7 @@ def test_the_command_shows_a_table_and_says_what_it_wrote(recording, library, tm
     shown = start("annotate", recording, "-l", library)
     assert shown.returncode == 0, shown.stderr
     assert shown.stderr == ""
-    assert all(word in shown.stdout for word in ("GShape", "unknown", "start [s]", "p-value"))
+    assert all(word in shown.stdout for word in ("GShape", "unknown", "start [s]", "how sure", "new"))
     wrote = run("annotate", recording, "-l", library, "-o", tmp_path / "a.json")
     assert f"written to {tmp_path / 'a.json'}" in wrote.stdout
     assert json.loads((tmp_path / "a.json").read_text())[0]["recording"] == "long.csv"

@@ -102,9 +102,10 @@ def test_the_answer_is_that_of_python(folder, asked):
     data = answer("recognize", asked / "c.csv", "-l", folder, "--top", 5)["movements"][0]
     with kineme.ActionLibrary(folder, read_only=True) as library:
         expected = library.recognize(read_recording(asked / "c.csv"))
-    assert data["confidence"] == expected.confidence
+    assert (data["confidence"], data["certainty"]) == (expected.confidence, expected.certainty)
     assert (data["p_known"], data["rule"], data["promise"]) == (expected.p_known, expected.rule, expected.promise)
     assert {one["symbol"]: one["p_value"] for one in data["ranked"]} == dict(expected.p_values)
+    assert {one["symbol"]: one["probability"] for one in data["ranked"]} == dict(expected.probabilities)
 
 
 def test_a_recording_may_come_through_a_pipe(folder, asked):
@@ -212,12 +213,13 @@ def test_an_answer_that_is_a_guess_says_so(tmp_path, asked, shown, guess):
     assert said["calibrated"] is not guess
     assert (said["rule"] == "guess", "any share" in said["promise"]) == (guess, guess)
     text = run("recognize", asked / "c.csv", "-l", tmp_path / "a").stdout
-    assert ("Which movements are unknown, their confidence, and p-values are a guess" in text) is guess
+    assert said["certainty"] == ("looks like" if guess else "sure")
+    assert ("Which movements are unknown is a guess" in text) is guess
     assert ("two or more of each symbol, 19 in all, to keep --error-rate 0.05" in text) is guess
 
 
-def test_tiny_p_values_are_shown_short_and_complete_as_data(tmp_path):
-    """Without calibration they fall to 1e-100, which says no more than a thousandth does, and widens the table."""
+def test_numbers_are_data_and_the_table_says_the_word(tmp_path):
+    """Without calibration p-values fall to 1e-100, and a confidence of 1 beside a guess contradicts itself."""
     u = np.linspace(0, 1, 50)
     shapes = {"wave": np.column_stack([u, np.sin(6 * u)]), "point": np.column_stack([u**2, u])}
     rng = np.random.default_rng(0)
@@ -227,8 +229,10 @@ def test_tiny_p_values_are_shown_short_and_complete_as_data(tmp_path):
     path = write_movement(tmp_path / "a.csv", {"times": u, "positions": shapes["wave"]})
     (one,) = answer("recognize", path, "-l", tmp_path / "actions")["movements"]
     assert one["ranked"][1]["p_value"] < 1e-3
+    assert (one["rule"], one["confidence"]) == ("guess", pytest.approx(1.0))
     text = run("recognize", path, "-l", tmp_path / "actions").stdout
-    assert "point <0.001" in text
+    assert "looks like" in text
+    assert not any(word in text for word in ("1.00", "p-value", "<0.001"))
 
 
 def test_a_library_of_one_movement_answers_and_says_that_it_guesses(tmp_path):
@@ -238,4 +242,4 @@ def test_a_library_of_one_movement_answers_and_says_that_it_guesses(tmp_path):
     run("learn", tmp_path / "one.csv", "--label", "a", "-l", tmp_path / "l")
     asked = (tmp_path / "other.csv", tmp_path / "strange.csv")
     assert [one["symbol"] for one in answer("recognize", *asked, "-l", tmp_path / "l")["movements"]] == ["a", None]
-    assert "are a guess" in run("recognize", *asked, "-l", tmp_path / "l").stdout
+    assert "is a guess" in run("recognize", *asked, "-l", tmp_path / "l").stdout

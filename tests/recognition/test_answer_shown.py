@@ -22,6 +22,7 @@ def test_answers_join_to_a_table():
     assert table["label"].tolist() == [one.label for one in answers] == DEMOS.labels.tolist()
     assert table["nearest"].tolist() == list(range(6))
     np.testing.assert_array_equal(table["confidence"], [one.confidence for one in answers])
+    assert table["certainty"].tolist() == [one.certainty for one in answers]
 
 
 def test_a_notebook_shows_the_classes_and_runs_nothing():

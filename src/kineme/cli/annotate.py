@@ -54,7 +54,8 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
 
     Every movement is searched for those of the library's symbols, with rests or without between them. Motion that is
     like no symbol is unknown. ELAN and Audacity count seconds from the first sample; tables have the recording's clock.
-    The p-value is the share of movements of known symbols that would be as novel or more.
+    How sure each is, is said as in kineme recognize; files and --json have the numbers. The p-value is the share of
+    movements of known symbols that would be as novel or more.
 
     Example: kineme annotate long.csv --library actions/ -o long-labels.csv
     """
@@ -84,7 +85,7 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
         notes += differences(library.channels, parsed.demonstrations.channels)
     written = [] if output is None else write_annotations(output, found.annotations, sources, form, movements)
     data = {
-        "annotations": [as_row(one) for one in found.annotations],
+        "annotations": [as_row(one) | {"certainty": _certainty(one, found.calibrated)} for one in found.annotations],
         "seconds": float(parsed.demonstrations.durations.sum()),
         "calibrated": found.calibrated,
         "written": [str(one) for one in written],
@@ -98,6 +99,12 @@ def annotate(recordings: tuple[Path, ...], folder: Path, output: Path | None, fo
             write(line, err=True)
     else:
         say(as_json, data, lambda: _text(data, problems))
+
+
+def _certainty(one: Any, calibrated: bool) -> str:
+    from kineme.recognition.certainty import certainty
+
+    return certainty(one.confidence, is_new=one.unknown, is_guess=not calibrated)
 
 
 def _check_folder(target: Path, force: bool) -> None:
@@ -137,8 +144,8 @@ def _text(data: dict[str, Any], problems: list[str]) -> str:
 def _remarks(data: dict[str, Any], problems: list[str]) -> list[str]:
     """What to know of the annotations, and what has none."""
     guess = (
-        "P-values, and what is unknown, are a guess: too few demonstrations tell how much movements of one symbol "
-        "differ; learn more of each"
+        "What is unknown is a guess: too few demonstrations tell how much movements of one symbol differ, so that "
+        "nothing more than looks like a symbol; learn more of each"
     )
     return [*([] if data["calibrated"] else [guess]), *map(printable, data["notes"]), *problems]
 
@@ -146,7 +153,7 @@ def _remarks(data: dict[str, Any], problems: list[str]) -> list[str]:
 def _each(rows: list[dict[str, Any]]) -> Any:
     from kineme.output.table import Table
 
-    heads = ("recording", "start [s]", "end [s]", "symbol", "confidence", "p-value")
+    heads = ("recording", "start [s]", "end [s]", "symbol", "how sure")
     return Table(
         "",
         heads,
@@ -156,8 +163,7 @@ def _each(rows: list[dict[str, Any]]) -> Any:
                 f"{one['start']:.2f}",
                 f"{one['end']:.2f}",
                 "unknown" if one["unknown"] else printable(one["symbol"]),
-                f"{one['confidence']:.2f}",
-                f"{one['p_value']:.2g}",
+                one["certainty"],
             )
             for one in rows
         ],

@@ -14,7 +14,6 @@ from kineme.cli.output import say
 from kineme.cli.reading import known_choices, layout_options, problem_lines, read, recordings_argument
 from kineme.output.text import printable
 
-_SMALLEST = 0.001  # p-value that is shown; JSON has all digits
 _AT_ONCE = 250  # movements recognized between two steps of the progress bar: fewer cost more each
 
 
@@ -35,10 +34,13 @@ def recognize(
 
     A movement that is like no symbol is unknown. What cannot be read is listed.
 
-    Confidence is the probability that the symbol is right if the movement is one of the library's; for an unknown
-    movement it is the share of known movements that are less novel. With --json, the rule says which demonstrations
-    decide what is unknown: those of the symbol (class), those of all symbols (pooled), or too few, as with one of each
-    (guess); the promise says what follows. P-values are then a guess too, and the answer says so.
+    An answer is sure or probably a symbol, or looks like one; what is unknown is new. It never more than looks like a
+    symbol where too few recordings, as one of each symbol, tell what is unknown: that then is a guess.
+
+    --json adds the numbers. The confidence is the probability that the symbol is right if the movement is one of the
+    library's; for an unknown movement it is the share of known movements that are less novel. The rule says which
+    recordings decide what is unknown: those of the symbol (class), those of all symbols (pooled), or too few (guess);
+    the promise says what follows. P-values are then a guess too.
 
     Example: kineme recognize *.csv --library actions/
     """
@@ -78,12 +80,13 @@ def _as_data(source: Any, answer: Any, ids: dict[str, str], top: int) -> dict[st
         "place": source.place,
         "symbol": answer.label,
         "id": None if answer.label is None else ids[answer.label],
+        "certainty": answer.certainty,
         "confidence": answer.confidence,
         "p_known": answer.p_known,
         "rule": answer.rule,
         "promise": answer.promise,
         "calibrated": answer.calibrated,
-        "ranked": [{"symbol": str(name), "p_value": answer.p_values.get(name)} for name in answer.ranked[:top]],
+        "ranked": [_ranked(answer, name) for name in answer.ranked[:top]],
         "like": [{"movement": one.index, "name": one.name, "similarity": one.similarity} for one in answer.nearest],
         "transform": {
             "matrix": transform.matrix.tolist(),
@@ -102,19 +105,19 @@ def _text(data: dict[str, Any], error_rate: float, problems: list[str]) -> str:
     rows = []
     for one in data["movements"]:
         name = f"{one['recording']} {one['place']}".strip()
-        others = ", ".join(f"{printable(each['symbol'])} {_share(each['p_value'])}" for each in one["ranked"])
+        others = ", ".join(printable(each["symbol"]) for each in one["ranked"])
         rows.append(
             (printable(name), "unknown" if one["symbol"] is None else printable(one["symbol"]),
-             f"{one['confidence']:.2f}", others, printable(one["like"][0]["name"] or one["like"][0]["movement"]),
+             one["certainty"], others, printable(one["like"][0]["name"] or one["like"][0]["movement"]),
              "" if one["symbol"] is None else _relative(one["transform"]))
         )  # fmt: skip
-    heads = ("recording", "symbol", "confidence", "ranked, with p-values", "most like", "relative to it")
+    heads = ("recording", "symbol", "how sure", "ranked", "most like", "relative to it")
     lines = [to_text(Table("", heads, rows)), *map(printable, data["notes"])]
-    if not all(one["calibrated"] for one in data["movements"]):
+    if any(one["rule"] == "guess" for one in data["movements"]):
         needed = math.ceil(1 / error_rate - 1 - 1e-9)
         lines.append(
-            "Which movements are unknown, their confidence, and p-values are a guess: too few demonstrations tell how "
-            "much movements of one symbol differ; learn two or more of each symbol, "
+            "Which movements are unknown is a guess: too few demonstrations tell how much movements of one symbol "
+            "differ, so that nothing more than looks like a symbol; learn two or more of each symbol, "
             f"{needed} in all, to keep --error-rate {error_rate:g}"
         )
     return "\n".join(lines + problems)
@@ -126,7 +129,7 @@ def _relative(transform: dict[str, Any]) -> str:
     return f"×{transform['scale'][0]:.2g}, {degrees:+d}°, {transform['duration_ratio']:.2g} × as long"
 
 
-def _share(p_value: float | None) -> str:
-    if p_value is None:
-        return ""
-    return f"{p_value:.2g}" if p_value >= _SMALLEST else f"<{_SMALLEST:g}"
+def _ranked(answer: Any, name: Any) -> dict[str, Any]:
+    """A symbol with its numbers; in a large library the least like have none."""
+    values = {"probability": answer.probabilities.get(name), "p_value": answer.p_values.get(name)}
+    return {"symbol": str(name), **values}

@@ -18,6 +18,7 @@ from kineme.movements.trajectories.labels import Label
 from kineme.movements.trajectories.movements_like import MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.output.table import Table, data_frame, to_html
+from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import RULES, Calibration
@@ -65,6 +66,8 @@ class Answer:
         share differ by 0.03 or less on average (``python -m bench --only open_set``). If unknown, 1 minus `p_known`:
         the share of known movements that are less novel, and no probability, since it is not known how many movements
         are of no class.
+    probabilities : mapping from label to float
+        Probability of each class if the movement is of a known one, see `class_probabilities`; they sum to 1.
     p_known : float
         Share of movements of known classes that would be as novel or more, see `Calibration`.
     p_values : mapping from label to float
@@ -88,6 +91,7 @@ class Answer:
 
     label: Label | None
     confidence: float
+    probabilities: Mapping[Label, float]
     p_known: float
     p_values: Mapping[Label, float]
     rule: str
@@ -103,11 +107,17 @@ class Answer:
         return RULES[self.rule]
 
     @property
+    def certainty(self) -> Certainty:
+        """How sure the answer is: "sure", "probably", "looks like", or "new" if it is unknown.
+
+        Nothing is more than "looks like" where the rule is "guess", whatever the confidence.
+        """
+        return certainty(self.confidence, is_new=self.label is None, is_guess=self.rule == "guess")
+
+    @property
     def in_words(self) -> str:
-        """The label and how sure it is, or what the movement is most like if it is unknown."""
-        if self.label is None:
-            return f"unknown, most like {self.ranked[0]}"
-        return f"{self.label}, confidence {self.confidence:.2f}"
+        """How sure it is and the label, such as "sure GShape"; or what the movement is most like if it is new."""
+        return in_words(self.certainty, str(self.label), str(self.ranked[0]))
 
     def to_pandas(self) -> Any:
         """Return the answer as a table of one row: ``pandas.concat(one.to_pandas() for one in answers)`` joins many.
@@ -115,9 +125,9 @@ class Answer:
         Returns
         -------
         pandas.DataFrame
-            With the columns ``label`` (None if unknown), ``confidence``, ``p_known``, ``rule``, ``calibrated``,
-            ``most_like`` (the best-ranked class), ``nearest`` (index of the nearest demonstration), ``nearest_name``,
-            ``similarity``, ``angle`` [rad] and ``duration_ratio``.
+            With the columns ``label`` (None if unknown), ``certainty``, ``confidence``, ``p_known``, ``rule``,
+            ``calibrated``, ``most_like`` (the best-ranked class), ``nearest`` (index of the nearest demonstration),
+            ``nearest_name``, ``similarity``, ``angle`` [rad] and ``duration_ratio``.
 
         Raises
         ------
@@ -125,14 +135,16 @@ class Answer:
             The package pandas is not installed.
         """
         nearest = self.nearest[0]
-        row = {name: getattr(self, name) for name in ("label", "confidence", "p_known", "rule", "calibrated")}
+        row = {
+            name: getattr(self, name) for name in ("label", "certainty", "confidence", "p_known", "rule", "calibrated")
+        }
         row |= {"most_like": self.ranked[0], "nearest": nearest.index, "nearest_name": nearest.name}
         row |= {"similarity": nearest.similarity, "angle": self.transform.angle}
         row["duration_ratio"] = self.transform.duration_ratio
         return data_frame({name: [value] for name, value in row.items()})
 
     def plot(self, movement: MovementLike | None = None, demonstrations: MovementsLike | None = None) -> Figure:
-        """Draw the p-values of the first ten classes, and the share of each representation in the similarity.
+        """Draw the probabilities of the first ten classes, and the share of each representation in the similarity.
 
         Parameters
         ----------
@@ -157,8 +169,8 @@ class Answer:
 
     def _repr_html_(self) -> str:
         """Show the first ten classes in a notebook; names are escaped."""
-        rows = [(str(label), f"{self.p_values[label]:.2g}") for label in self.ranked[:_LISTED]]
-        return to_html(Table(self.in_words, ("class", "p-value"), rows, self.promise))
+        rows = [(str(label), f"{self.probabilities[label]:.2f}") for label in self.ranked[:_LISTED]]
+        return to_html(Table(self.in_words, ("class", "probability, if it is known"), rows, self.promise))
 
     def __repr__(self) -> str:
         sure = f"confidence={self.confidence:.3g}, rule={self.rule!r}, calibrated={self.calibrated}"
@@ -237,6 +249,7 @@ class Verdict(NamedTuple):
 
     label: Label | None
     confidence: float
+    probabilities: Mapping[Label, float]
     p_known: float
     p_values: Mapping[Label, float]
     rule: str
@@ -268,12 +281,13 @@ def verdicts_of(
     names = [one.name for one in compared.comparison.representations]
     known = np.array([label is not None for label in labels])
     similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
-    right = class_probabilities(similar)[np.arange(len(shown)), shown]
-    confidence = np.where(known, right, 1.0 - p_known).tolist()
+    probabilities = class_probabilities(similar)
+    confidence = np.where(known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(
             labels[i],
             confidence[i],
+            dict(zip(classes, probabilities[i].tolist(), strict=True)),
             float(p_known[i]),
             dict(zip(classes, p[i].tolist(), strict=True)),
             rules[i],

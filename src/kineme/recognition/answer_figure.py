@@ -23,7 +23,7 @@ _NAME = 28  # letters of a name beside its bar
 
 
 def draw_answer(answer: Answer, movement: MovementLike | None, demonstrations: MovementsLike | None) -> Figure:
-    """Bars of p-values and of the shares of the representations; see `Answer.plot`."""
+    """Bars of the probabilities and of the shares of the representations; see `Answer.plot`."""
     if (movement is None) != (demonstrations is None):
         raise SpecificationError(
             "expected the movement and the demonstrations, got one of them; write "
@@ -42,9 +42,9 @@ def draw_answer(answer: Answer, movement: MovementLike | None, demonstrations: M
             draw_movements_beside(left, paths)
         rows = bars.subplots(2, 1, height_ratios=(len(ranked), len(answer.responsibilities)))
         colors = [BLUE if label == answer.label else GRAY for label in ranked]
-        _draw_bars(rows[0], [str(one) for one in ranked], [answer.p_values[one] for one in ranked], colors)
+        _draw_bars(rows[0], [str(one) for one in ranked], [answer.probabilities[one] for one in ranked], colors)
         _draw_bars(rows[1], list(answer.responsibilities), list(answer.responsibilities.values()), GRAY)
-        rows[0].set(xlabel="p-value", title=drawable(shortened(answer.in_words, 2 * _NAME)))
+        rows[0].set(xlabel="probability, if it is known", title=drawable(shortened(answer.in_words, 2 * _NAME)))
         rows[1].set_xlabel("share in the similarity")
     return figure
 

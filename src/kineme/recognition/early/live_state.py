@@ -6,6 +6,7 @@ from enum import Flag, auto
 from typing import NamedTuple
 
 from kineme.movements.trajectories.labels import Label
+from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.validation import Array
 
 
@@ -80,3 +81,23 @@ class LiveState(NamedTuple):
     arrival: float
     skipped: int
     status: LiveStatus
+
+    @property
+    def certainty(self) -> Certainty | None:
+        """How sure it is so far: "looks like", or "new" where unknown has the largest share; None before a movement.
+
+        What begins like a known movement may go on otherwise, so that no more is said before the end.
+        """
+        if not self.ranked:
+            return None
+        best = self.ranked[0].confidence
+        return certainty(best, is_new=self.unknown > best, is_guess=False, is_over=False)
+
+    @property
+    def in_words(self) -> str:
+        """What the movement looks like so far: the decided class, or the most likely one."""
+        word = self.certainty
+        if word is None:
+            return "nothing yet"
+        best = str(self.ranked[0].label)
+        return f"{in_words(word, best if self.label is None else str(self.label), best)} so far"
