@@ -357,3 +357,26 @@ def test_a_name_that_was_learned_in_another_place_is_not_compared_in_order(tmp_p
             for u in [np.linspace(0, 1, 50)]
         ]
         assert library.recognize(Demonstrations.from_dataframe(more))[0].label == "b"
+
+
+@pytest.mark.parametrize(
+    ("heads", "lost"),
+    [
+        (["battery", "hand.y", "hand.x"], None),
+        (["battery", "hand.x", "elbow.x"], r"\['hand.y'\]"),
+        (["hand.x"], r"\['hand.y'\]"),
+    ],
+)
+def test_columns_are_taken_by_name_from_recordings_with_more_and_a_missing_one_is_named(tmp_path, heads, lost):
+    u = np.linspace(0, 1, 40)
+    columns = {"hand.x": np.sin(3 * u), "hand.y": np.cos(2 * u), "battery": 99 - u, "elbow.x": u**2}
+    for name, chosen in (("a", ["hand.x", "hand.y"]), ("more", heads)):
+        pd.DataFrame({"t": u} | {head: columns[head] for head in chosen}).to_csv(tmp_path / f"{name}.csv", index=False)
+    with ActionLibrary(tmp_path / "library", create=True) as actions:
+        actions.learn([kineme.read_recording(tmp_path / "a.csv")], ["wave"])
+        asked = kineme.read_recording(tmp_path / "more.csv")
+        if lost is None:
+            assert actions.recognize(asked).nearest[0].similarity == pytest.approx(1.0)
+        else:
+            with pytest.raises(TrajectoryError, match=f"with the columns {lost} too, which were learned, got .*--col"):
+                actions.recognize(asked)

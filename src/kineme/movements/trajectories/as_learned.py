@@ -20,6 +20,7 @@ from kineme.movements.channels.channel import (
 )
 from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion
 from kineme.movements.channels.coordinates import lever_of
+from kineme.movements.tables.parsed import listed
 from kineme.movements.trajectories.channels import in_coordinates, of_channels
 from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.movements.trajectories.movements_like import MovementsLike
@@ -44,7 +45,7 @@ def as_learned(
     - With channels of the names that were learned, their columns are put in that order and converted to those units,
       others left aside, whatever kind their values look like.
     - With channels of other names, their kinds have to be those that were learned, in their order, discrete ones left
-      aside; units are converted.
+      aside; units are converted. Else what is lacking of names of which others are there is said.
 
     `what` they are called in messages.
 
@@ -98,6 +99,7 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     if moving_kinds(channels) == moving_kinds(learned):
         _check_places(channels, learned, what)
         return _in_units(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
+    _check_lacking(channels, moving, what)
     if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
         raise TrajectoryError(_of_width(demos, learned, n_dims, what))
     raise TrajectoryError(
@@ -137,6 +139,17 @@ def by_names(demos: Demonstrations, learned: Channels, known_units: bool = True)
     ours, wanted = columns_recorded(demos.channels or ()), columns_recorded(learned)
     positions = np.ascontiguousarray(columns_like(raw.positions, ours, wanted, known_units))
     return of_columns(Demonstrations.of_movements(replace(raw.movements, positions=positions), demos.steps), learned)
+
+
+def _check_lacking(channels: Channels, moving: Channels, what: str) -> None:
+    """Refuse columns of which some have names that were learned, while others of these names are not there."""
+    ours, wanted = columns_recorded(channels), columns_recorded(moving)
+    lost = [head for head, name in zip(wanted.heads, wanted.names, strict=True) if name not in ours.names]
+    if len(lost) < len(wanted.heads) and not ours.may_be(wanted):
+        raise TrajectoryError(
+            f"expected {what} with the columns {listed(lost)} too, which were learned, got {listed(ours.heads)}; "
+            f"record them, or {_SAY}"
+        )
 
 
 def _check_places(channels: Channels, learned: Channels, what: str) -> None:
