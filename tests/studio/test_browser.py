@@ -35,7 +35,7 @@ import kineme
 from browsing import Pages, wait_until
 
 WIDTHS = (390, 820, 1440)
-ANSWERED = "['This is', 'Most like', 'The answer'].includes(document.getElementById('verdict-kind').textContent)"
+ANSWERED = "['Sure', 'Probably', 'Looks like', 'New'].includes(document.getElementById('verdict-kind').textContent)"
 VIEWS = ("draw", "library", "move", "recordings", "robot")
 
 
@@ -99,14 +99,18 @@ def test_a_letter_is_recognized_while_it_is_drawn(opened, served_letters, shape)
         wait_until(page, ANSWERED)
         assert page.inner_text(".rank:first-child .rank-name") == shape
         answers.add((page.inner_text("#verdict"), page.inner_text("#spoken")))
-    assert (shape, f"This is {shape}.") in answers  # one in twenty may be called unknown
+        assert page.inner_text("#ranks-kind") == "If it is a known one"  # as while it was drawn
+        assert "p-value" not in page.inner_text(".draw > .panel")
+    page.click("#why summary")
+    assert "p-value" in page.inner_text("#why-text")
+    assert (shape, f"Sure {shape}.") in answers  # one in twenty may be called unknown
 
 
 def test_a_movement_of_no_known_letter_is_unknown(opened, served_letters):
     page = opened(served_letters)
     draw(page, letters("Zshape")[0])
     wait_for_text(page, "#verdict", "Unknown")
-    wait_for_text(page, "#spoken", "Unknown.")  # and nothing about a name: it is open for reading only
+    wait_for_text(page, "#spoken", "New: unknown.")  # and nothing about a name: it is open for reading only
 
 
 #: What looks as if it could change the library: buttons for that, and fields that are filled in for that.
@@ -153,7 +157,7 @@ def test_a_studio_that_knows_nothing_says_what_to_do_and_learns_from_one_drawing
     draw(page, letters("GShape")[3])
     wait_until(page, ANSWERED)
     assert page.inner_text(".rank:first-child .rank-name") == "GShape"
-    assert page.inner_text("#verdict-kind") in {"Most like", "The answer"}  # nothing is sure from two drawings
+    assert page.inner_text("#verdict-kind") in {"Looks like", "New"}  # nothing is sure from two drawings
     held = []
     page.route("**/api/library/movements", lambda route, _: held.append(route))  # storing takes long
     page.click("text=+ GShape")
@@ -408,7 +412,7 @@ def test_a_pen_goes_before_the_hand_that_rests_and_may_be_lifted_unheard(opened,
     for k, kind in enumerate(["mousePressed", *["mouseMoved"] * 30]):
         at = {"x": x + 4 * k, "y": y - 50 * np.sin(k / 5)}
         client.send("Input.dispatchMouseEvent", {"type": kind, **at, **pen, "buttons": 1})
-    assert page.inner_text("#verdict-kind") not in {"Too short", "The answer"}
+    assert page.inner_text("#verdict-kind") not in {"Too short", "Sure", "Probably", "Looks like", "New"}
     client.send("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": x, "y": y, "pointerType": "pen", "buttons": 0})
     wait_until(page, ANSWERED)
     client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
@@ -595,7 +599,9 @@ def test_every_view_fits_its_window(opened, served_letters):
 
 #: What the panel says of a movement of which this much is done, with the evidence that it is unknown.
 SAYS = """([progress, unknown]) => import("/draw/answer_panel.js").then(({ AnswerPanel }) => {
-  new AnswerPanel().drawing({ ranked: [], unknown, decided: null, progress, arrival: null }, 0);
+  const certainty = unknown > 0.5 ? "new" : "looks like";
+  const ranked = [{ name: "A", probability: 1 }];
+  new AnswerPanel().drawing({ ranked, unknown, certainty, decided: null, progress, arrival: null }, 0);
   return document.getElementById("verdict").textContent;
 })"""
 

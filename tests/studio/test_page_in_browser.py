@@ -85,6 +85,11 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     page.get_by_role("button", name="Clear").click()
     draw(page)
     assert page.evaluate("kineme.state.answer.ranked[0]") == "GShape"
+    word = page.evaluate("kineme.state.answer.certainty")
+    assert page.locator("#certainty").inner_text() == word.capitalize()
+    shares = page.locator("#bars li .value").all_inner_texts()
+    assert abs(sum(int(share.removesuffix(" %")) for share in shares) - 100) <= 3
+    assert "p-value" not in page.inner_text("main")
     before = page.evaluate("kineme.state.moving.positions")
     page.mouse.move(*handle(page, "goal"))
     page.mouse.down()
@@ -95,6 +100,8 @@ def test_a_letter_is_drawn_recognized_and_dragged(opened, width):
     assert np.linalg.norm(np.array(after[-1]) - before[-1]) > 0.5 * np.linalg.norm(
         np.array(page.evaluate("kineme.state.moving.goal")) - before[-1]
     )
+    page.click("#why summary")
+    assert "p-value" in page.inner_text("#numbers")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.get_by_role("button", name=HOSTILE).click()
     seen = page.locator("#verdict").bounding_box()

@@ -341,6 +341,8 @@ def test_the_answer_is_that_of_the_library(client, folder):
     with ActionLibrary(folder, read_only=True) as library:
         ours = library.recognize(_array(given))
     assert (answer["label"], answer["calibrated"]) == (ours.label, ours.calibrated)
+    assert answer["certainty"] == ours.certainty
+    assert {one["name"]: one["probability"] for one in answer["ranked"]} == pytest.approx(dict(ours.probabilities))
     assert answer["p_values"] == pytest.approx(dict(ours.p_values))
     assert [one["name"] for one in answer["ranked"]] == list(ours.ranked)
     assert [one["p_value"] for one in answer["ranked"]] == pytest.approx([ours.p_values[name] for name in ours.ranked])

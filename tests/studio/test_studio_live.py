@@ -69,6 +69,8 @@ def test_states_are_those_of_a_stream_of_the_library_that_expects_another_tempo(
         state = _said(socket, "state")
     assert [one["name"] for one in state["ranked"]] == [one.label for one in ours.ranked]
     assert state["ranked"][0]["share"] == pytest.approx(ours.ranked[0].confidence)
+    assert state["ranked"][0]["probability"] == pytest.approx(ours.ranked[0].confidence / (1 - ours.unknown))
+    assert state["certainty"] == ours.certainty
     assert state["progress"] == pytest.approx(ours.progress)
     assert np.array(state["path"]) == pytest.approx(ours.path)
 

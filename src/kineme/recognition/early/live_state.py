@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Flag, auto
 from typing import NamedTuple
 
+import numpy as np
+
 from kineme.movements.trajectories.labels import Label
 from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.validation import Array
@@ -92,6 +94,12 @@ class LiveState(NamedTuple):
             return None
         best = self.ranked[0].confidence
         return certainty(best, is_new=self.unknown > best, is_guess=False, is_over=False)
+
+    @property
+    def probabilities(self) -> dict[Label, float]:
+        """Probability of each class if the movement is of a known one, most likely first: as that of an `Answer`."""
+        known = max(1.0 - self.unknown, np.finfo(float).tiny)
+        return {one.label: one.confidence / known for one in self.ranked}
 
     @property
     def in_words(self) -> str:

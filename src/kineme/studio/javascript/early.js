@@ -1,6 +1,7 @@
 // A movement while it is under way: which stored one, how much of it, and what remains.
 
 import { argmax, descending, interpolate, linspace, softmax } from "./arrays.js";
+import { certainty } from "./certainty.js";
 import { N_POINTS } from "./description.js";
 import { logEvidence, shares } from "./evidence.js";
 import { beginnings } from "./hypotheses.js";
@@ -61,7 +62,7 @@ function decision(confidence, patience) {
  * @param {{confidence?: number, patience?: number}} [options]
  */
 export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
-  const { classes, comparison: { n_dims: d, cutoff } } = stored.known.header;
+  const { classes, certainty: least, comparison: { n_dims: d, cutoff } } = stored.known.header;
   const decide = decision(confidence, patience);
   let [leader, furthest] = [-1, 0];
   /**
@@ -91,7 +92,9 @@ export function follow(stored, { confidence = 0.9, patience = 0.05 } = {}) {
     leader = shown;
     return {
       ranked: order.map((c) => ({ name: classes[c], share: share[c] })),
+      probabilities: Object.fromEntries(order.map((c) => [classes[c], share[c] / Math.max(1 - share[classes.length], Number.MIN_VALUE)])),
       unknown: share[classes.length],
+      certainty: certainty(least, share[order[0]], { isNew: share[classes.length] > share[order[0]], isOver: false }),
       decided: decided === null ? null : classes[decided],
       progress: Math.min(furthest, 1),
       arrival: times[n - 1] + ahead.seconds,

@@ -1,6 +1,7 @@
 // What a movement is, or that it is unknown: similarities, classes, calibrated p-values.
 
 import { argmax, descending, logSumExp, softmax } from "./arrays.js";
+import { certainty } from "./certainty.js";
 import { describeMovement, fillShapes, featureRows, N_POINTS, roomForShapes } from "./description.js";
 import { squaredDistances } from "./distances.js";
 
@@ -39,9 +40,10 @@ const SHARES = {
  * @property {number} confidence
  * @property {number} pKnown
  * @property {Object<string, number>} pValues
- * @property {Object<string, number>} shares probability of each class if it is one of them
+ * @property {Object<string, number>} probabilities of each class if it is one of them
  * @property {string} rule class, pooled or guess
  * @property {boolean} calibrated
+ * @property {"sure"|"probably"|"looks like"|"new"} certainty
  * @property {string[]} ranked
  * @property {{index: number, similarity: number}[]} nearest
  * @property {Object<string, number>} responsibilities
@@ -223,8 +225,9 @@ export function recognize(known, one, errorRate = 0.05) {
     confidence: isKnown ? odds[shown] : 1 - p.known,
     pKnown: p.known,
     pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
-    shares: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
+    probabilities: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
     rule: p.rule,
+    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: p.rule === "guess" }),
     calibrated: p.calibrated,
     ranked: ranked.map((c) => classes[c]),
     nearest,

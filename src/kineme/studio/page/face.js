@@ -66,8 +66,9 @@ function paintMoving(moving) {
   if (state.played !== null) stage.dot(moving.positions[state.played], "--predicted");
 }
 
-/** Words of the answer; a reader of the screen is told once for each verdict. */
-function say(verdict, reason, kind = "") {
+/** Words of the answer, and how sure it is; a reader of the screen is told once for each verdict. */
+function say(verdict, reason, kind = "", sure = "") {
+  element("certainty").textContent = sure && sure[0].toUpperCase() + sure.slice(1);
   const said = element("verdict");
   if (said.textContent !== verdict) said.replaceChildren(...breakable(verdict));
   said.title = verdict;
@@ -77,41 +78,52 @@ function say(verdict, reason, kind = "") {
 
 function showLive() {
   const { live } = state;
+  why([]);
   if (!live) return say("…", "Go on drawing.");
-  const begun = live.decided !== null || live.progress >= BEGUN;
-  const sure = begun ? live.decided ?? live.ranked[0].name : "…";
-  const unknown = begun && live.unknown > live.ranked[0].share;
-  say(unknown ? "Unknown so far" : sure, `${percent(live.progress)} done, ${live.decided ? "decided" : "not decided yet"}`, unknown ? "unknown" : "");
-  bars([...live.ranked, { name: null, share: live.unknown }]);
+  const done = `${percent(live.progress)} done`;
+  if (live.decided === null && live.progress < BEGUN) say("…", done);
+  else if (live.certainty === "new") say("Unknown", `${done}, most like ${live.ranked[0].name}`, "unknown", "new, so far");
+  else say(live.decided ?? live.ranked[0].name, done, "", `${live.certainty}, so far`);
+  bars(live.probabilities);
 }
 
 function showAnswer() {
   const { answer, moving } = state;
+  why([]);
   if (!answer) return say(moving ? moving.name : "What is it?", moving ? "Drag its start, its goal, or the path itself." : "Draw a movement: with a mouse, a pen or a finger. Or choose a known one.");
-  const guess = answer.calibrated ? "" : " One drawing of each is known: the verdict is a guess.";
-  if (answer.label === null) say("Unknown", `Nearest is ${answer.ranked[0]}; only ${percent(answer.pKnown)} of known movements differ as much.${guess}`, "unknown");
-  else say(answer.label, `${percent(answer.confidence)} sure.${guess} Drag its start, its goal, or the path; or clear it and draw another.`);
-  const unknown = answer.label === null ? 1 - answer.pKnown : 0;
-  bars([...answer.ranked.map((name) => ({ name, share: answer.shares[name] * (1 - unknown) })), { name: null, share: unknown }]);
+  const more = answer.rule === "guess" ? "More drawings of each would say how sure. " : "";
+  if (answer.label === null) say("Unknown", `Most like ${answer.ranked[0]}. ${more}`, "unknown", answer.certainty);
+  else say(answer.label, `${more}Drag its start, its goal, or the path; or clear it and draw another.`, "", answer.certainty);
+  why([
+    `${percent(answer.pKnown)} of known movements differ as much.`,
+    `p-values: ${answer.ranked.slice(0, ROWS).map((name) => `${name} ${answer.pValues[name].toPrecision(2)}`).join(", ")}`,
+    `Similarity to the nearest: ${answer.nearest[0].similarity.toFixed(2)}`,
+  ]);
+  bars(answer.probabilities);
 }
 
-/** The most likely ones, always as many rows; names are text. */
-function bars(ranked) {
-  const shown = ranked.slice().sort((a, b) => b.share - a.share).slice(0, ROWS);
+/** The numbers, for who asks. */
+function why(reasons) {
+  element("why").hidden = !reasons.length;
+  element("numbers").replaceChildren(...reasons.map((textContent) => make("p", { textContent })));
+}
+
+/** The most likely ones, if it is a known one; always as many rows; names are text. */
+function bars(probabilities) {
+  const shown = Object.entries(probabilities).sort((a, b) => b[1] - a[1]).slice(0, ROWS);
   [...element("bars").children].forEach((row, i) => {
-    const one = shown[i];
     const [name, track, value] = row.children;
-    name.textContent = one ? one.name ?? "unknown" : "";
-    row.className = one?.name ? "" : "unknown";
-    value.textContent = one ? percent(one.share) : "";
-    track.firstChild.style.width = `${100 * (one?.share ?? 0)}%`;
+    const [label, share] = shown[i] ?? ["", 0];
+    name.textContent = label;
+    value.textContent = label && percent(share);
+    track.firstChild.style.width = `${100 * share}%`;
   });
 }
 
 function clear() {
   Object.assign(state, { stroke: null, live: null, answer: null, moving: null, drawn: null, note: "", pointer: null, held: null });
   known.select(null);
-  bars([]);
+  bars({});
   showAnswer();
   later();
 }
@@ -150,7 +162,7 @@ function finish() {
     known.select(state.answer.label);
   } catch {
     state.note = "That was too short: draw a longer movement.";
-    bars([]);
+    bars({});
   }
   showAnswer();
   later();

@@ -16,6 +16,7 @@ from kineme.validation import LARGEST, Array
 MOST_SAMPLES = 10_000  # in one message
 _MOST_WAITING = 200  # messages that are taken in again when the library has changed: a few seconds
 _EMPTY: dict[str, Any] = {
+    "certainty": None,
     "ranked": [],
     "unknown": None,
     "decided": None,

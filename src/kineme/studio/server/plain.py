@@ -52,10 +52,18 @@ def plain_answer(answer: Answer) -> dict[str, Any]:
     """An answer of a library; `ranked` is best first."""
     return {
         "label": answer.label,
+        "certainty": answer.certainty,
         "confidence": numbers(answer.confidence),
         "p_known": numbers(answer.p_known),
         "p_values": {str(name): numbers(value) for name, value in answer.p_values.items()},
-        "ranked": [{"name": name, "p_value": numbers(answer.p_values.get(name, np.nan))} for name in answer.ranked],
+        "ranked": [
+            {
+                "name": name,
+                "probability": numbers(answer.probabilities.get(name, np.nan)),
+                "p_value": numbers(answer.p_values.get(name, np.nan)),
+            }
+            for name in answer.ranked
+        ],
         "nearest": [
             {"id": near.index, "name": near.name, "similarity": numbers(near.similarity)} for near in answer.nearest
         ],
@@ -67,8 +75,13 @@ def plain_answer(answer: Answer) -> dict[str, Any]:
 
 def plain_state(state: LiveState) -> dict[str, Any]:
     """A movement under way: the most likely classes, best first, and what is predicted."""
+    probabilities = state.probabilities
     return {
-        "ranked": [{"name": one.label, "share": numbers(one.confidence)} for one in state.ranked[:_SHOWN]],
+        "certainty": state.certainty,
+        "ranked": [
+            {"name": one.label, "share": numbers(one.confidence), "probability": numbers(probabilities[one.label])}
+            for one in state.ranked[:_SHOWN]
+        ],
         "unknown": numbers(state.unknown),
         "decided": state.label,
         "progress": numbers(state.progress),

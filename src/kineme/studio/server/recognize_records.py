@@ -16,9 +16,10 @@ class Asked(Sent):
 
 
 class RankedOut(BaseModel):
-    """A class, and its p-value."""
+    """A class, its probability if the movement is of a known one, and its p-value."""
 
     name: str
+    probability: float | None
     p_value: float | None
 
 
@@ -34,6 +35,7 @@ class AnswerOut(BaseModel):
     """What a movement is; label null is unknown."""
 
     label: str | None
+    certainty: str
     confidence: float | None
     p_known: float | None
     p_values: dict[str, float | None]

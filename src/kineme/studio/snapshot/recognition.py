@@ -16,6 +16,7 @@ from kineme.kernels.shapes import Shapes
 from kineme.movements.preparation.pauses import without_pauses
 from kineme.movements.preparation.spline import spline_matrix
 from kineme.movements.trajectories.demonstrations import Demonstrations
+from kineme.recognition.certainty import LEAST_CONFIDENCE
 from kineme.recognition.classifiers import Classifier, Nearest, NearestEach, Prototype
 from kineme.recognition.conformal import Calibration
 from kineme.recognition.known_classes import KnownClasses
@@ -46,6 +47,7 @@ def recognition_parts(known: KnownClasses) -> Snapshot:
         "first": known.references.first.tolist(),
         "comparison": comparison,
         "calibration": calibration,
+        "certainty": dict(LEAST_CONFIDENCE),
         **_classifier(known.classifier),
     }
     paths = even_paths(demos, 0, len(demos), known.comparison.cutoff)

@@ -6,6 +6,7 @@ import { library } from "../parts/library_state.js";
 const ROWS = 5;
 const BEGUN = 0.1; // share of the path from which unknown is said: every beginning is unlike the whole
 const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
+const capital = (/** @type {string} */ word) => word[0].toUpperCase() + word.slice(1);
 const pValue = (/** @type {number} */ p) => (p < 0.001 ? "< 0.001" : p.toFixed(p < 0.1 ? 3 : 2));
 
 /** @param {string} name */
@@ -17,9 +18,7 @@ function row(name) {
 export class AnswerPanel {
   constructor() {
     this.rows = [...Array(ROWS)].map(() => row("\u00a0"));
-    this.unknown = row("unknown");
-    this.unknown.element.classList.add("unknown");
-    fill(byId("ranks"), ...this.rows.map((one) => one.element), this.unknown.element);
+    fill(byId("ranks"), ...this.rows.map((one) => one.element));
     this.last = "";
     this.idle();
   }
@@ -27,8 +26,8 @@ export class AnswerPanel {
   idle() {
     this.words("Nothing drawn yet", "–", "\u00a0", "open");
     this.progress(0);
-    this.kind("Evidence for each name");
-    this.list([], null, percent);
+    this.list([]);
+    this.why([]);
   }
 
   /** @param {string} kind @param {string} word @param {string} note @param {string} state open, known, unknown */
@@ -39,9 +38,10 @@ export class AnswerPanel {
     byId("verdict").parentElement.dataset.state = state;
   }
 
-  /** @param {string} text What the bars mean. */
-  kind(text) {
-    write(byId("ranks-kind"), text);
+  /** @param {string[]} reasons Sentences with the numbers, for who asks. */
+  why(reasons) {
+    byId("why").hidden = !reasons.length;
+    fill(byId("why-text"), ...reasons.map((text) => make("p", {}, text)));
   }
 
   /** @param {number} share */
@@ -51,15 +51,15 @@ export class AnswerPanel {
     meter.firstElementChild.style.setProperty("--share", String(share));
   }
 
-  /** @param {{name: string, value: number}[]} ranked @param {number|null} unknown @param {(value: number) => string} text */
-  list(ranked, unknown, text) {
-    this.rows.forEach((one, k) => this.set(one, ranked[k]?.name ?? "\u00a0", ranked[k]?.value ?? null, text));
-    this.set(this.unknown, "unknown", unknown, text);
+  /** The same while it is drawn and after: how likely each name is, if it is a known one. @param {{name: string, probability: number|null}[]} ranked */
+  list(ranked) {
+    write(byId("ranks-kind"), "If it is a known one");
+    this.rows.forEach((one, k) => this.set(one, ranked[k]?.name ?? "\u00a0", ranked[k]?.probability ?? null));
   }
 
-  set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value, /** @type {(value: number) => string} */ text) {
+  set(/** @type {any} */ one, /** @type {string} */ name, /** @type {number|null} */ value) {
     write(one.name, name);
-    write(one.value, value === null ? "" : text(value));
+    write(one.value, value === null ? "" : percent(value));
     one.bar.style.setProperty("--share", String(value ?? 0));
     one.element.classList.toggle("nothing", value === null);
   }
@@ -67,34 +67,35 @@ export class AnswerPanel {
   /** While it is drawn. @param {any} state @param {number} now Time of the last sample [s]. */
   drawing(state, now) {
     const best = state.ranked[0];
-    const unknown = state.unknown ?? 0;
     const left = Number.isFinite(state.arrival) && state.arrival !== null ? Math.max(state.arrival - now, 0) : null;
-    const note = [state.progress === null ? "" : `${percent(state.progress)} of the path`, left === null ? "" : `arrives in ${left.toFixed(1)} s`];
-    if (state.decided !== null) this.words("Decided while drawing", state.decided, note.filter(Boolean).join(", "), "known");
-    else if (best && best.share >= 0.5) this.words("Probably", best.name, note.filter(Boolean).join(", "), "open");
-    else if (unknown > 0.5 && state.progress >= BEGUN) this.words("Probably", "Unknown", "like nothing that is known so far", "open");
-    else this.words("Still open", "…", note.filter(Boolean).join(", "), "open");
+    const note = [state.progress === null ? "" : `${percent(state.progress)} of the path`, left === null ? "" : `arrives in ${left.toFixed(1)} s`].filter(Boolean).join(", ");
+    const name = state.decided ?? best?.name;
+    if (!best || (state.decided === null && state.progress < BEGUN)) this.words("Still open", "…", note, "open");
+    else if (state.certainty === "new") this.words("New, so far", "Unknown", `most like ${best.name}`, "open");
+    else this.words(`${capital(state.certainty)}, so far`, name, note, state.decided === null ? "open" : "known");
     this.progress(state.progress ?? 0);
-    this.kind("Evidence for each name so far");
-    this.list(state.ranked.map((/** @type {any} */ one) => ({ name: one.name, value: one.share })), state.unknown, percent);
-    if (state.decided !== null) this.speak(`Decided: ${state.decided}`);
+    this.list(state.ranked);
+    this.why([]);
+    if (state.decided !== null && state.certainty !== "new") this.speak(`${capital(state.certainty)} ${name}, so far.`);
   }
 
   /** Of the whole movement. @param {any} answer */
   final(answer) {
-    const ranked = answer.ranked.map((/** @type {any} */ one) => ({ name: one.name, value: one.p_value ?? 0 }));
-    const nearest = answer.nearest?.[0];
-    const like = nearest ? `similarity ${nearest.similarity.toFixed(2)}` : "";
-    if (answer.label === null) this.words("The answer", "Unknown", `unlike everything that is known${answer.p_known === null ? "" : `, p-value ${pValue(answer.p_known)}`}`, "unknown");
-    else {
-      const p = ranked.find((/** @type {any} */ one) => one.name === answer.label)?.value;
-      const sure = answer.calibrated ? `p-value ${pValue(p ?? 0)}` : "a guess until more is drawn";
-      this.words(answer.calibrated ? "This is" : "Most like", answer.label, [sure, like].filter(Boolean).join(", "), answer.calibrated ? "known" : "open");
-    }
+    const [best] = answer.ranked;
+    const isNew = answer.certainty === "new";
+    const word = capital(answer.certainty);
+    if (isNew) this.words(word, "Unknown", `most like ${best.name}`, "unknown");
+    else this.words(word, answer.label, answer.rule === "guess" ? "more drawings of each would say how sure" : "", answer.certainty === "looks like" ? "open" : "known");
     this.progress(1);
-    this.kind("p-value of each name");
-    this.list(ranked, null, pValue);
-    this.speak(answer.label === null ? `Unknown.${library().read_only ? "" : " Give it a name."}` : `${answer.calibrated ? "This is" : "Most like"} ${answer.label}.`);
+    this.list(answer.ranked);
+    const nearest = answer.nearest?.[0];
+    this.why([
+      answer.p_known === null ? "" : `p-value of being known: ${pValue(answer.p_known)}`,
+      `p-values of names: ${answer.ranked.slice(0, ROWS).filter((/** @type {any} */ one) => one.p_value !== null).map((/** @type {any} */ one) => `${one.name} ${pValue(one.p_value)}`).join(", ")}`,
+      nearest ? `similarity to the nearest: ${nearest.similarity.toFixed(2)}` : "",
+      answer.promise,
+    ].filter(Boolean));
+    this.speak(isNew ? `New: unknown.${library().read_only ? "" : " Give it a name."}` : `${word} ${answer.label}.`);
   }
 
   /** To a screen reader, once each. @param {string} text */

@@ -1,0 +1,13 @@
+// How sure an answer is, in one of four words, as kineme.recognition.certainty says it; thresholds are the snapshot's.
+
+/**
+ * @param {Object<string, number>} least word -> the least confidence that it takes
+ * @param {number} confidence
+ * @param {{isNew: boolean, isGuess?: boolean, isOver?: boolean}} what
+ * @returns {"sure"|"probably"|"looks like"|"new"}
+ */
+export function certainty(least, confidence, { isNew, isGuess = false, isOver = true }) {
+  if (isNew) return "new";
+  if (isGuess || !isOver || !(confidence >= least.probably)) return "looks like";
+  return confidence >= least.sure ? "sure" : "probably";
+}
