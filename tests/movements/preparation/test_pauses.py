@@ -69,3 +69,17 @@ def test_some_of_many_movements_are_cut_as_they_are_alone():
         alone, among = without_pauses(demos, i, i + 1), every[i]
         np.testing.assert_allclose(alone[0].times, among.times, atol=1e-9)
         np.testing.assert_array_equal(alone[0].positions, among.positions)
+
+
+@pauses
+def test_a_turned_movement_is_cut_where_it_was(seed, seconds, at_rest, noise, d):
+    demos = interrupted(draw_shapes([2], d, seed, n_samples=60 + seed % 90), seconds, at_rest, noise, seed)
+    rotation = np.linalg.qr(np.random.default_rng(seed).normal(size=(d, d)))[0]
+    turned = kineme.Demonstrations.from_arrays(
+        [demo.positions @ rotation.T for demo in demos], times=[demo.times for demo in demos]
+    )
+    times, positions, ends = cut(demos)
+    turned_times, turned_positions, turned_ends = cut(turned)
+    np.testing.assert_array_equal(ends, turned_ends)
+    np.testing.assert_allclose(times, turned_times, atol=1e-9)
+    np.testing.assert_allclose(positions @ rotation.T, turned_positions, atol=1e-9)

@@ -76,15 +76,13 @@ def _fill_rests(positions, steps, kept):  # type: ignore[no-untyped-def]
     n, window, size = len(positions), SHORTEST, 0.0
     while 2 * WINDOWS * window <= n:
         window *= 2
-    for k in range(positions.shape[1]):
-        low = high = positions[0, k]
-        for j in range(n):
-            low, high = min(low, positions[j, k]), max(high, positions[j, k])
-        size = max(size, high - low)
+    for j in range(1, n):
+        size = max(size, _squared_distance(positions, 0, j))
+    most_apart = RADIUS * RADIUS * size
     until, motion, count = 0, 0.0, 0
     for j in range(n):
         kept[j] = True
-        if j + window <= n and _is_still(positions, j, window, RADIUS * size):
+        if j + window <= n and _is_still(positions, j, window, most_apart):
             until = j + window - 1
         if j < until:
             kept[j] = False  # for now: it rests
@@ -112,16 +110,17 @@ def _fill_rests(positions, steps, kept):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _is_still(positions, begin, window, radius):  # type: ignore[no-untyped-def]
-    """Whether the samples of a window stay within the radius; ends that are apart settle it for most."""
-    end = begin + window - 1
-    for k in range(positions.shape[1]):
-        if abs(positions[end, k] - positions[begin, k]) > radius:
-            return False
-    for k in range(positions.shape[1]):
-        low = high = positions[begin, k]
-        for j in range(begin + 1, end + 1):
-            low, high = min(low, positions[j, k]), max(high, positions[j, k])
-        if high - low > radius:
+def _is_still(positions, begin, window, most_apart):  # type: ignore[no-untyped-def]
+    """Whether the samples of a window stay near its first; its last settles it for most windows."""
+    for j in range(begin + window - 1, begin, -1):  # noqa: SIM110 - Numba compiles no generators
+        if _squared_distance(positions, begin, j) > most_apart:
             return False
     return True
+
+
+@jit
+def _squared_distance(positions, i, j):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for k in range(positions.shape[1]):
+        total += (positions[j, k] - positions[i, k]) ** 2
+    return total

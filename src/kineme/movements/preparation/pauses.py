@@ -10,7 +10,8 @@ from kineme.movements.trajectories.movements import Movements
 from kineme.runtime.compiled import compiled_module, use_compiled
 from kineme.validation import Array
 
-#: A rest stays within this share of the movement's extent. Of hands the noise at rest is below, and corners are above.
+#: A rest stays within this share of the movement's reach, which is its largest distance from its first sample. Of
+#: hands the noise at rest is below, and corners are above.
 RADIUS = 0.015
 #: Longer steps than so many median ones are gaps.
 GAP = 3.0
@@ -45,10 +46,11 @@ def cut_pauses(times: Array, positions: Array, offsets: NDArray[np.intp]) -> Par
     """Cut short the time in which a movement does not move, or in which nothing was recorded of it.
 
     So that a drawing during which somebody stopped to think is the drawing that it would have been: smoothing by cycles
-    of a movement and representations over time divide by its duration. A gap is a step longer than three median ones; a
-    rest is a run of windows, of about a 32nd of the samples each, that stay within 0.015 of the largest extent. Each
-    counts as at most a tenth of the time in motion, a rest at the end as a quarter. A rest keeps as many samples as fit
-    into that, evenly spaced.
+    of a movement and representations over time divide by its duration. A gap is a step longer than three median ones. A
+    rest is a run of windows, of about a 32nd of the samples each, that stay near the sample in which they begin: within
+    0.015 of the movement's reach, its largest distance from its first sample, whatever its direction. Each counts as at
+    most a tenth of the time in motion, a rest at the end as a quarter. A rest keeps as many samples as fit into that,
+    evenly spaced.
 
     Parameters
     ----------
@@ -117,20 +119,18 @@ def _fill_shortened(
 def _resting(positions: Array, offsets: NDArray[np.intp], owner: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Whether the step after each sample belongs to a window of samples that stays in its place."""
     first, last, total = offsets[:-1], offsets[1:] - 1, len(positions)
-    extents = np.maximum.reduceat(positions, first) - np.minimum.reduceat(positions, first)
-    radius = (RADIUS * extents.max(axis=1))[owner]
+    from_first = np.linalg.norm(positions - positions[first][owner], axis=1)
+    radius = (RADIUS * np.maximum.reduceat(from_first, first))[owner]
     windows = np.full(len(first), SHORTEST)
     while (wider := 2 * WINDOWS * windows <= np.diff(offsets)).any():
         windows[wider] *= 2
     own = windows[owner]
-    high, low = positions.copy(), positions.copy()  # largest and smallest of the next `width` samples
-    marks, width = np.zeros(total + 1), 1
-    while width < windows.max():
-        high[:-width] = np.maximum(high[:-width], high[width:])
-        low[:-width] = np.minimum(low[:-width], low[width:])
-        width *= 2
-        inside = (own == width) & (np.arange(total) + width - 1 <= last[owner])
-        still = np.flatnonzero(inside & ((high - low).max(axis=1) <= radius))
-        np.add.at(marks, still, 1)
-        np.add.at(marks, still + width - 1, -1)
+    still = np.arange(total) + own - 1 <= last[owner]
+    for ahead in range(1, int(windows.max())):
+        begins = np.flatnonzero(still & (ahead < own))
+        apart = np.linalg.norm(positions[begins + ahead] - positions[begins], axis=1)
+        still[begins[apart > radius[begins]]] = False
+    begins, marks = np.flatnonzero(still), np.zeros(total + 1)
+    np.add.at(marks, begins, 1)
+    np.add.at(marks, begins + own[begins] - 1, -1)
     return np.asarray(np.cumsum(marks[:-1]) > 0)

@@ -3,7 +3,7 @@
 const GAP = 3; // median steps: longer ones are gaps
 const PAUSE = 0.1; // of the time in motion: a gap or a rest counts at most as much
 const LAST_REST = 0.25; // the same of a rest at the end
-const RADIUS = 0.015; // of the extent, within which a rest stays
+const RADIUS = 0.015; // of the reach from the first sample: so near to where a window begins a rest stays
 const [SHORTEST, WINDOWS] = [4, 32]; // samples of a window, at least; windows in a movement
 const FEWEST = 3; // steps that a rest is left, at least
 const ROUNDS = 3;
@@ -72,16 +72,16 @@ function restingSteps({ times, positions, d }) {
   const n = times.length;
   let [window, size] = [SHORTEST, 0];
   while (2 * WINDOWS * window <= n) window *= 2;
-  const range = (begin, end, k) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (let j = begin; j < end; j++) [low, high] = [Math.min(low, positions[j * d + k]), Math.max(high, positions[j * d + k])];
-    return high - low;
+  const apart = (i, j) => {
+    let total = 0;
+    for (let k = 0; k < d; k++) total += (positions[j * d + k] - positions[i * d + k]) ** 2;
+    return total;
   };
-  for (let k = 0; k < d; k++) size = Math.max(size, range(0, n, k));
+  for (let j = 1; j < n; j++) size = Math.max(size, apart(0, j));
   const resting = new Uint8Array(n);
   for (let begin = 0, until = 0; begin < n; begin++) {
     let still = begin + window <= n;
-    for (let k = 0; still && k < d; k++) still = range(begin, begin + window, k) <= RADIUS * size;
+    for (let j = begin + window - 1; still && j > begin; j--) still = apart(begin, j) <= RADIUS * RADIUS * size;
     if (still) until = begin + window - 1;
     resting[begin] = begin < until ? 1 : 0;
   }
