@@ -122,7 +122,8 @@ def test_positions_in_a_unit_that_is_not_said_are_in_the_one_that_was_learned(sh
     learned = recognizer.comparison_.checked(made)
     np.testing.assert_allclose(learned.positions[-1, 3:], demos.positions[-1, 3:], atol=2)
     meters = poses((GRIPPER, *(one._replace(unit="m") for one in XYZ), Q))
-    np.testing.assert_array_equal(recognizer.comparison_.checked(meters).positions, meters.positions)
+    said = recognizer.comparison_.checked(meters).positions  # converted, and so is the lever of the orientations
+    np.testing.assert_allclose(said, 1000 * meters.positions, rtol=1e-12, atol=1e-9)
 
 
 def test_angles_are_unwrapped(of_angles):
