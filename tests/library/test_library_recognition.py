@@ -280,13 +280,18 @@ def test_a_library_with_one_symbol_knows_it_from_others(make):
         assert list(answer.p_values) == ["kind 00"]
 
 
+def test_a_library_of_one_movement_guesses(make):
+    library = make(_kinds([1]))
+    for recognizing in (library, LibraryRecognizer(library.store, exhaustive=0)):
+        (answer,) = recognizing.recognize(_questions([1]))
+        assert (answer.label, answer.rule, answer.calibrated) == ("kind 00", "guess", False)
+
+
 def test_what_cannot_be_answered_says_why(make):
     library = make()
     library.learn(_kinds([2]), labels=[None, None])
     with pytest.raises(SpecificationError, match=r"that show a symbol, got none among its 2; learn some with"):
         library.recognize(_questions([1]))
-    with pytest.raises(SpecificationError, match=r"expected training movements that differ, got one movement"):
-        make(_kinds([1]), "one").recognize(_questions([1]))
     for exhaustive in (0, 1000):
         recognizing = LibraryRecognizer(make(_kinds([2, 2]), f"two {exhaustive}").store, exhaustive)
         with pytest.raises(TrajectoryError, match=r"expected movements of 2 dimensions as in fit, got 3"):
