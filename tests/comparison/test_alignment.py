@@ -97,7 +97,7 @@ def test_the_medoid_is_the_most_typical():
     primitives = kineme.DMP().learn(demos)
     typical = K.sum(axis=1)
     assert medoid_of(demos) == typical.argmax()
-    assert typical[prototype(primitives).medoid] >= 0.98 * typical.max()  # of replays, whose slow ends count less
+    assert typical[prototype(primitives).medoid] >= 0.95 * typical.max()  # of replays, whose slow ends count less
     assert prototype(primitives, medoid=2).medoid == 2
     assert medoid_of(demos[[1, 1, 1, 1]]) == medoid_of(demos[:2]) == 0
 
