@@ -83,7 +83,8 @@ def test_every_gesture_of_a_session_is_named_and_the_topic_is_that_of_the_librar
         "Read topic /tool of geometry_msgs/msg/PoseStamped, as the movements of the library; say --topic or --frame "
         "for others"
     ]
-    assert "/kineme/annotations" in {one["topic"] for one in answer("inspect", out)["contents"]["topics"]}
+    inspected = answer("inspect", out, "--topic", "/tool")
+    assert "/kineme/annotations" in {one["topic"] for one in inspected["contents"]["topics"]}
     assert answer("annotate", bag, "-l", library, "--topic", "/tool")["notes"] == []
     assert "Read topic /tool" in run("annotate", bag, "-l", library).stdout
 

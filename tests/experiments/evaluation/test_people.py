@@ -41,7 +41,7 @@ def test_a_movement_that_is_left_out_takes_no_person_along(archive):
     path = archive(people=np.arange(8))
     with np.load(path) as arrays:
         content = dict(arrays)
-    content["positions"][41 + 5] = np.nan  # in movement 1
+    content["positions"][40:81] = np.nan  # movement 1
     np.savez(path, **content)
     read = load_data(str(path))
     assert len(read.demonstrations) == 7
