@@ -31,11 +31,11 @@ def folder(tmp_path):
 @pytest.mark.parametrize("command", ["recognize", "annotate"])
 def test_names_and_units_that_differ_are_said(folder, command):
     asked = folder / "asked.csv"
-    _table(asked, ("px [mm]", "y [mm]", "z [m]"), 1.5)
+    _table(asked, ("hand_x [mm]", "hand_y [mm]", "hand_z [m]"), 1.5)
     told = answer(command, asked, "--library", folder / "actions")
     names, units = told["notes"]
-    assert names == "Columns are compared in their order: px [mm] of the recordings with x [m] of the library"
-    assert "Units are converted: px [mm] in mm, y [mm] in mm in the recordings, x [m] in m" in units
+    assert names.startswith("Columns are compared in their order: hand_x [mm], hand_y [mm], hand_z [m] of the record")
+    assert "Units are converted: hand_x [mm] in mm, hand_y [mm] in mm in the recordings, x [m] in m" in units
     shown = run(command, asked, "--library", folder / "actions")[1]
     assert "Columns are compared in their order" in " ".join(shown.split())
     _table(asked, ("x [m]", "y [m]", "z [m]"), 1.5)
@@ -53,3 +53,15 @@ def test_other_kinds_are_refused(folder, command):
     said = " ".join((out + err).split())
     assert "recorded as x [m] (position), y [m] (position), z [m] (position)" in said
     assert "got joint1 (angle)" in said
+
+
+@pytest.mark.parametrize("command", ["recognize", "annotate"])
+def test_other_names_are_refused_unless_columns_are_chosen_by_their_numbers(folder, command):
+    asked = folder / "asked.csv"
+    _table(asked, ("elbow [mm]", "wrist [mm]", "hip [mm]"), 1.5)
+    _, out, err = run(command, asked, "--library", folder / "actions")
+    said = " ".join((out + err).split())
+    assert " of the columns ['x [m]', 'y [m]', 'z [m]']" in said
+    assert "got ['elbow [mm]', 'wrist [mm]', 'hip [mm]']" in said
+    told = answer(command, asked, "--library", folder / "actions", "--columns", "1,2,3")
+    assert "in mm in the recordings, x [m] in m" in told["notes"][0]

@@ -348,8 +348,13 @@ def test_columns_without_names_are_learned_by_their_count(tmp_path, heads):
 def test_a_name_that_was_learned_in_another_place_is_not_compared_in_order(tmp_path):
     with ActionLibrary(tmp_path / "actions", create=True) as library:
         library.learn(frames(("x", "y", "z"), lambda x: x), list("abab"))
-        with pytest.raises(TrajectoryError, match="with z in another place"):
+        with pytest.raises(TrajectoryError, match=r"\['x', 'y', 'z'\], .*got \['w', 'z', 'y'\]"):
             library.recognize(frames(("w", "z", "y"), lambda x: x))
+        counted = frames(("x2", "x3", "x4"), lambda x: x)
+        with ActionLibrary(tmp_path / "joints", create=True) as joints:
+            joints.learn(frames(("x1", "x2", "x3"), lambda x: x), list("abab"))
+            with pytest.raises(TrajectoryError, match=r"\['x1', 'x2', 'x3'\], .*got \['x2', 'x3', 'x4'\]"):
+                joints.recognize(counted)
         more = [
             pd.DataFrame(
                 {"t": np.linspace(0, 1, 50), "load": np.arange(50.0) % 7, "y": 3 * u**2, "x": u, "z": np.sin(3 * u)}

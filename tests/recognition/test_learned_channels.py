@@ -134,10 +134,27 @@ def test_angles_are_unwrapped(of_angles):
     assert of_angles.predict(raw).tolist() == labels
 
 
-def test_names_are_free_kinds_are_not(of_angles, of_poses):
-    named = tuple(one._replace(name=f"arm{k}", columns=(f"arm{k}",)) for k, one in enumerate(JOINTS))
+def test_columns_of_other_names_are_refused_and_taken_without_names(of_angles, of_poses):
+    named = tuple(one._replace(name=f"arm_{k}", columns=(f"arm_{k}",)) for k, one in zip("abc", JOINTS, strict=True))
     paths, labels = joints()
-    assert of_angles.predict(of_joints(paths, channels=named)).tolist() == labels
+    asked = of_joints(paths, channels=named)
+    for ask in (of_angles.predict, of_angles.recognize, lambda movements: of_angles.spot(movements[0])):
+        with pytest.raises(
+            TrajectoryError, match=r"columns \['joint1', 'joint2', 'joint3'\], .* got \['arm_a', 'arm_b'"
+        ):
+            ask(asked)
+    assert of_angles.predict([one.positions for one in asked]).tolist() == labels
+    channels = (GRIPPER, *(one._replace(name=f"foot_{one.name}", columns=(f"foot_{one.name}",)) for one in XYZ), Q)
+    right = tuple(one._replace(name=one.name.replace("foot", "hand")) for one in channels)
+    right = tuple(one if one.kind != "position" else one._replace(columns=(one.name,)) for one in right)
+    assert of_poses.predict(poses(channels)).tolist() == list("ababab")  # x, y, z may be those of a foot
+    with pytest.raises(TrajectoryError, match=r"'hand_x'.* got .*'foot_x'"):
+        Recognizer().fit(poses(right)).predict(poses(channels))
+
+
+def test_columns_of_other_kinds_are_refused(of_angles, of_poses):
+    named = tuple(one._replace(name=f"arm{k}", columns=(f"arm{k}",)) for k, one in enumerate(JOINTS))
+    paths, _ = joints()
     positions = tuple(one._replace(kind="position", period=None) for one in named)
     with pytest.raises(TrajectoryError, match=r"expected movements recorded as joint1 \(angle\), .* got arm0 \(posit"):
         of_angles.recognize(of_joints(paths, channels=positions))

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from kineme.errors import DataError, KinemeError
+from kineme.movements.channels.detect import unit_of
 from kineme.movements.tables.columns import excluded_numbers, numbers_by_name
-from kineme.movements.tables.layout import Layout
+from kineme.movements.tables.layout import Known, Layout
 from kineme.movements.tables.parsed import Parsed, listed
 
 
@@ -17,7 +18,8 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
     """Parse a file, and keep the columns that are asked for.
 
     Where nobody chooses columns, those of the movements to compare with are read, if the file has all of them; and a
-    column without any value is left aside.
+    column without any value is left aside. Columns that are chosen by their numbers are those in that order, whatever
+    their names.
 
     Raises
     ------
@@ -31,6 +33,8 @@ def select_columns(parse: Callable[[Layout], Parsed], layout: Layout) -> Parsed:
         except KinemeError:
             pass  # it has other columns, which may be compared in their order
     parsed = parse(layout)
+    if layout.known is not None and layout.by_number:
+        return _named_as(_kept(parsed, layout), layout.known)
     heads = parsed.detected.columns
     places = numbers_by_name(heads, names)
     lost = [name for name, place in zip(names, places, strict=True) if place is None]
@@ -65,6 +69,16 @@ def _kept(parsed: Parsed, layout: Layout) -> Parsed:
         ignored=(*detected.ignored, *(heads[k] for k in sorted(dropped))),
     )
     return parsed._replace(detected=detected, block=replace(block, positions=block.positions[:, kept]))
+
+
+def _named_as(parsed: Parsed, known: Known) -> Parsed:
+    """A file with the names of as many columns of the movements to compare with, in its own units."""
+    detected = parsed.detected
+    names = next((some for some in (known.columns, known.moving) if len(some) == len(detected.columns)), None)
+    if names is None:
+        return parsed
+    units = detected.measured_in or tuple(unit_of(head) or "" for head in detected.columns)
+    return parsed._replace(detected=detected._replace(columns=names, measured_in=units))
 
 
 def _at(texts: Sequence[str], numbers: Sequence[int]) -> tuple[str, ...]:

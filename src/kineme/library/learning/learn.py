@@ -30,7 +30,7 @@ from kineme.movements.channels.channel import (
     recorded_names,
     same_columns,
 )
-from kineme.movements.channels.column_match import columns_recorded
+from kineme.movements.channels.column_match import columns_recorded, may_be
 from kineme.movements.tables.parsed import listed
 from kineme.movements.trajectories.as_learned import as_recorded, by_names, of_columns
 from kineme.movements.trajectories.channels import in_coordinates
@@ -180,7 +180,7 @@ def _in_columns_of(store: Store, demos: Demonstrations) -> Demonstrations:
         here, there = columns_recorded(demos.channels), columns_recorded(ours)
         if {*here.names} == {*there.names}:  # in other orders, units or kinds, as a gripper that moves in steps
             return by_names(demos, ours)
-        if len(here.heads) == len(there.heads) and not here.may_be(there):
+        if len(here.heads) == len(there.heads) and not may_be(demos.channels, ours):
             raise TrajectoryError(
                 f"expected the columns {listed(there.heads)} as {_others(store)} of the library in {store.folder}, got "
                 f"{listed(here.heads)}; choose the columns, in the shell with --columns, or make another library"

@@ -17,7 +17,8 @@ def known_sources(store: Store) -> Known:
     choices = tuple(dict.fromkeys(one for one in told if any(one)))
     if (channels := store.channels) is None:
         return Known(choices)
-    return Known(choices, recorded_names(channels), sum(one.kind == "orientation" for one in channels))
+    moving = recorded_names(tuple(one for one in channels if one.coordinates))
+    return Known(choices, recorded_names(channels), sum(one.kind == "orientation" for one in channels), moving)
 
 
 def _choice(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -56,20 +56,25 @@ class Columns(NamedTuple):
         """Whether the heads only count the columns: x1, x2, x3."""
         return all(_NAMELESS.fullmatch(head.strip()) for head in self.heads)
 
-    def may_be(self, others: Columns) -> bool:
-        """Whether columns of other names may be these, as x, y, z without any other name may be those of a hand."""
-        axes = tuple("xyz"[: len(self.heads)])
-        pairs = zip(self.names, others.names, strict=False)
-        return (
-            self.are_nameless
-            or others.are_nameless
-            or (axes in {self.names, others.names} and all(words_of(a)[-1:] == words_of(b)[-1:] for a, b in pairs))
-        )
-
 
 def columns_recorded(channels: Channels) -> Columns:
     """The columns of channels."""
     return Columns(recorded_names(channels), tuple(one.unit for one in channels for _ in one.columns))
+
+
+def may_be(channels: Channels, others: Channels) -> bool:
+    """Whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
+    names = [Columns(tuple(one.name for one in several), ()).names for several in (channels, others)]
+    kinds = [tuple(one.kind for one in several) for several in (channels, others)]
+    is_bare = any(all(len(words_of(name)) == 1 for name in some) for some in names)
+    return any(columns_recorded(several).are_nameless for several in (channels, others)) or (
+        is_bare
+        and kinds[0] == kinds[1]
+        and all(
+            kind == "orientation" or words_of(a)[-1:] == words_of(b)[-1:]
+            for kind, a, b in zip(kinds[0], *names, strict=True)
+        )
+    )
 
 
 @lru_cache(maxsize=256)  # thousands of files have the same heads

@@ -34,11 +34,14 @@ class Known:
         Their columns; empty if these are not known.
     n_orientations : int
         How many quaternions are among the columns.
+    moving : tuple of str
+        The columns without those that are discrete.
     """
 
     choices: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
     columns: tuple[str, ...] = ()
     n_orientations: int = 0
+    moving: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

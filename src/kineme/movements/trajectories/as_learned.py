@@ -13,12 +13,11 @@ from kineme.movements.channels.channel import (
     Channels,
     in_words,
     is_plain,
-    learned_names,
     moving_kinds,
     recorded_names,
     same_columns,
 )
-from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion
+from kineme.movements.channels.column_match import columns_like, columns_recorded, conversion, may_be
 from kineme.movements.channels.coordinates import lever_of
 from kineme.movements.tables.parsed import listed
 from kineme.movements.trajectories.channels import in_coordinates, of_channels
@@ -44,16 +43,17 @@ def as_learned(
       wraps of angles.
     - With channels of the names that were learned, their columns are put in that order and converted to those units,
       others left aside, whatever kind their values look like.
-    - With channels of other names, their kinds have to be those that were learned, in their order, discrete ones left
-      aside; units are converted. Else what is lacking of names of which others are there is said.
+    - With channels that may be those, as x, y, z those of a hand, or that only count, as x1, x2, x3, see
+      `kineme.movements.channels.column_match.may_be`, their kinds have to be those that were learned, in their
+      order, discrete ones left aside; units are converted. Else what is lacking is said.
 
     `what` they are called in messages.
 
     Raises
     ------
     TrajectoryError
-        Channels of other kinds, another number of columns, a unit that cannot be converted, names that were learned in
-        another place, or columns of a quaternion that is not of norm 1.
+        Channels of other names or kinds, another number of columns, a unit that cannot be converted, names that were
+        learned in another place, or columns of a quaternion that is not of norm 1.
     """
     if isinstance(movements, (list, tuple)) and _of_several_channels(movements):
         return _one_by_one(movements, learned, n_dims, what)
@@ -97,7 +97,7 @@ def _of_kinds(demos: Demonstrations, learned: Channels | None, n_dims: int, what
     if {*columns_recorded(moving).names} <= {*columns_recorded(channels).names}:
         return by_names(demos, moving, known_units=False)
     if moving_kinds(channels) == moving_kinds(learned):
-        _check_places(channels, learned, what)
+        _check_names(channels, moving, what)
         return _in_units(Demonstrations.of_movements(in_coordinates(demos.movements), demos.steps), learned)
     _check_lacking(channels, moving, what)
     if is_plain(channels) and is_plain(learned) and demos.n_dims != n_dims:
@@ -145,20 +145,24 @@ def _check_lacking(channels: Channels, moving: Channels, what: str) -> None:
     """Refuse columns of which some have names that were learned, while others of these names are not there."""
     ours, wanted = columns_recorded(channels), columns_recorded(moving)
     lost = [head for head, name in zip(wanted.heads, wanted.names, strict=True) if name not in ours.names]
-    if len(lost) < len(wanted.heads) and not ours.may_be(wanted):
+    if len(lost) < len(wanted.heads) and not may_be(channels, moving):
         raise TrajectoryError(
             f"expected {what} with the columns {listed(lost)} too, which were learned, got {listed(ours.heads)}; "
             f"record them, or {_SAY}"
         )
 
 
-def _check_places(channels: Channels, learned: Channels, what: str) -> None:
-    """Refuse to compare columns in their order where one has a name that was learned in another place."""
-    ours, wanted = (learned_names(one) for one in (channels, learned))
-    if moved := [name for k, name in enumerate(ours) if name in wanted and wanted.index(name) != k]:
+def _check_names(channels: Channels, moving: Channels, what: str) -> None:
+    """Refuse to compare columns in their order that have other names, or a name that was learned in another place."""
+    asked = tuple(one for one in channels if one.coordinates)
+    ours, wanted = columns_recorded(asked), columns_recorded(moving)
+    place = {name: k for k, name in enumerate(wanted.names)}
+    if not may_be(asked, moving) or any(place.get(name, k) != k for k, name in enumerate(ours.names)):
         raise TrajectoryError(
-            f"expected {what} of the columns {', '.join(wanted)}, as those that were learned, got {', '.join(ours)}, "
-            f"with {moved[0]} in another place; {_SAY}"
+            f"expected {what} of the columns {listed(wanted.heads)}, as those that were learned, got "
+            f"{listed(ours.heads)}; choose the columns of these names with columns= of read_recordings, in the shell "
+            "--columns; or take others in their order: in the shell --columns with their numbers, in Python movements "
+            "of their positions alone"
         )
 
 
