@@ -1,10 +1,11 @@
 # make demo   the paper's tables and figures, in out/
+# make check  formatter, linter, type checker, and the tests that find most: minutes
 # make test   formatter, linter, type checker, tests
 # make test-pythons  the same with every Python that is found here
 # make test-lowest   the tests with the lowest versions of what kineme depends on
 # make package   wheel and source archive in out/package, checked, and tried in an empty environment of every Python found
 # make ros2   messages of ROS 2 itself, in .venv-ros2; the tests that need them are skipped where it is not there
-# make soak   faults of the action library, many times: minutes
+# make soak   faults of the action library, many times, and what make test tries a part of: an hour
 # make fuzz   files and libraries damaged at random, read in child processes: minutes; FUZZ_SEED, FUZZ_ROUNDS
 # make bench  speed and accuracy side by side with other libraries
 # make evaluate  recognition beside its rivals, in out/
@@ -21,7 +22,10 @@ PYTHON ?= python3
 PYTHONS ?= python3.11 python3.12 python3.13 python3.14
 DEV ?= .venv-dev
 
-.PHONY: demo test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
+# Tests start hundreds of commands: where Python writes no bytecode, each of them compiles the package again.
+export PYTHONDONTWRITEBYTECODE =
+
+.PHONY: demo check test test-pythons test-lowest package ros2 always soak fuzz bench evaluate docs check-docs figures reference tables scene lock clean
 
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
@@ -65,7 +69,7 @@ ros2: .venv-ros2/ready
 	touch $@
 
 soak: $(DEV)/ready
-	KINEME_SOAK=1 $(DEV)/bin/pytest soak tests/studio/test_runtime.py -p no:cacheprovider
+	KINEME_SOAK=1 $(DEV)/bin/pytest -n 2 --dist loadscope soak $$(grep -rlE 'soaking|KINEME_SOAK' tests --include='test_*.py') -p no:cacheprovider
 
 fuzz: $(DEV)/ready
 	$(DEV)/bin/pytest fuzz -p no:cacheprovider

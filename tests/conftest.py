@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import sys
@@ -11,17 +12,25 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from soaking import examples
+
 sys.path.append(str(Path(__file__).parents[1] / "docs"))  # for `walk_through`, which runs the pages
 
 settings.register_profile(
     "deterministic",
     derandomize=True,
     deadline=None,
-    max_examples=6,
+    max_examples=examples(6),
     database=None,
     suppress_health_check=[HealthCheck.differing_executors],
 )
 settings.load_profile("deterministic")
+
+
+def pytest_collection_finish():
+    """Leave what was collected to no search for garbage: ten thousand tests are no garbage."""
+    gc.collect()
+    gc.freeze()
 
 
 def _make_movement(seed, n_dims=2, n_samples=None, even=True):

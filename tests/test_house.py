@@ -46,7 +46,12 @@ def _functions_of(path):
 
 
 def test_files_and_functions_are_short():
-    code = {path: _code_lines(path) for path in SOURCES if len(path.read_text().splitlines()) > MAX_FUNCTION}
+    """Tokens are read only where lines of any kind are too many."""
+    long = [
+        path for path in SOURCES if len(path.read_text().splitlines()) > MAX_FILE
+        or any(node.end_lineno - node.body[0].lineno >= MAX_FUNCTION for node in _functions_of(path))
+    ]  # fmt: skip
+    code = {path: _code_lines(path) for path in long}
     assert not {str(path.relative_to(ROOT)): len(lines) for path, lines in code.items() if len(lines) > MAX_FILE}
     lengths = {
         f"{path.relative_to(ROOT)}: {node.name}": len(lines & set(range(node.body[0].lineno, node.end_lineno + 1)))
@@ -86,12 +91,14 @@ def test_test_files_have_names_of_their_own():
     assert [one for one, other in pairwise(names) if one == other] == []
 
 
-_BRITISH = re.compile(
-    r"\b\w*(?:recogni|normali|initiali|vectori|seriali|summari|generali|organi|minimi|maximi|optimi|reali|speciali|visuali"
-    r"|synchroni|parametri|discreti|randomi|regulari|orthogonali)s(?:e[drs]?|ing|ations?)\b|\banalys(?:e[ds]?|ing)\b"
-    r"|\b\w*(?:neighbour|colour|behaviour|favour|artefact|catalogue|licence)|\bcentre[ds]?\b|\bmetres?\b|\bgrey|\blearnt\b"
-    r"|label(?:led|ling)|modell(?:ed|ing)|travell(?:ed|ing)|judgement|whilst",
-    re.IGNORECASE,
+_S_FOR_Z = (
+    "discreti", "generali", "initiali", "maximi", "minimi", "normali", "optimi", "organi", "orthogonali", "parametri",
+    "randomi", "reali", "recogni", "regulari", "seriali", "speciali", "summari", "synchroni", "vectori", "visuali",
+)  # fmt: skip
+_BRITISH = re.compile(  # each alternative begins with a letter: such a search is ten times as fast
+    "|".join(rf"{stem}s(?:e[drs]?|ing|ations?)\b" for stem in _S_FOR_Z)
+    + r"|analyse(?<!\wanalyse)[ds]?\b|analysing\b|neighbour|colour|behaviour|favour|artefact|catalogue|licence"
+    r"|centre[ds]?\b|metres?\b|grey|learnt\b|labelled|labelling|modelled|modelling|travelled|travelling|judgement|whilst"
 )
 
 
@@ -104,7 +111,7 @@ def test_warnings_are_given_in_one_way():
 def test_spelling_is_american():
     texts = {".py", ".pyi", ".md", ".toml", ".json", ".in", ""}
     pages = [path for path in _tracked() if path.suffix in texts and "results" not in path.parts]
-    found = {str(page.relative_to(ROOT)): _BRITISH.findall(page.read_text(encoding="utf-8")) for page in pages}
+    found = {str(page.relative_to(ROOT)): _BRITISH.findall(page.read_text(encoding="utf-8").lower()) for page in pages}
     assert {"pyproject.toml", "CHANGELOG.md", "src/kineme/__init__.py", "tests/conftest.py"} < set(found)
     assert not {page: words for page, words in found.items() if words}
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from kineme.runtime.compiled import jit, tell_when_compiling
+from soaking import SOAK
 
 THREADS = """
 import sys, threading, time, traceback
@@ -73,7 +74,7 @@ def run(code, **environment):
     return done.stdout
 
 
-@pytest.mark.parametrize("first", ["users_own", "recognizer.stream"])
+@pytest.mark.parametrize("first", ["users_own", "recognizer.stream"][: 1 + SOAK])
 def test_threads_may_make_the_first_compiled_call_at_the_same_time(first):
     run(THREADS.replace("FIRST", first))
 

@@ -126,7 +126,8 @@ def test_one_symbol_or_one_member():
     assert [(one.first, one.second) for one in suggest_merges(demos, labels)] == [("c", "kind 00")]
 
 
-def test_many_members_speak_through_some():
+def test_many_members_speak_through_some(monkeypatch):
+    monkeypatch.setattr("kineme.anchoring.proposals.merge_split._LARGEST", 2000)  # 400 of one symbol
     demos = draw_kinds([1300, 900], 2, 0, spread=0.03)
     labels = np.where(np.arange(2200) % 2, "a", "b")
     (merge,) = suggest_merges(demos[:1300], labels[:1300])

@@ -12,6 +12,7 @@ from kineme.primitives.generation.deviation import largest_deviation
 from kineme.primitives.generation.figure import draw_movement, path_columns
 from kineme.primitives.generation.generate import MovementOptions, generate
 from kineme.primitives.generation.learned import learn_one
+from soaking import combined
 
 U = np.linspace(0, 1, 80)
 S = U**3 * (10 - 15 * U + 6 * U**2)
@@ -81,8 +82,7 @@ def test_it_moves_as_shown_in_the_columns_that_were_recorded(case, recording, tm
             np.testing.assert_allclose(replayed, was.recorded[:, k], atol=1e-3, err_msg=name)
 
 
-@each
-@pytest.mark.parametrize("ending", [".csv", ".npz", ".json"])
+@pytest.mark.parametrize(("case", "ending"), combined(HEADS, [".csv", ".npz", ".json"], together=1))
 def test_a_goal_is_met_in_every_format_at_another_tempo(case, ending, recording, tmp_path):
     path, out = recording(case), tmp_path / f"new{ending}"
     done = run(

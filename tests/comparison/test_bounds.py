@@ -16,6 +16,7 @@ from kineme.comparison.specification import ComparisonSpecification
 from kineme.kernels.procrustes import Procrustes
 from kineme.kernels.soft_rotation import RotationPrior
 from movement_samples import draw_shapes
+from soaking import combined
 
 #: Limits of the angle, or priors.
 ANGLES = {
@@ -54,10 +55,12 @@ def _reduced(d, n_reduced):
     return reduce_features(bases, asked, d), reduce_features(bases, stored, d)
 
 
-@pytest.mark.parametrize("mean", LOG_MEANS)
-@pytest.mark.parametrize(("d", "angle"), [(d, angle) for d, angles in ANGLES.items() for angle in angles])
-@pytest.mark.parametrize("n_reduced", [1, 3, 12, 100])
-def test_no_movement_is_more_alike_than_its_reduced_features_allow(d, angle, mean, n_reduced):
+@pytest.mark.parametrize(
+    ("turned", "mean", "n_reduced"),
+    combined([(d, angle) for d, angles in ANGLES.items() for angle in angles], LOG_MEANS, [1, 3, 12, 100]),
+)
+def test_no_movement_is_more_alike_than_its_reduced_features_allow(turned, mean, n_reduced):
+    d, angle = turned
     similarity = AveragedSimilarity(_procrustes(d, angle), np.array([0.5, 2.0, 2.2]), mean)
     bounds = log_bounds(similarity, *_reduced(d, n_reduced))
     exact = _exact(similarity, *_asked_and_stored(d))

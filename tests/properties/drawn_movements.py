@@ -22,6 +22,13 @@ one_movement = st.tuples(
 many_movements = st.lists(one_movement, min_size=36, max_size=44)
 
 
+def any_movements(seed, n=40):
+    """A batch as hypothesis may draw it, in which each kind of stamps and nearly each power of ten occurs."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.integers((4, -6, 0, -2, 0), (121, 7, len(STAMPS), 4, 10**6), (n, 5)).tolist()
+    return [(length, size, STAMPS[kind], tempo, own) for length, size, kind, tempo, own in drawn]
+
+
 def _stamps(kind, length, rng):
     """Stamps (T,) from 0 to 1."""
     gaps = np.ones(length - 1)

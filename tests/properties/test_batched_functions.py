@@ -7,11 +7,12 @@ import warnings
 import numpy as np
 import pytest
 from batched_functions import TABLE
-from drawn_movements import many_movements
-from hypothesis import Phase, given, settings
+from drawn_movements import any_movements, many_movements
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from kineme import DegenerateMovementWarning
+from soaking import SOAK, examples
 
 #: Numbers of one tile of work, set so small that every batch is many tiles, none of which begins where the batch does.
 TILES = {
@@ -43,7 +44,8 @@ def _off(one, other):
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.name)
-@settings(max_examples=3, phases=(Phase.explicit, Phase.generate))  # shrinking would take minutes
+@settings(max_examples=examples(1, 12), phases=(Phase.explicit, Phase.generate)[: 1 + SOAK])  # shrinking takes minutes
+@example(drawn=any_movements(1), seed=1)
 @given(drawn=many_movements, seed=st.integers(0, 10**6))
 def test_a_batch_equals_its_members_one_by_one(row, drawn, seed):
     rng = np.random.default_rng(seed)

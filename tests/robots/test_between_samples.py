@@ -16,6 +16,7 @@ from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
 from kineme.robots.checks.along import along
 from kineme.robots.execution.between import between, extreme
+from soaking import examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -78,7 +79,7 @@ def test_an_acceleration_that_only_the_middle_of_a_gap_has_is_measured_as_it_is(
     assert check.passed is passes
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(6), deadline=None)
 @given(
     name=st.sampled_from(["panda", "ur5e", "wam", "so101"]),
     rate=st.sampled_from([1.0, 3.0, 10.0, 25.0, 100.0, 1000.0, 10_000.0]),

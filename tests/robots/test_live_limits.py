@@ -17,6 +17,7 @@ from arm_samples import stroke
 from kineme.orientation import PoseDMP, exp, product
 from kineme.robots import ArmController, ArmStatus, load
 from kineme.robots.live.braking import Braking, brakeable
+from soaking import combined, examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
@@ -67,7 +68,7 @@ def check_limits(robot, path, dt):
 
 @pytest.mark.parametrize("follow", ["full", "free"])
 @pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(2), deadline=None)
 @example(0.001, 3, False)
 @example(0.02, 5, True)
 @given(time_steps, seeds, st.booleans())
@@ -83,7 +84,7 @@ def test_limits_hold_at_every_step_whatever_the_goal_does(name, follow, dt, seed
 
 
 @pytest.mark.parametrize("name", MODELS[:3])
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=examples(3), deadline=None)
 @given(time_steps, seeds)
 def test_limits_hold_for_poses_too(name, dt, seed):
     robot = robot_of(name)
@@ -122,8 +123,7 @@ def test_the_fastest_velocity_that_can_be_braked_needs_all_of_the_distance(dista
     assert dt * np.maximum(first - m * change, 0).sum() == pytest.approx(distance, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])
+@pytest.mark.parametrize(("name", "dt"), combined(MODELS, [0.001, 0.005, 0.02], together=1))
 def test_what_was_missed_is_caught_up_without_overshooting(name, dt):
     """The movement starts with a jump of 10 cm: the tip must come back to it and pass it by no more than 1 mm."""
     robot = robot_of(name)

@@ -16,6 +16,7 @@ pytest.importorskip("pinocchio", reason="the extra robot is not installed")
 
 from kineme.robots import load, write_view
 from kineme.robots.checks.along import along
+from soaking import combined
 
 WIDTHS = (390, 820, 1440)
 #: A triangle whose texture is the address of a file.
@@ -76,8 +77,7 @@ def _overlap(a, b):
     )
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("width", "scheme"), combined(WIDTHS, ["light", "dark"], together=1))
 def test_the_slider_moves_the_arm_to_where_the_model_has_its_tip(opened, panda, width, scheme):
     page = opened(panda, width, color_scheme=scheme)
     tips = along(panda.robot, panda.trajectory).tip_positions

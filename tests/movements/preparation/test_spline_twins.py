@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from exact_spline import exact_smoothing_spline
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 from scipy.interpolate import make_smoothing_spline as smoothing_spline_of_numbers
@@ -15,6 +15,7 @@ from kineme.movements.preparation.arc_length import arc_length_phase, resample_b
 from kineme.movements.preparation.resample import relative_rows
 from kineme.movements.preparation.smooth import smooth_rows
 from kineme.movements.preparation.spline import spline_matrix, spline_rows
+from soaking import examples
 
 CHOICES = ("always", "never")
 
@@ -93,6 +94,8 @@ def test_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(co
         _within_its_extent(row.T, CubicSpline(t, x - x[0])(np.linspace(0, t[-1], 33)), 1e-9)
 
 
+@settings(max_examples=examples(1, 20))
+@example(seed=1)
 @given(seed=st.integers(0, 10**6))
 def test_smoothing_splines_of_many_movements_are_those_of_scipy_in_units_of_each_extent(compiled, seed):
     movements = _company(seed, 200, least=5)
@@ -136,6 +139,7 @@ def test_what_fifty_digits_give_is_the_minimizer():
     np.testing.assert_allclose(exact(u) + lam * np.diff(third, axis=0), x, atol=1e-9)
 
 
+@settings(max_examples=examples(3))
 @any_ragged
 def test_smoothing_splines_between_the_samples_are_those_of_scipy(compiled, seed, origin, place):
     movements = _ragged(seed, least=5, n=40, origin=origin, place=place)
@@ -166,6 +170,7 @@ def test_arc_length_is_the_same_compiled_through_pauses_and_at_rest(share, seed,
         np.testing.assert_allclose(resample_by_arc_length(paths, 31, share), expected, atol=1e-9)
 
 
+@settings(max_examples=examples(3))
 @given(seed=st.integers(0, 10**6), nearness=st.sampled_from([1e-5, 1e-7]))
 @example(seed=0, nearness=1e-9)
 def test_nearly_duplicate_stamps_do_no_harm_to_exact_data(compiled, seed, nearness):
