@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kineme
+from kineme.files.gaps import SENTINELS
 from kineme.files.recordings import read_recordings, read_recordings_from_bytes
 from kineme.movements.tables.columns import choose_roles, is_time
 from kineme.movements.tables.layout import Layout
@@ -27,7 +28,7 @@ def lines(rows, head="time,x,y"):
     return "\n".join([head, *(",".join(map(str, row)) for row in rows)]) + "\n"
 
 
-finite = st.floats(-1e100, 1e100)  # the range of positions
+finite = st.floats(-1e100, 1e100).filter(lambda x: x not in SENTINELS)  # the range of positions
 formats = st.sampled_from(["{!r}", "{:.17g}", "{:.17e}", "{:+.17E}", " {!r} ", '"{!r}"'])
 
 

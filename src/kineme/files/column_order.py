@@ -13,6 +13,7 @@ from kineme.files.problem import Problem, in_shell
 from kineme.files.read_file import FileRead
 from kineme.movements.channels.column_match import Columns, columns_like
 from kineme.movements.channels.detect import unit_of
+from kineme.movements.tables.columns import beside_positions
 from kineme.movements.tables.parsed import Detected, listed
 from kineme.movements.tables.time_stamps import words_of
 from kineme.units import unit_named
@@ -24,6 +25,8 @@ _SENSORS = frozenset(
         "uncalibrated", "linear", "total",
     }
 )  # fmt: skip
+
+_NAMED = 6  # columns that a note names
 
 
 class ColumnSet(NamedTuple):
@@ -92,6 +95,20 @@ def notes_on_order(detected: Iterable[Detected], ours: Columns) -> list[str]:
     if other := sorted((a, b) for a, b in pairs if a and b and unit_named(a) != unit_named(b)):
         notes.append(f"units are converted: {', '.join(f'{a} to {b}' for a, b in other)}")
     return notes
+
+
+def notes_on_aside(detected: Iterable[Detected]) -> list[str]:
+    """A sentence if columns are left aside since they are no coordinates beside the positions of their names."""
+    several = {how.columns + how.ignored: {*how.ignored} for how in detected}
+    aside = [head for heads, ignored in several.items() for head in heads if head in beside_positions(heads) & ignored]
+    named = [*dict.fromkeys(aside)]
+    if not named:
+        return []
+    more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+    return [
+        f"left aside {', '.join(named[:_NAMED])}{more}, which are no positions but of positions that are read; say "
+        "--columns with all that count to read them too"
+    ]
 
 
 def _as(one: FileRead, known: Columns, ours: Columns) -> FileRead:

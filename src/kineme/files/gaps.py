@@ -27,6 +27,14 @@ _SHOWN = 5  # columns in a message beside the first
 _ROUNDING = 1e-9  # of a gap, relative
 
 
+_VAST = np.append(10.0 ** np.arange(20, 39), np.finfo(np.float32).max)
+#: Numbers that programs write where they have no value: 999 to 9999999, 32768, 1e20 to 1e38, the largest of a float32,
+#: with either sign.
+SENTINELS = np.concatenate(
+    [sign * np.concatenate([10.0 ** np.arange(3, 8) - 1, _VAST, _VAST.astype(np.float32), [32768]]) for sign in (-1, 1)]
+)
+
+
 class Spans(NamedTuple):
     """Runs of missing values of one column: first rows, rows after the last ones, and the time that each takes [s].
 
@@ -44,6 +52,29 @@ def spans_of(missing: Flags, times: Array) -> Spans:
     first, stop = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     before, after = np.concatenate(([-np.inf], times)), np.concatenate((times, [np.inf]))
     return Spans(first, stop, after[stop] - before[first])
+
+
+def sentinels_as_missing(block: Block, columns: Sequence[str]) -> tuple[Block, tuple[str, ...]]:
+    """Take numbers as -9999 that stand for no value as missing, and say which in which columns.
+
+    They are that where they lie farther from all other values of their column than these do from each other.
+    """
+    positions, said = block.positions, []
+    with np.errstate(invalid="ignore"):
+        suspected = np.flatnonzero((np.abs(positions) >= np.abs(SENTINELS).min()).any(axis=0))
+    for k in suspected.tolist():
+        x = block.positions[:, k]
+        marks = np.isfinite(x) & np.isin(x, SENTINELS)
+        others = x[np.isfinite(x) & ~marks]
+        if not len(others) or not marks.any():
+            continue
+        low, high = others.min(), others.max()
+        marks &= np.maximum(low - x, x - high) > high - low
+        if marks.any():
+            positions = positions.copy() if positions is block.positions else positions
+            said += [f"{value:g} in {columns[k]}" for value in np.unique(x[marks]).tolist()]
+            positions[marks, k] = np.nan
+    return (replace(block, positions=positions), tuple(said)) if said else (block, ())
 
 
 def fill_gaps(block: Block, columns: Sequence[str], layout: Layout) -> Block:

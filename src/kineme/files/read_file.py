@@ -18,6 +18,7 @@ from kineme.files.blocks import in_blocks
 from kineme.files.check_block import check_block
 from kineme.files.folders import OUTSIDE, as_text, leads_out
 from kineme.files.formats import FORMATS, Format, data_set_of
+from kineme.files.gaps import sentinels_as_missing
 from kineme.files.limits import check_expanded
 from kineme.files.problem import Problem
 from kineme.files.select_columns import select_columns
@@ -116,6 +117,8 @@ def _parsed(parse: Callable[[Layout], Parsed], form: Format, relative: Path, lay
                 raise DataError("expected text, of which each line is a movement, got another format; leave out rows")
             parsed = select_columns(parse, layout)
             detected, block, left_out = parsed if layout.every is None else in_blocks(parsed, layout.every)
+            block, sentinels = sentinels_as_missing(block, detected.columns)
+            detected = detected._replace(sentinels=sentinels)
             block, problems = check_block(block, name, layout, detected.columns)
     except _UNREADABLE as error:
         return FileRead(name, "", 0, 0.0, None, None, [Problem(name, None, _plainly(error))])

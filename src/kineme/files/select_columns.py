@@ -74,7 +74,7 @@ def _kept(parsed: Parsed, layout: Layout) -> Parsed:
 def _named_as(parsed: Parsed, known: Known) -> Parsed:
     """A file with the names of as many columns of the movements to compare with, in its own units."""
     detected = parsed.detected
-    names = next((some for some in (known.columns, known.moving) if len(some) == len(detected.columns)), None)
+    names = next((heads for heads in (known.columns, known.moving) if len(heads) == len(detected.columns)), None)
     if names is None:
         return parsed
     units = detected.measured_in or tuple(unit_of(head) or "" for head in detected.columns)

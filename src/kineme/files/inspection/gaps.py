@@ -9,12 +9,16 @@ from kineme.files.merge_files import Recordings
 from kineme.files.problem import note_on_missing
 from kineme.output.text import counted
 
+_NAMED = 6  # numbers that stand for no value in a note
 _PAUSE = 1.0  # s without samples from which on a movement may be several
 
 
 def notes_on_gaps(recordings: Recordings) -> list[str]:
-    """Say in one sentence each what was filled, what was cropped, and which columns keep movements from being read."""
+    """Say in one sentence each which numbers count as no value, what was filled and cropped, and which columns lack."""
     sources, notes = recordings.sources, []
+    if sentinels := [*dict.fromkeys(one for how, _ in recordings.detected for one in how.sentinels)]:
+        more = f" and {len(sentinels) - _NAMED} more" if len(sentinels) > _NAMED else ""
+        notes.append(f"{', '.join(sentinels[:_NAMED])}{more} counts as no value, far from all others")
     if filled := [one for one in sources if one.filled]:
         samples, longest = sum(one.filled for one in filled), max(one.longest_gap for one in filled)
         notes.append(

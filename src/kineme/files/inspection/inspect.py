@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kineme.files.column_order import notes_on_order
+from kineme.files.column_order import notes_on_aside, notes_on_order
 from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.extents import extents_of, notes_on_extents, notes_on_sizes
 from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
@@ -154,6 +154,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
         notes.append("some files have no times: each of their movements counts as one second; give --units STEP")
     if any(how.format.startswith("LeRobot") for how, _ in recordings.detected):
         notes.append("LeRobot does not declare the units of joints: they are taken as they are stored")
+    notes += notes_on_aside(how for how, _ in recordings.detected)
     notes += notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
     single = [str(one.label) for one in labels if one.label is not None and one.movements == 1]
     if single:

@@ -66,7 +66,7 @@ def may_be(channels: Channels, others: Channels) -> bool:
     """Whether channels of other names may be those: x, y, z without any other name may be those of a hand."""
     names = [Columns(tuple(one.name for one in several), ()).names for several in (channels, others)]
     kinds = [tuple(one.kind for one in several) for several in (channels, others)]
-    is_bare = any(all(len(words_of(name)) == 1 for name in some) for some in names)
+    is_bare = any(all(len(words_of(name)) == 1 for name in each) for each in names)
     return any(columns_recorded(several).are_nameless for several in (channels, others)) or (
         is_bare
         and kinds[0] == kinds[1]

@@ -31,11 +31,22 @@ _BESIDE_COUNTERS = frozenset({"sub", "task", "nr", "no", "number", "id", "count"
 _ROS_HEADER = re.compile(r"(.*[./_])?header[./_](seq|stamp|frame_id)(?![^\W_]).*", re.IGNORECASE)  # of a message
 _ROS_STAMP = re.compile(r"(.*[./_])?header[./_]stamp([./_]secs?)?", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*?)(s|sec|secs|seconds)", re.IGNORECASE)
-_TURNED = re.compile(r"(.+)\.r[xyz]")  # rotation about an axis, see `kineme.movements.channels.channel`
-_JOINT_STATE = re.compile(r"(?<![a-z])(velocit(?:y|ies)|efforts?|accelerations?)(?![a-z])", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(].*?[\])]")  # around units
 _UNNAMED = re.compile(r"([^:]*:)?(\*|unlabell?ed|unidentified)[ _-]?\d*(\.position)?\.[xyz]", re.IGNORECASE)  # markers
-_DERIVATIVE = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)|[va]([xyz])", re.IGNORECASE)
+# Of a rotation about an axis, see `kineme.movements.channels.channel`.
+_TURNING = re.compile(r"(?:v|vel|velocity|a|acc|acceleration)[_ .](.+)\.r[xyz]", re.IGNORECASE)
+_SHORT = re.compile(r"(?:v|a|d|dd)([xyz])|([xyz])d{1,2}ot")  # words for derivatives of x, y, z
+_POSITION_WORDS = frozenset({"pos", "position", "positions"})
+#: Words of columns that are no coordinates where others of the same name without them are.
+_DERIVATIVE_WORDS = frozenset(
+    {
+        "vel", "velocity", "velocities", "speed", "acc", "accel", "acceleration", "accelerations", "jerk", "dot",
+        "ddot", "effort", "efforts",
+    }
+)  # fmt: skip
+#: Words of columns that say how sure the position of the same name is.
+_CONFIDENCE_WORDS = frozenset({"confidence", "conf", "likelihood", "score", "visibility", "presence", "residual"})
+_AXES = frozenset("xyz")
 
 
 class Roles(NamedTuple):
@@ -96,7 +107,12 @@ def choose_roles(heads: Sequence[str], kinds: Sequence[str], layout: Layout, nam
             for k in free
             if time is not None and (_is_clock(heads[k]) or (is_time(heads[time]) and _is_stamp(heads[k])))
         }
-        positions = tuple(k for k in free if not (named and (k in clocks or _says_nothing_new(heads[k], plain))))
+        derived = beside_positions([heads[k] for k in free]) if named else set()
+        positions = tuple(
+            k
+            for k in free
+            if not (named and (k in clocks or heads[k] in derived or _says_nothing_new(heads[k], plain)))
+        )
     if not positions:
         texts = [head for k, head in enumerate(heads) if k not in taken and kinds[k] == "text"]
         of_text = f"; there are no numbers in {listed(texts)}" if texts else ""
@@ -310,20 +326,46 @@ def _movement(heads: Sequence[str], layout: Layout, named: bool, label: int | No
     )
 
 
+def beside_positions(heads: Sequence[str]) -> set[str]:
+    """The heads of derivatives, efforts and confidences of positions that are there too.
+
+    So ``x_vel``, ``vx``, ``dx`` and ``x_dot`` beside ``x`` or ``pos_x``, and ``nose_score`` beside ``nose_x``.
+    """
+    words = {head: _spelled_out(head) for head in heads}
+    noted = {head: {*parts} & (_DERIVATIVE_WORDS | _CONFIDENCE_WORDS) for head, parts in words.items()}
+    places = {_without(parts, _POSITION_WORDS) for head, parts in words.items() if not noted[head]}
+    points = {_without(parts, _AXES) for parts in places if _AXES & {*parts}}
+    return {
+        head
+        for head, parts in words.items()
+        if noted[head] and _without(parts, noted[head]) in (places if noted[head] <= _DERIVATIVE_WORDS else points)
+    }
+
+
+def _spelled_out(head: str) -> tuple[str, ...]:
+    """The words of a head without its unit; of ``vx``, ``dx`` and ``xdot`` the axis and that it is a derivative."""
+    words = words_of(_BRACKETS.sub("", head))
+    if len(words) > 1 and words[0] in {"v", "a"}:
+        words = ("dot", *words[1:])
+    short = [_SHORT.fullmatch(word) for word in words]
+    return tuple(
+        part
+        for word, match in zip(words, short, strict=True)
+        for part in ((match[1] or match[2], "dot") if match else (word,))
+    )
+
+
+def _without(words: tuple[str, ...], others: Collection[str]) -> tuple[str, ...]:
+    return tuple(word for word in words if word not in others)
+
+
 def _says_nothing_new(head: str, plain: set[str]) -> bool:
-    """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a derivative."""
+    """Whether a column is redundant: a counter, a stamp beside the times, a marker that nobody named, a turning."""
     words = {word for word in words_of(head) if not word.isdecimal()}
     counts = words & _COUNTERS and words <= _COUNTERS | _BESIDE_COUNTERS
     if counts or not head.strip() or _ROS_HEADER.fullmatch(head) or _UNNAMED.fullmatch(head):
         return True
     if _plain(head).endswith("/speed") and f"{_plain(head).removesuffix('speed')}value" in plain:  # of OpenSim's states
         return True
-    derived = _DERIVATIVE.fullmatch(_plain(head))
-    if derived is None:  # of the state of a joint: field.velocity0 beside field.position0
-        states = {_JOINT_STATE.sub(what, _plain(head)) for what in ("position", "positions")}
-        return not states.isdisjoint(plain - {_plain(head)})
-    quantity = derived[1] or derived[2]
-    turned = _TURNED.fullmatch(quantity)  # of a quaternion
-    return quantity in plain or (
-        turned is not None and any(turned[1] + dot + "w" in plain for dot in ("", ".", "_", " "))
-    )
+    turning = _TURNING.fullmatch(_plain(head))
+    return turning is not None and any(turning[1] + dot + "w" in plain for dot in ("", ".", "_", " "))

@@ -38,6 +38,10 @@ class Detected(NamedTuple):
         The unit of each coordinate where the file says it, else empty; nothing at all if it says none.
     person : tuple of str
         The column that names who showed a movement.
+    named : bool
+        Whether the file names the coordinates.
+    sentinels : tuple of str
+        Numbers that stand for no value, each with its column: ``-9999 in x``.
     """
 
     format: str
@@ -52,6 +56,7 @@ class Detected(NamedTuple):
     measured_in: tuple[str, ...] = ()
     person: tuple[str, ...] = ()
     named: bool = True
+    sentinels: tuple[str, ...] = ()
 
 
 class Repair(NamedTuple):

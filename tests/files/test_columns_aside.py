@@ -1,0 +1,76 @@
+"""Columns that are no coordinates: derivatives and confidences of positions, and numbers that stand for no value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import kineme
+from kineme.files.column_order import notes_on_aside
+from kineme.files.inspection.gaps import notes_on_gaps
+from kineme.files.inspection.inspect import inspect
+
+T = 40
+U = np.linspace(0, 1, T)
+
+
+def _written(path, heads, values=None):
+    columns = {head: np.sin((k + 1) * U) for k, head in enumerate(heads)}
+    pd.DataFrame({"t": U} | columns | (values or {})).to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("positions", "others"),
+    [
+        (["x", "y"], ["x_vel", "y_velocity", "vx", "dy", "x_dot", "x_acc", "ay", "a_x"]),
+        (["x [mm]", "y [mm]"], ["x_velocity [mm/s]", "vy [mm/s]"]),
+        (["pos_x", "pos_y"], ["vel_x", "acc_y", "xVel"]),
+        (["joint1_position", "elbow"], ["joint1_velocity", "joint1_effort", "elbow_vel"]),
+        (["nose_x", "nose_y"], ["nose_likelihood"]),
+        (["x0", "y0", "Hand.X", "Hand.Y"], ["score0", "Hand.Visibility"]),
+        (["x", "y"], ["confidence", "residual"]),
+    ],
+)
+def test_derivatives_and_confidences_are_left_aside_beside_their_positions(tmp_path, positions, others):
+    path = _written(tmp_path / "a.csv", [*positions, *others])
+    read = kineme.read_recordings(path)
+    assert read.detected[0][0].columns == tuple(positions)
+    (note,) = notes_on_aside(how for how, _ in read.detected)
+    assert all(head in note for head in others[:6])
+    assert "--columns" in note
+    assert note in inspect(read).notes
+    kept = kineme.read_recordings(path, columns=[*positions, *others])
+    assert kept.demonstrations.n_dims == len(positions) + len(others)
+
+
+@pytest.mark.parametrize(
+    "heads", [("vx", "vy"), ("acc_x", "acc_y", "gyro_x"), ("score", "x2"), ("ear_score", "nose_x")]
+)
+def test_the_same_words_without_such_positions_are_coordinates(tmp_path, heads):
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", heads))
+    assert read.detected[0][0].columns == heads
+    assert notes_on_aside(how for how, _ in read.detected) == []
+
+
+@pytest.mark.parametrize("sentinel", [-9999, 999, -99999.0, 1e20, 3.4028234663852886e38, -32768])
+def test_a_number_that_stands_for_no_value_is_missing_and_said(tmp_path, sentinel):
+    lost = np.where((U > 0.4) & (U < 0.5), sentinel, np.sin(U))
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))
+    np.testing.assert_allclose(read.demonstrations.positions[:, 1], np.sin(U), atol=1e-4)
+    assert f"{sentinel:g} in x counts as no value" in notes_on_gaps(read)[0]
+    assert read.sources[0].filled == 4
+
+
+def test_a_number_within_reach_of_the_others_is_a_value(tmp_path):
+    x = np.where(U > 0.9, 999, 2000 * U)
+    read = kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": x, "z": np.full(T, 999)}))
+    np.testing.assert_allclose(read.demonstrations.positions[:, 1:], np.column_stack([x, np.full(T, 999)]))
+    assert notes_on_gaps(read) == []
+
+
+def test_long_stretches_of_such_a_number_are_refused_as_gaps(tmp_path):
+    lost = np.where((U > 0.2) & (U < 0.8), -9999, np.sin(U))
+    with pytest.raises(kineme.KinemeError, match=r"got nothing in .*--fill-gaps"):
+        kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": lost}))
