@@ -30,10 +30,25 @@ export PYTHONDONTWRITEBYTECODE =
 demo: .venv/ready
 	.venv/bin/kineme reproduce --out out/
 
-test: $(DEV)/ready
+define lint
 	$(DEV)/bin/ruff format --check .
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/mypy --cache-dir $(DEV)/mypy
+endef
+
+# A table of what takes batches, and one of wrong values, go through most of the package.
+FIRST = house layering front_door wrong_values
+CHECKED = $(FIRST:%=tests/test_%.py) tests/properties tests/primitives/discrete tests/primitives/pose tests/movements/trajectories \
+  tests/recognition/test_recognition_numbers.py tests/recognition/test_recognizer.py tests/comparison/test_similarity.py \
+  $(patsubst %,tests/library/test_library_%.py,learning recognition changes exchange) \
+  tests/files/test_read_recordings.py tests/cli/test_learn.py tests/cli/test_recognize_command.py tests/kernels/test_gram_formulas.py
+
+check: $(DEV)/ready
+	$(lint)
+	$(DEV)/bin/pytest -n 2 --dist loadscope $(CHECKED)
+
+test: $(DEV)/ready
+	$(lint)
 	$(DEV)/bin/pytest -n 2 --dist loadscope -rs
 
 # Each Python with an environment of its own; all are tried, though one fails.
