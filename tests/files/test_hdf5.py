@@ -121,3 +121,38 @@ def test_a_file_larger_than_the_limit_is_refused_before_it_is_read(write):
 
     with pytest.raises(DataError, match="takes at most"):
         kineme.read_recordings(write(sparse))
+
+
+def test_units_are_those_of_the_attributes(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, u = tmp_path / "a.h5", np.linspace(0, 1, 30)
+    with h5py.File(path, "w") as file:
+        for k, group in enumerate((file.create_group("wave_0"), file.create_group("wave_1"))):
+            group.attrs["units"] = "mm"
+            group["time"] = 20 * np.arange(30)
+            group["time"].attrs["units"] = "ms"
+            group["hand"] = np.column_stack([u, (k + 1) * u**2])
+            group["wrist"] = 100 * u
+            group["wrist"].attrs["unit"] = b"deg"
+    demos = kineme.read_recordings(path).demonstrations
+    assert [one.unit for one in demos.channels] == ["mm", "mm", "deg"]
+    np.testing.assert_allclose(demos.durations, 0.58)
+    with h5py.File(path, "a") as file:
+        file["wave_1/hand"].attrs["units"] = ["m", "mm"]
+    (problem,) = kineme.read_recordings(path).problems
+    assert "expected 'hand' in mm, mm, as in the first movement, got m, mm" in str(problem)
+
+
+def test_units_of_movements_without_times_are_read_and_must_agree(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path, u = tmp_path / "a.h5", np.linspace(0, 1, 30)
+    with h5py.File(path, "w") as file:
+        for name, n in (("wave", 30), ("nod", 20)):
+            file[name] = np.column_stack([u, u**2])[:n]
+            file[name].attrs["units"] = "mm"
+    read = kineme.read_recordings(path, units=0.1)
+    assert [one.unit for one in read.demonstrations.channels] == ["mm", "mm"]
+    with h5py.File(path, "a") as file:
+        file["nod"].attrs["units"] = "m"
+    with pytest.raises(kineme.KinemeError, match="unit"):
+        kineme.read_recordings(path, units=0.1)

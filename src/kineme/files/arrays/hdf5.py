@@ -13,12 +13,14 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.arrays.tree_movements import tree_movements
 from kineme.files.arrays.trees import GROUPS, RATE_NAMES, STEP_NAMES
+from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
+_UNITS = frozenset({"unit", "units"})  # attributes
 _ATTRIBUTES = frozenset({"label", "task"}) | RATE_NAMES | STEP_NAMES
 
 
@@ -46,9 +48,13 @@ def hdf5_movements(path: Path, layout: Layout) -> Parsed:
         raise DataError(f"expected an HDF5 file, got something foreign, truncated or damaged ({error})") from error
 
 
-def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0) -> dict[str, Any]:
-    """A group as a mapping: data sets that are not read yet, single numbers and texts, groups."""
+def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any = None) -> dict[str, Any]:
+    """A group as a mapping: data sets that are not read yet, single numbers and texts, groups.
+
+    `unit` is that of the group around it, for data sets that have none.
+    """
     tree: dict[str, Any] = {}
+    unit = _unit_in(group) or unit
     for name in group.attrs:
         if name.lower() in _ATTRIBUTES and (value := _single(group.attrs[name])) is not None:
             tree[name] = value
@@ -61,13 +67,24 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0) -> dict[str
         one = group[name]
         if isinstance(one, Mapping):
             if depth < _DEEPEST:
-                tree[name] = _tree(one, h5py, counted, depth + 1)
+                tree[name] = _tree(one, h5py, counted, depth + 1, unit)
         elif isinstance(one, h5py.Dataset) and not one.external and not one.is_virtual:
             if one.shape == ():
                 tree[name] = _single(one[()])
             elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = _Stored(one)
+                tree[name] = _Stored(one, _unit_in(one) or ("" if is_time(name) else unit))
     return tree
+
+
+def _unit_in(stored: Any) -> Any:
+    """The unit in the attributes of a group or of a data set, or one for each of its columns; None without."""
+    for name in stored.attrs:
+        if name.lower() in _UNITS:
+            value = stored.attrs[name]
+            units = [_single(one) for one in np.ravel(value)] if np.ndim(value) else [_single(value)]
+            if units and all(isinstance(one, str) for one in units):
+                return units[0] if len({*units}) == 1 else units
+    return None
 
 
 class _Stored:
@@ -81,8 +98,8 @@ class _Stored:
         On reading: samples that were never written, or that expand by more than gzip can.
     """
 
-    def __init__(self, stored: Any) -> None:
-        self._stored, self.shape, self.dtype = stored, stored.shape, stored.dtype
+    def __init__(self, stored: Any, unit: Any) -> None:
+        self._stored, self.shape, self.dtype, self.unit = stored, stored.shape, stored.dtype, unit
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.asarray(self[()], dtype)

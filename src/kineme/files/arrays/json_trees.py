@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ from kineme.errors import DataError
 from kineme.files.arrays.arrays import arrays_movements, has_known_names
 from kineme.files.arrays.tree_movements import tree_movements
 from kineme.files.limits import check_expanded
+from kineme.files.tables.dialect import is_number
 from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
+from kineme.movements.tables.time_stamps import is_date, seconds_of_dates
 
 _NUMBER, _LIST = 32, 88  # bytes of a Python object
 
@@ -27,6 +29,8 @@ def json_movements(data: bytes, layout: Layout) -> Parsed:
     except json.JSONDecodeError as error:
         raise DataError(f"expected JSON, got a truncated or damaged file ({error}); write it again") from error
     if isinstance(entries, Mapping):
+        if (frame := _frame(entries)) is not None:
+            return tree_movements(_columns_of(frame), layout, "JSON", many="take")
         if has_known_names(entries):
             return arrays_movements(entries, layout, "JSON")
     elif not isinstance(entries, list) or not any(isinstance(one, (Mapping, list)) for one in entries[:1]):
@@ -48,6 +52,59 @@ def json_lines_movements(data: bytes, layout: Layout) -> Parsed:
     if not entries:
         raise DataError("expected samples, got an empty file")
     return tree_movements(as_tree(entries), layout, "JSON lines", many="take")
+
+
+def _frame(entries: Mapping[str, Any]) -> dict[str, list[Any]] | None:
+    """The columns of a data frame as pandas writes it by columns, by its index, or split; None of something else.
+
+    Its index is a column too: the times if it holds dates.
+    """
+    if {*entries} == {"columns", "index", "data"}:
+        if any(not isinstance(row, list) or len(row) != len(entries["columns"]) for row in entries["data"]):
+            raise DataError("expected a row of data with a number for each of the columns, got another one")
+        heads = ["_".join(map(str, one)) if isinstance(one, list) else str(one) for one in entries["columns"]]
+        return _with_index(
+            entries["index"], dict(zip(heads, map(list, zip(*entries["data"], strict=True)), strict=True))
+        )
+    rows = list(entries.values())
+    if not rows or not all(isinstance(row, Mapping) and row and row.keys() == rows[0].keys() for row in rows):
+        return None
+    if any(isinstance(cell, (Mapping, list)) for row in rows for cell in row.values()):
+        return None
+    if _counts(rows[0]):
+        return _with_index(list(rows[0]), {head: list(column.values()) for head, column in entries.items()})
+    if _counts(entries):
+        return _with_index(list(entries), {head: [row[head] for row in rows] for head in rows[0]})
+    return None
+
+
+def _counts(names: Iterable[str]) -> bool:
+    """Whether names are those of the rows of a frame: numbers or dates."""
+    return all(is_number(name, False) or is_date(name) for name in names)
+
+
+def _with_index(index: list[Any], columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    texts = [str(one) for one in index]
+    head = "time" if all(map(is_date, texts)) else "index"
+    if head in columns:
+        return columns
+    return {
+        head: texts if head == "time" else [float(one) if is_number(one, False) else one for one in texts]
+    } | columns
+
+
+def _columns_of(frame: Mapping[str, list[Any]]) -> dict[str, Any]:
+    """Columns as arrays; of times that are texts the seconds, which their head says."""
+    tree = {}
+    for head, cells in frame.items():
+        if is_time(head) and any(isinstance(one, str) for one in cells):
+            seconds, others = seconds_of_dates([str(one) for one in cells])
+            if others:
+                raise DataError(f"expected dates or durations in {head!r}, got {next(iter(others.values()))!r:.80}")
+            tree[f"{head} (s)"] = seconds
+        else:
+            tree[head] = _array(cells)
+    return tree
 
 
 def check_objects(data: bytes) -> None:
@@ -96,7 +153,7 @@ def _columns(samples: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Samples with names as one array for each name, NaN where it is missing."""
     flat = [_flat(one) for one in samples]
     names = dict.fromkeys(name for one in flat for name in one)
-    return {name: _array([one.get(name) for one in flat]) for name in names}
+    return _columns_of({name: [one.get(name) for one in flat] for name in names})
 
 
 def _flat(sample: Mapping[str, Any]) -> dict[str, Any]:

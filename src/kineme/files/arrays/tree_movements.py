@@ -87,9 +87,12 @@ def _bare(found: Sequence[Found], layout: Layout, kind: str) -> Parsed:
     found = [one for one, x in zip(found, xs, strict=True) if x.shape[1] == width]
     xs = [x for x in xs if x.shape[1] == width]
     labels = [one.label for one in found]
-    return parsed_arrays(
-        xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed")
-    )._replace(left_out=odd)
+    units = {tuple(_units_of(next(iter(one.entries.values())), width)) for one in found}
+    if len(units) > 1:
+        raise DataError(f"expected movements in one unit, got {sorted(units)}; read them apart")
+    parsed = parsed_arrays(xs, None, Named(labels, TIMES[0], [one.place for one in found]), layout, (kind, "keyed"))
+    measured_in = next(iter(units)) if any(next(iter(units))) and layout.coordinates is None else ()
+    return parsed._replace(detected=parsed.detected._replace(measured_in=measured_in), left_out=odd)
 
 
 def _plainly_named(one: Found) -> Found:
@@ -123,6 +126,12 @@ def _is_text(entry: Any) -> bool:
     return entry.dtype.kind in "OU"
 
 
+def _units_of(array: Any, width: int) -> list[str]:
+    """The unit of each of the columns of an array, empty where it says none."""
+    unit = getattr(array, "unit", None) or ""
+    return [unit] * width if isinstance(unit, str) else unit if len(unit) == width else [""] * width
+
+
 def _table(
     found: Sequence[Found], first: Found, columns: tuple[Sequence[str], Sequence[str]], needed: Mapping[str, bool]
 ) -> Table:
@@ -142,6 +151,9 @@ def _table(
         of_texts = name in first.entries and _is_text(first.entries[name])
         for one, length, start in zip(found, lengths, offsets, strict=False):
             part, fault = _part(one, name, length, (widths[name], of_texts, not is_coordinate))
+            here, there = (_units_of(each.entries.get(name), widths[name]) for each in (one, first))
+            if here != there and not fault:
+                fault = f"expected {name!r} in {', '.join(there)}, as in the first movement, got {', '.join(here)}"
             parts.append(part)
             if fault:
                 faults[int(start)] = fault
@@ -152,8 +164,9 @@ def _table(
         filled.append(arrays[owner][:, numbers[owner]] if owner in arrays else None)
         numbers[owner] += 1
     segments = Segments(offsets, [one.place for one in found], [one.label for one in found])
+    units = [unit for name in dict.fromkeys(owners) for unit in _units_of(first.entries.get(name), widths[name])]
     whole = None if len(found) == 1 and not found[0].place and found[0].label is None else segments
-    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, segments=whole)
+    return Table(tuple(heads), filled, int(offsets[-1]), no_lines, faults, None, units, whole)
 
 
 def _part(one: Found, name: str, length: int, kind: tuple[int, bool, bool]) -> tuple[Any, str]:

@@ -33,6 +33,14 @@ _DATE_WORDS = frozenset({"unix", "epoch", "utc"})
 _DRIFT = 1e-4  # of the time that passed, between two clocks of one device
 
 _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?\s?(Z|[-+]\d\d:?\d\d)?")
+_CLOCK = r"(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d([.,]\d+)?)"
+#: A time of day, a duration as pandas writes it, and one after ISO 8601.
+_DURATIONS = (
+    re.compile(rf"((?P<d>-?\d+) days? ?\+?)?{_CLOCK}"),
+    re.compile(r"P(?P<d>-?\d+)DT(?P<h>\d+)H(?P<m>\d+)M(?P<s>\d+([.,]\d+)?)S"),
+    re.compile(r"(?P<d>-?\d+) days?"),
+)
+_HOUR, _DAY = 3600.0, 86400.0
 
 #: Sources of a unit that are guesses.
 GUESSED = ("since 1970", "by its steps", "assumed")
@@ -102,20 +110,39 @@ def in_seconds(stamps: Array, units: str | float) -> Array:
 
 
 def is_date(cell: str) -> bool:
-    """Whether a cell reads as a date with a time of day, after ISO 8601."""
-    return _DATE.fullmatch(cell) is not None
+    """Whether a cell reads as a date with a time of day, after ISO 8601, as a time of day, or as a duration."""
+    return _DATE.fullmatch(cell) is not None or _duration(cell) is not None
 
 
 def seconds_of_dates(cells: Sequence[str]) -> tuple[Array, dict[int, str]]:
-    """Seconds since 1970 to the microsecond, NaN where a cell is no date; and row -> that cell. No zone is UTC."""
+    """Seconds, NaN where a cell is no date, time of day or duration; and row -> that cell.
+
+    Of dates they count from 1970, to the microsecond; no zone is UTC. Where times of day pass midnight, they go on.
+    """
     seconds, others = np.full(len(cells), np.nan), {}
     for row, cell in enumerate(cells):
+        if (duration := _duration(cell.strip())) is not None:
+            seconds[row] = duration
+            continue
         try:
             date = datetime.fromisoformat(cell.strip())
             seconds[row] = (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
         except (ValueError, OverflowError):
             others[row] = cell
+    late, early = seconds[:-1] >= _DAY - _HOUR, seconds[1:] < _HOUR
+    if (midnights := late & early & (seconds[:-1] < _DAY)).any():
+        seconds[1:] += _DAY * np.cumsum(midnights)
     return seconds, others
+
+
+def _duration(cell: str) -> float | None:
+    """The seconds of a time of day or of a duration: ``12:30:01.5``, ``0 days 00:00:00.01``, ``P0DT0H0M0.01S``."""
+    match = next(filter(None, (one.fullmatch(cell) for one in _DURATIONS)), None)
+    if match is None:
+        return None
+    parts = match.groupdict()
+    days, hours, minutes = (float(parts.get(name) or 0) for name in "dhm")
+    return days * _DAY + hours * _HOUR + minutes * 60.0 + float((parts.get("s") or "0").replace(",", "."))
 
 
 def nanoseconds(stamps: NDArray[Any]) -> Array:
