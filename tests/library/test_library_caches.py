@@ -16,6 +16,7 @@ from kineme.library.recognition import calibration_cache
 from kineme.library.recognition import reduced_features_cache as features_cache
 from kineme.library.recognition.members import members_of
 from kineme.library.recognition.recognize import LibraryRecognizer
+from kineme.recognition.confidence import EXPONENT
 from kineme.recognition.conformal import Calibration, calibrate
 
 CODES, CALIBRATION = features_cache.FILE, calibration_cache.FILE
@@ -233,7 +234,8 @@ def test_the_calibration_of_a_small_library_is_computed_once(of_all, tmp_path):
     (found, read), (again, _) = _all_answers(library), _all_answers(library)
     assert found == again == expected
     assert len(computed) == 1
-    for name in vars(made):
+    assert (made.between, made.exponent) == (read.between, read.exponent) != (0.0, EXPONENT)
+    for name in vars(made).keys() - {"between", "exponent"}:
         for one, other in zip(getattr(made, name), getattr(read, name), strict=True):
             np.testing.assert_array_equal(one, other)
     (tmp_path / calibration_cache.FILE_OF_ALL).write_bytes(b"spoiled")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.stats import chi
 
@@ -16,7 +16,7 @@ from kineme.comparison.described import Described
 from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.kernels.procrustes import Prepared, Procrustes
-from kineme.recognition.confidence import class_probabilities
+from kineme.recognition.confidence import EXPONENT, class_probabilities, fit_exponent
 from kineme.recognition.conformal import Calibration, calibrate
 from kineme.recognition.left_out import ClassDistances, law
 from movement_samples import draw_shapes
@@ -54,13 +54,15 @@ def _drawn(rng, n_classes, n_shown, n_dims, apart=3.0, n_people=0):
     return labels, points.reshape(-1, n_dims), asked.reshape(-1, n_dims)
 
 
-def _called_unknown(n_classes, n_shown, n_dims, seeds, rate=0.05, n_people=0, grouped=False):
+def _called_unknown(n_classes, n_shown, n_dims, seeds, rate=0.05, n_people=0, by="those shown"):
     """Share of new movements of known classes that are called unknown."""
     shares = []
     for seed in seeds:
         labels, points, asked = _drawn(np.random.default_rng(seed), n_classes, n_shown, n_dims, n_people=n_people)
-        groups = np.arange(len(labels)) % n_shown % n_people if grouped else None
+        groups = np.arange(len(labels)) % n_shown % n_people if by == "groups" else None
         calibration = _calibration(points, labels, groups)
+        if by == "those shown":
+            calibration = calibration.of_those_shown()
         shares.append(np.mean(calibration.known_p_values(_asked(points, labels, asked), rate) <= rate))
     return np.mean(shares)
 
@@ -92,7 +94,35 @@ def test_of_other_people_the_error_rate_is_kept_by_groups_alone(n_shown):
     """Each shows a movement twice; new people do not do it as any of those who showed it."""
     shown = {"n_classes": 10, "n_shown": n_shown, "n_dims": 8, "seeds": range(40), "n_people": n_shown // 2}
     assert _called_unknown(**shown) >= 0.4
-    assert 0.02 <= _called_unknown(**shown, grouped=True) <= 0.08
+    assert 0.02 <= _called_unknown(**shown, by="groups") <= 0.08
+
+
+@pytest.mark.parametrize("n_shown", [2, 4, 24])
+def test_without_groups_what_is_much_nearer_to_one_class_than_to_the_next_is_known(n_shown):
+    labels, points, _ = _drawn(np.random.default_rng(0), 5, n_shown, 4)
+    others = np.where(labels[:, None] == labels, np.inf, np.linalg.norm(points[:, None] - points, axis=2)).min(axis=1)
+    calibration, typical = _calibration(points, labels), np.median(others)
+    shown = calibration.of_those_shown()
+
+    def known(away, to_next, by=calibration):
+        logs = -0.5 * np.array([[away, to_next, 50, 50, 50]]) ** 2
+        return by.known_p_values(logs, 0.05)[0] > 0.05
+
+    far = 0.9 * typical
+    assert known(0.999 * far, 50)
+    assert known(1.001 * far, 50) == known(1.001 * far, 50, shown)
+    near = 0.8 * typical
+    assert known(near, 1.501 * near)
+    assert known(near, 1.499 * near) == known(near, 1.499 * near, shown)
+    if n_shown == 24:
+        assert not known(near, 50, shown)
+
+
+def test_of_one_demonstration_each_and_with_groups_nothing_is_widened():
+    labels, points, _ = _drawn(np.random.default_rng(0), 5, 4, 4)
+    assert _calibration(points[::4], labels[::4]).between == 0
+    assert _calibration(points, labels, np.arange(20) % 4).between == 0
+    assert _calibration(points, labels, np.zeros(20, int)).between == _calibration(points, labels).between > 0
 
 
 def test_copies_within_a_group_are_never_compared():
@@ -137,15 +167,15 @@ def test_the_order_of_demonstrations_does_not_matter(seed, grouped):
 
 @given(seed=st.integers(0, 10**6))
 def test_the_larger_the_error_rate_the_more_is_unknown(seed):
-    """As long as the same rule speaks; and what is farther from all classes is not less unknown."""
+    """By the same rule; and by those who showed some, what is farther from all classes is not less unknown."""
     labels, points, asked = _drawn(np.random.default_rng(seed), 6, 4, 4)
     calibration, logs = _calibration(points, labels), _asked(points, labels, asked)
     for rates in ((0.04, 0.1, 0.15), (0.001, 0.01, 0.03)):
         found = np.array([calibration.known_p_values(logs, rate) <= rate for rate in rates])
-        assert len({tuple(calibration.rules(logs, rate)) for rate in rates}) == 1
+        assume(len({tuple(calibration.rules(logs, rate)) for rate in rates}) == 1)
         assert (np.diff(found.astype(int), axis=0) >= 0).all()
         order = np.argsort(calibration.scores(logs).min(axis=1))
-        assert (np.diff(calibration.known_p_values(logs, rates[0])[order]) <= 0).all()
+        assert (np.diff(calibration.of_those_shown().known_p_values(logs, rates[0])[order]) <= 0).all()
 
 
 def test_people_make_the_guess_from_one_demonstration_look_farther():
@@ -211,6 +241,18 @@ def test_probabilities_are_right_where_neighbors_are_drawn_evenly():
     np.testing.assert_allclose(p.sum(axis=1), 1.0)
     np.testing.assert_allclose(p[:2, 0], [0.5, 1 / (1 + 2.0**-15)])
     np.testing.assert_allclose(p[2:, 0], [1.0, 0.5])
+
+
+@pytest.mark.parametrize("exponent", [4.0, 15.0, 45.0])
+def test_the_exponent_of_classes_that_are_drawn_by_it_is_fitted(exponent):
+    rng = np.random.default_rng(0)
+    away = rng.uniform(1, 1.5, (1500, 5))
+    shares = class_probabilities(-0.5 * away**2, exponent)
+    classes = (shares.cumsum(axis=1) < rng.random((1500, 1))).sum(axis=1)
+    assert fit_exponent(away, classes) == pytest.approx(exponent, rel=0.1)
+    few = fit_exponent(away[:3], classes[:3])
+    assert min(exponent, EXPONENT) * 0.9 <= few <= max(exponent, EXPONENT) * 1.4  # mostly the prior
+    assert fit_exponent(away[:0], classes[:0]) == EXPONENT
 
 
 TABLE = {

@@ -177,6 +177,14 @@ def test_probabilities_sum_to_one_and_agree_with_the_label(classifier, n_classes
     np.testing.assert_array_equal(recognizer.classes_[shares.argmax(axis=1)], recognizer.predict(demos))
 
 
+@pytest.mark.parametrize("classifier", ["nearest", "nearest-each"])
+def test_probabilities_are_those_of_the_answers(classifier):
+    demos, fresh = draw_shapes([3] * 4), draw_shapes([5] * 4, seed=1, spread=0.8)
+    recognizer = Recognizer(classifier=classifier).fit(demos)
+    answers = [list(one.probabilities.values()) for one in recognizer.recognize(fresh)]
+    np.testing.assert_allclose(recognizer.predict_proba(fresh), answers, rtol=1e-9)
+
+
 def test_it_is_a_scikit_learn_classifier():
     demos = draw_shapes([4] * 3)
     arrays = np.array([one.positions for one in demos])

@@ -281,7 +281,7 @@ def verdicts_of(
     names = [one.name for one in compared.comparison.representations]
     known = np.array([label is not None for label in labels])
     similar = compared.nearest_each if isinstance(classifier, NearestEach) else compared.nearest
-    probabilities = class_probabilities(similar)
+    probabilities = class_probabilities(similar, calibration.exponent)
     confidence = np.where(known, probabilities[np.arange(len(shown)), shown], 1.0 - p_known).tolist()
     return [
         Verdict(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,14 @@ from numpy.typing import NDArray
 from kineme.comparison.references import References
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.errors import SpecificationError
+from kineme.recognition.confidence import EXPONENT, fit_exponent
 from kineme.recognition.left_out import (
+    DIMENSIONS,
     LEAST,
     REACH,
     REACH_OF_OTHERS,
+    REACH_OF_STRANGERS,
+    REACH_TO_NEXT,
     ClassDistances,
     Scored,
     broad_law,
@@ -26,7 +31,9 @@ from kineme.recognition.left_out import (
     distances,
     finite,
     law,
+    reaching,
     score_classes,
+    typical_distance,
     typical_scale,
 )
 from kineme.sampling import evenly_spaced
@@ -91,8 +98,12 @@ class Calibration:
     the first and the last samples of two recordings do, and its own next movement would be unknown. Movements of people
     vary by more: by 0.19 of that median at the least, in LASA, handwritten letters and gestures in space.
 
-    With groups, such as people, the rates hold for movements of other groups; without, for more movements like the
-    demonstrations. ``python -m bench --only open_set`` measures both.
+    With groups, such as people, the rates hold for movements of other groups, on average over groups. Without groups
+    repetitions by one person tell nothing of how much people differ. A movement by somebody else is still much nearer
+    to its class than to any other, so the p of all known classes together is then at least ``exp(-pi/4 (d / u)^2)``,
+    with d the distance to the nearest class. u is set so that this is 0.05 at 0.9 of the median distance from a
+    demonstration to the nearest other class, or at two thirds of the movement's own distance to the second nearest
+    class, if that is less. ``python -m bench --only open_set`` measures all this.
 
     Attributes
     ----------
@@ -104,6 +115,11 @@ class Calibration:
         For each class, the scores of all demonstrations, each scored against as many as the class has.
     own_novelties, pooled_novelties : tuple of C ndarrays
         The same of novelties; of `sampled_calibration` the scores of members, which are not smaller.
+    between : float
+        The median distance, in kernel widths, from a demonstration to the nearest other class; 0 where groups tell how
+        much people differ, and where each class has one demonstration.
+    exponent : float
+        Power of the ratio of distances by which classes are likely, see `class_probabilities`.
     """
 
     scales: Array
@@ -111,6 +127,12 @@ class Calibration:
     pooled: tuple[Array, ...]
     own_novelties: tuple[Array, ...]
     pooled_novelties: tuple[Array, ...]
+    between: float = 0.0
+    exponent: float = EXPONENT
+
+    def of_those_shown(self) -> Calibration:
+        """The calibration for movements by those who showed some, whatever the groups."""
+        return replace(self, between=0.0)
 
     def scores(self, nearest: Array) -> Array:
         """Nonconformity (n, C) of movements whose log similarity to each class's nearest demonstration is given."""
@@ -138,7 +160,17 @@ class Calibration:
                 result[like == c] = _shares(chosen[1], own)
             else:
                 result[like == c] = law(own / max(few.mean(), LEAST)) if len(few) else broad_law(own)
-        return result
+        return np.maximum(result, self._by_strangers(nearest))
+
+    def _by_strangers(self, nearest: Array) -> Array:
+        """P-values (n,) if somebody else made the movements; 0 where groups tell how much people differ."""
+        if not self.between:
+            return np.zeros(len(nearest))
+        away = np.sort(distances(nearest), axis=1)
+        reach = np.full(len(away), REACH_OF_STRANGERS * self.between)
+        if away.shape[1] > 1:
+            reach = np.minimum(reach, REACH_TO_NEXT * away[:, 1])
+        return broad_law(away[:, 0] / np.maximum(reaching(reach), LEAST))
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
         """The rule of each movement's `known_p_values`: "class", "pooled" or "guess", see `RULES`."""
@@ -174,8 +206,9 @@ class Calibration:
         """The calibration of some of the classes, in rising order."""
         if len(classes) == len(self.scales):
             return self
-        parts = (self.own, self.pooled, self.own_novelties, self.pooled_novelties)
-        return Calibration(self.scales[classes], *(tuple(part[c] for c in classes) for part in parts))
+        parts = ("own", "pooled", "own_novelties", "pooled_novelties")
+        of_some: dict[str, Any] = {name: tuple(getattr(self, name)[c] for c in classes) for name in parts}
+        return replace(self, scales=self.scales[classes], **of_some)
 
     def _counting(self, error_rate: float) -> tuple[list[Counted | None], list[Counted | None]]:
         """What counts of the scores and of the novelties; kept for the error rate that was asked for last."""
@@ -250,8 +283,32 @@ def calibrate(
         tuple(pooled[int(size)] for size in counts),
         tuple(novelties[int(size)][0][novelties[int(size)][1] == c] for c, size in enumerate(counts)),
         tuple(novelties[int(size)][0] for size in counts),
+        between_classes(to_others, blocks, groups),
+        _exponent(blocks, others),
     )
     return made.with_least_scales(np.full(len(counts), least_scale(to_others)))
+
+
+def _exponent(blocks: Sequence[ClassDistances], others: Sequence[Array]) -> float:
+    """The exponent fitted to what is left out: to as many of its own class, about, as of the others."""
+    away = np.concatenate(others)
+    classes = np.repeat(np.arange(len(blocks)), [len(one) for one in others])
+    own = np.concatenate([_own(block) for block in blocks])
+    away[np.arange(len(away)), classes] = own
+    return fit_exponent(away[np.isfinite(own)], classes[np.isfinite(own)])
+
+
+def _own(block: ClassDistances) -> Array:
+    """Distances to the nearest other one of the class, if as many were left as the class has."""
+    size = block.distances.shape[1]
+    return np.asarray(block.nearest(size)[0] * (np.maximum(block.counted(size), 1) / size) ** (1 / DIMENSIONS))
+
+
+def between_classes(to_others: Array, blocks: Sequence[ClassDistances], groups: NDArray[np.intp] | None) -> float:
+    """`Calibration.between`, from distances of demonstrations to the nearest other class and to those of their own."""
+    if groups is not None or not any(np.isfinite(block.distances).any() for block in blocks):
+        return 0.0
+    return typical_distance(to_others)
 
 
 def least_scale(to_others: Array) -> float:

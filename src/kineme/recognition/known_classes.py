@@ -119,7 +119,7 @@ def _known(
 def open_set_labels(
     known: KnownClasses, described: Described, error_rate: float = 0.05
 ) -> tuple[NDArray[np.object_], Array]:
-    """The class of each described movement and its p-values.
+    """The class of each described movement by those who showed some, and its p-values.
 
     Returns
     -------
@@ -130,5 +130,6 @@ def open_set_labels(
     check_error_rate(error_rate)
     similarities, scores = score(known.comparison, known.references, described, nearest, known.classifier.scores)
     p_values = known.calibration.p_values(similarities, error_rate)
-    labels = known_labels(known.references.classes, scores, similarities, known.calibration, error_rate)
+    calibration = known.calibration.of_those_shown()
+    labels = known_labels(known.references.classes, scores, similarities, calibration, error_rate)
     return labels, p_values

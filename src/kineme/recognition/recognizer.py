@@ -27,7 +27,8 @@ from kineme.movements.trajectories.demonstrations import Demonstrations, check_l
 from kineme.movements.trajectories.movements_like import HasDemonstrations, MovementLike, MovementsLike
 from kineme.movements.trajectories.trajectory import Trajectory
 from kineme.recognition.answer import Answer, answers, is_one, known_labels
-from kineme.recognition.classifiers import CLASSIFIERS, fit_classifier
+from kineme.recognition.classifiers import CLASSIFIERS, SupportVectors, fit_classifier
+from kineme.recognition.confidence import class_probabilities
 from kineme.recognition.conformal import Calibration, calibrate, check_error_rate
 from kineme.recognition.left_out import check_groups
 from kineme.validation import Array, check_choice
@@ -236,14 +237,18 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         return np.asarray(references.classes[best])
 
     def predict_proba(self, X: MovementsLike) -> Array:
-        """Each class's share of the similarity, shape (n, C); rows sum to 1.
+        """Probability of each class for movements of known classes, shape (n, C); rows sum to 1.
 
-        A softmax of the scores, not a calibrated probability; `recognize` gives p-values and states whether they are
-        calibrated.
+        The largest is that of `predict`. By the classifiers "nearest" and "nearest-each" they are those of
+        `Answer.probabilities`, see `class_probabilities`; by "prototype" they follow in the same way from the distances
+        to the prototypes; by "svm" they are a softmax of its scores, which nothing calibrates. Whether a movement is of
+        a known class at all is what `recognize` tells.
         """
         scores = self._scores(X)
-        shares = np.exp(scores - scores.max(axis=1, keepdims=True))
-        return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+        if isinstance(self.classifier_, SupportVectors):
+            shares = np.exp(scores - scores.max(axis=1, keepdims=True))
+            return np.asarray(shares / shares.sum(axis=1, keepdims=True))
+        return class_probabilities(scores, self.calibration().exponent)
 
     def score(self, X: MovementsLike, y: ArrayLike | None = None, sample_weight: Any = None) -> float:
         """Share of movements recognized as what they are; labels `y` are by default those of the demonstrations."""
@@ -303,7 +308,7 @@ class Recognizer(ClassifierMixin, BaseEstimator):
         """The calibration of the p-values; computed on first use, since it compares all demonstrations."""
         comparison, references = self._fitted
         made = self._calibration
-        if made is None or "own_novelties" not in vars(made):  # by an earlier version
+        if made is None or "exponent" not in vars(made):  # by an earlier version
             self._calibration = made = calibrate(comparison.similarity, references, vars(self).get("_groups"))
         return made
 

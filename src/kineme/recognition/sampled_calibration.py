@@ -10,7 +10,7 @@ from kineme.comparison.bounds import log_bounds
 from kineme.comparison.described import Described
 from kineme.comparison.similarity import AveragedSimilarity
 from kineme.comparison.stored_references import Rows, StoredReferences
-from kineme.recognition.conformal import Calibration, least_scale
+from kineme.recognition.conformal import Calibration, between_classes, least_scale
 from kineme.recognition.left_out import (
     REACH,
     REACH_OF_OTHERS,
@@ -42,12 +42,12 @@ def calibrate_sample(
 ) -> Calibration:
     """The `Calibration` of movements that are stored elsewhere; `groups` are the numbers (m,) of the members' groups.
 
-    As `conformal.calibrate`, with four differences: novelties are the scores of members, as other classes are not
-    compared with, so that somewhat fewer than the error rate are called unknown; up to a hundred movements of a
-    class calibrate it, but only about 4000 in all and of a thousand classes, so that above 200 classes the scores
-    of all classes count; classes of more than 16 are compared as if they were equally large; and the nearest
-    movement is the nearest of the eight with the largest bounds. Distances are to the whole class, not to the
-    sample.
+    As `conformal.calibrate`, with five differences: novelties are the scores of members, as other classes are not
+    compared with, so that somewhat fewer than the error rate are called unknown; the exponent is not fitted; up to a
+    hundred movements of a class calibrate it, but only about 4000 in all and of a thousand classes, so that above 200
+    classes the scores of all classes count; classes of more than 16 are compared as if they were equally large; and
+    the nearest movement is the nearest of the eight with the largest bounds. Distances are to the whole class, not to
+    the sample.
     """
     n_classes = len(stored.first)
     sampled = evenly_spaced(n_classes, _CLASSES)
@@ -75,6 +75,7 @@ def calibrate_sample(
         tuple(pooled[int(level)] for level in levels),
         tuple(own),
         tuple(novelties[int(level)] for level in levels),
+        between_classes(to_others, windows, groups),
     )
     return made.with_least_scales(np.full(n_classes, least_scale(to_others)))
 

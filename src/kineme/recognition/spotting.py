@@ -104,7 +104,7 @@ def spot(
     logs, similar = score(comparison, references, pieces_of(whole, rows), nearest, nearest_each)
     p_known = calibration.known_p_values(logs, error_rate)
     confidence = 1.0 - p_known
-    confidence[: len(best)] = class_probabilities(similar)[np.arange(len(best)), best]
+    confidence[: len(best)] = class_probabilities(similar, calibration.exponent)[np.arange(len(best)), best]
     classes = references.classes.tolist()
     labels = [*(classes[c] for c in best.tolist()), *([None] * len(unknown))]
     t = whole.times

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
@@ -30,7 +31,7 @@ from kineme.validation import Array
 FILE = "calibration.cache"  # of a large library, by a sample
 FILE_OF_ALL = "calibration_of_all.cache"  # of a smaller one, whose members are all compared
 
-_FORMAT = "3"
+_FORMAT = "4"
 _FEW = 500  # members of which a calibration takes 0.1 s: computed every time
 _SPOILED = (OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, BadZipFile, zlib.error)
 _SAMPLE = 500  # movements that widths and weights are estimated from, evenly spaced as in `Recognizer.fit`
@@ -108,7 +109,7 @@ def _serialized(calibration: Calibration, key: str) -> bytes:
     for name, several in (("", calibration.own), ("novel ", calibration.own_novelties)):
         arrays |= {f"{name}own": np.concatenate(several), f"{name}ends": np.cumsum([len(one) for one in several])}
     file = io.BytesIO()
-    np.savez(file, scales=calibration.scales, **arrays)
+    np.savez(file, scales=calibration.scales, two=[calibration.between, calibration.exponent], **arrays)
     return _seal(file.getvalue(), key) + file.getvalue()
 
 
@@ -127,12 +128,16 @@ def _deserialized(data: bytes, key: str, n: int) -> Calibration:
         pooled, novelties = (
             [_real(arrays[f"{name} {k}"]) for k in range(int(which.max()) + 1)] for name in ("pooled", "novelties")
         )
-        scales = _real(arrays["scales"])
+        scales, (between, exponent) = _real(arrays["scales"]), _real(arrays["two"]).tolist()
         own, own_novelties = (_split(arrays[f"{name}own"], arrays[f"{name}ends"], n) for name in ("", "novel "))
-    if scales.shape != (n,) or not ((scales > 0) & np.isfinite(scales)).all():
+    if (
+        scales.shape != (n,)
+        or not ((scales > 0) & np.isfinite(scales)).all()
+        or not (0 <= between < math.inf and 0 < exponent < math.inf)
+    ):
         raise ValueError("no calibration")
     every = tuple(pooled[k] for k in which), tuple(novelties[k] for k in which)
-    return Calibration(scales, own, every[0], own_novelties, every[1])
+    return Calibration(scales, own, every[0], own_novelties, every[1], between, exponent)
 
 
 def _split(scores: NDArray[Any], ends: NDArray[Any], n: int) -> tuple[Array, ...]:

@@ -5,9 +5,11 @@ import { certainty } from "./certainty.js";
 import { describeMovement, fillShapes, featureRows, N_POINTS, roomForShapes } from "./description.js";
 import { squaredDistances } from "./distances.js";
 
-const EXPONENT = 15; // of the ratio of distances: the odds of two classes
 const LEAST = 5e-3; // smallest distance that counts, in kernel widths
 const NO_DISTANCE = 1e-5; // of a log similarity: rounding
+const REACH_OF_STRANGERS = 0.9; // of the typical distance between classes: how far people differ at the most
+const REACH_TO_NEXT = 2 / 3; // of the distance to the next class
+const SCALE_OF_REACH = Math.sqrt(Math.PI / 4 / Math.log(20)); // by which the broad law is 0.05 at a reach of 1
 const SHOWN = 3; // movements named in an answer
 const MEAN_IN_EIGHT = (Math.SQRT2 * 11.631728396567448) / 6; // of chi with 8 degrees of freedom: gamma(4.5) / gamma(4)
 
@@ -169,6 +171,15 @@ function counted(known, kind, c, errorRate) {
   return enough(pooled) ? { rule: "pooled", scores: pooled, pooled } : { rule: "guess", scores: null, pooled };
 }
 
+/** The p-value if somebody else made the movement; 0 where groups tell how much people differ. */
+function byStrangers(known, away) {
+  const { between } = known.header.calibration;
+  if (!between) return 0;
+  const [nearest, next = Infinity] = Float64Array.from(away).sort();
+  const reach = Math.min(REACH_OF_STRANGERS * between, REACH_TO_NEXT * next);
+  return broadLaw(nearest / Math.max(reach * SCALE_OF_REACH, LEAST));
+}
+
 /**
  * P-values of each class and of all together, see kineme.recognition.conformal.
  * @param {Known} known
@@ -176,7 +187,8 @@ function counted(known, kind, c, errorRate) {
  * @param {number} errorRate
  */
 function pValues(known, nearest, errorRate) {
-  const scores = nearest.map((log, c) => distance(log) / known.arrays.scales[c]);
+  const away = nearest.map(distance);
+  const scores = away.map((one, c) => one / known.arrays.scales[c]);
   const found = Array.from(scores, (_, c) => counted(known, "scores", c, errorRate));
   const each = scores.map((score, c) => (found[c].scores ? shareAbove(found[c].scores, score) : broadLaw(score)));
   const like = scores.reduce((best, score, c) => (score < scores[best] ? c : best), 0);
@@ -185,15 +197,16 @@ function pValues(known, nearest, errorRate) {
   const guess = all.pooled.length ? law(scores[like] / Math.max(mean, LEAST)) : broadLaw(scores[like]);
   return {
     each,
-    known: all.scores ? shareAbove(all.scores, scores[like]) : guess,
+    known: Math.max(all.scores ? shareAbove(all.scores, scores[like]) : guess, byStrangers(known, away)),
     rule: all.rule,
     calibrated: found.every((one) => one.scores !== null),
   };
 }
 
-/** Probability of each class for movements of one of them: the odds are ratios of distances to the power of 15. */
-function probabilities(similar) {
-  return softmax(similar.map((log) => -EXPONENT * Math.log(Math.max(distance(log), LEAST))));
+/** Probability of each class for movements of one of them: the odds are ratios of distances to the power fitted. */
+function probabilities(known, similar) {
+  const { exponent } = known.header.calibration;
+  return softmax(similar.map((log) => -exponent * Math.log(Math.max(distance(log), LEAST))));
 }
 
 /**
@@ -212,7 +225,7 @@ export function recognize(known, one, errorRate = 0.05) {
   const isKnown = p.known > errorRate;
   const ranked = descending(compared.scores);
   const shown = isKnown ? chosen : ranked[0];
-  const odds = probabilities(compared.similar);
+  const odds = probabilities(known, compared.similar);
   const own = compared.average.subarray(first[shown], first[shown + 1] ?? known.stored.m);
   const nearest = descending(own).slice(0, SHOWN)
     .map((j) => ({ index: first[shown] + j, similarity: Math.exp(own[j]) }));

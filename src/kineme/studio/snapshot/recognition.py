@@ -166,4 +166,5 @@ def _calibration(calibration: Calibration) -> tuple[dict[str, Any], dict[str, ND
     for name, several in parts.items():
         arrays[name] = np.concatenate([np.sort(one) for one in several])
         arrays[f"{name} ends"] = np.cumsum([len(one) for one in several]).astype(np.int32)
-    return {"pooled": [numbers[pair] for pair in shared]}, arrays
+    header = {"between": calibration.between, "exponent": calibration.exponent}
+    return {"pooled": [numbers[pair] for pair in shared], **header}, arrays
