@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
 import kineme
+from kineme.errors import TrajectoryError
 from kineme.robots import load, move
 from kineme.robots.kinematics.descent import kinematics
 from kineme.robots.kinematics.inverse import ORIENTATIONS
@@ -89,6 +92,32 @@ def test_the_path_that_an_arm_recorded_is_followed_whatever_is_left_free(tmp_pat
         made = move(movement, robot, follow=follow, timing="slowed")
         assert tracked(made) < 0.02  # mm
         assert np.all((made.trajectory.positions >= robot.lower) & (made.trajectory.positions <= robot.upper))
+
+
+def test_joints_that_a_pose_leaves_free_keep_off_their_stops_and_do_not_slow_the_movement_down(tmp_path):
+    robot = arm("pr2", tmp_path)
+    made = move(recorded(robot, 13), robot, timing="slowed")
+    assert tracked(made) < 0.02  # mm
+    assert made.factor < 1.1
+
+
+@settings(max_examples=2)
+@example(name="so101", seed=676, share=0.34)
+@given(name=st.sampled_from(list(SEEDS)), seed=st.integers(0, 999), share=st.floats(0.3, 0.97))
+def test_what_is_followed_in_full_is_followed_by_its_axis_and_by_its_position_alone(
+    tmp_path_factory, name, seed, share
+):
+    robot = arm(name, tmp_path_factory.getbasetemp())
+    movement = recorded(robot, seed, share=share)
+    followed = [follows(movement, robot, follow) for follow in ORIENTATIONS]
+    assert followed == sorted(followed)
+
+
+def follows(movement, robot, follow):
+    try:
+        return tracked(move(movement, robot, follow=follow, timing="slowed", rate=25.0)) <= 1.0  # mm
+    except TrajectoryError:
+        return False
 
 
 def test_the_shortest_turn_of_the_axis_does_not_depend_on_the_turn_about_it():

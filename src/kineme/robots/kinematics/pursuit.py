@@ -7,6 +7,7 @@ import numpy as np
 from kineme.robots.kinematics.cost import AT_A_STOP, costs_of
 from kineme.robots.kinematics.descent import distances, kinematics, step_within
 from kineme.robots.kinematics.postures import postures
+from kineme.robots.kinematics.relaxation import relaxed
 from kineme.robots.kinematics.task_path import TaskPath
 from kineme.robots.models.robot import Robot
 from kineme.validation import Array
@@ -35,7 +36,7 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
     Postures at the beginning, the end and the middle of the path are followed to both ends, all at once, by Newton's
     method with limits: a joint at a stop stays there and the others do its part. What a pose leaves free stays as it
     is, or goes slowly towards the rest posture and away from stops. Of the ways that stay within 0.01 mm of the path,
-    that of least cost; the end and the middle are begun at only if a joint comes to a stop on all the others.
+    that of least cost, smoothed as `relaxed`; the end and the middle are begun at only if it comes to a stop.
 
     The parameters are those of `choose_posture`.
     """
@@ -51,13 +52,29 @@ def pursue(robot: Robot, path: TaskPath, turn_costs: Array) -> tuple[Array, Task
         for order in (range(begin, last + 1), range(begin, -1, -1)):
             _follow(robot, path, turn_costs, order, joints, errors)
         worst = errors.max(axis=0)
-        good = np.flatnonzero(worst <= min(_NEARLY, max(_FOLLOWED, min(worst, default=np.inf))))
-        costs = costs_of(robot, path.times, joints[:, good], errors[:, good]) if len(good) else np.array([np.inf])
-        if costs.min() < least:
-            least, best = float(costs.min()), joints[:, good[int(np.argmin(costs))]]
+        close = min(_NEARLY, max(_FOLLOWED, min(worst, default=np.inf)))
+        good = np.flatnonzero(worst <= close)
+        if len(good) == 0:
+            continue
+        cheapest = good[int(np.argmin(costs_of(robot, path.times, joints[:, good], errors[:, good])))]
+        way, errors = _relaxed(robot, path, turn_costs, joints[:, [cheapest]], errors[:, [cheapest]], close)
+        cost = float(costs_of(robot, path.times, way, errors)[0])
+        if cost < least:
+            least, best = cost, way[:, 0]
         if least < AT_A_STOP:
             break
     return None if best is None else (best, path)
+
+
+def _relaxed(
+    robot: Robot, path: TaskPath, turn_costs: Array, way: Array, errors: Array, close: float
+) -> tuple[Array, Array]:
+    """The way (T, 1, n) with less bending, and its errors (T, 1); itself, where that leads farther from the path."""
+    middle, half = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 2
+    limits = turn_costs, middle - _INSIDE * half, middle + _INSIDE * half
+    near = relaxed(robot, path, turn_costs, way[:, 0])
+    joints, off = _newton(robot, near, np.zeros_like(near), (path.positions, path.rotations), limits)
+    return (joints[:, None], off[:, None]) if off.max() <= close else (way, errors)
 
 
 def _follow(robot: Robot, path: TaskPath, turn_costs: Array, order: range, joints: Array, errors: Array) -> None:
