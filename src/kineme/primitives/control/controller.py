@@ -13,7 +13,7 @@ from kineme.primitives.control.limits import limits_from
 from kineme.primitives.control.moving_goal import MovingGoal
 from kineme.primitives.control.obstacles import ObstacleAvoidance
 from kineme.primitives.control.options import Options
-from kineme.primitives.control.plan import SHORTEST, Influences, Plan, check_controlled
+from kineme.primitives.control.plan import SHORTEST, Influences, Plan, ViaPlaces, check_controlled, passed
 from kineme.primitives.control.state import State, Status
 from kineme.primitives.control.stepping import stepper
 from kineme.validation import Array
@@ -77,7 +77,7 @@ class Controller:
         self._set_tau(plan.duration)
         self._tempo, self._rate, self._slowing = 1.0, 1.0 / self._tau, 0.0
         self._obstacles = self._obstacle_velocities = self._nowhere
-        self._events = _NOTHING
+        self._events, self._via_missed = _NOTHING, 0.0
         influences = Influences(*self._follow(0.0), self._zeros, self._zeros, self._nowhere, self._nowhere)
         self._motion = self._advance(plan.state, plan.begin, 0.0, influences)  # x - origin, dx/du, x''
         self.state = self._report(*self._derivatives())
@@ -245,6 +245,7 @@ class Controller:
     def _move(self, dt: float, push: Array, last: Array) -> None:
         """Advance by one step; if that leads out of the range of numbers, stay with `last`."""
         goal, ratio = self._follow(dt)
+        self._via_missed = 0.0
         goal_velocity = self._goal.velocity
         self._clock.add_time(dt)
         du = self._rate * dt
@@ -259,13 +260,24 @@ class Controller:
         goal_rate = self._zeros if goal_velocity is None else goal_velocity / self._rate
         goal = goal if goal_velocity is None else self._goal.ahead(goal, goal_rate)
         influences = Influences(goal, ratio, goal_rate, push, self._obstacles, velocities)
-        motion = self._advance(self._motion[:2], self._clock.u, du, influences)
+        begin = self._clock.u
+        motion = self._advance(self._motion[:2], begin, du, influences)
         if self._usable(motion):
-            self._motion = motion
             self._clock.add_phase(du)
+            if self._plan.via is not None:
+                self._pass(self._plan.via, begin, du, influences)
+            self._motion = motion
         else:
             self._motion = last
             self._events |= Status.STATE_KEPT
+
+    def _pass(self, via: ViaPlaces, begin: float, du: float, influences: Influences) -> None:
+        """Measure how far from the via points, whose times lie in a step of du from `begin`, the movement passes."""
+        for ahead, point in passed(via, begin, self._clock.u, du, self._plan.periodic):
+            at = self._advance(self._motion[:2], begin, ahead, influences)[0, : len(point)]
+            self._via_missed = max(self._via_missed, float(np.sqrt(np.nansum((at - point) ** 2))))
+        if not self._via_missed <= via.tolerance:
+            self._events |= Status.VIA_POINT_MISSED
 
     def _usable(self, motion: Array) -> bool:
         """Whether the movement can go on from there."""
@@ -282,7 +294,8 @@ class Controller:
     def _report(self, velocity: Array, acceleration: Array) -> State:
         x, clock = self._motion[0], self._clock
         origin, goal = self._origin, self._goal.now
-        return State(clock.time, clock.progress, origin + x, velocity, acceleration, origin + goal, self._status())
+        place, aim = origin + x, origin + goal
+        return State(clock.time, clock.progress, place, velocity, acceleration, aim, self._via_missed, self._status())
 
     def _status(self) -> Status:
         status = Status.MOVING

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -26,6 +26,14 @@ class Influences(NamedTuple):
     push: Array  # (d,), an external acceleration
     obstacles: Array  # (m, n_positions), at the start of the step
     obstacle_velocities: Array  # (m, n_positions); with these the obstacles go on during the step
+
+
+class ViaPlaces(NamedTuple):
+    """Where a movement is to be at k times, relative to the origin."""
+
+    times: Array  # (k,), normalized
+    points: Array  # (k, n_positions), or (k, d) of a movement without positions; NaN where a dimension is free
+    tolerance: float  # distance from one that is said
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +72,8 @@ class Plan:
         Whether `shape` repeats itself after u = 1; then the movement never settles.
     longest_step : float
         At most so many durations in one step.
+    via : ViaPlaces, optional
+        Its via points, which obstacles, goals and measurements may lead it away from.
     """
 
     K: float
@@ -80,6 +90,7 @@ class Plan:
     begin: float = 0.0
     periodic: bool = False
     longest_step: float = 1.0
+    via: ViaPlaces | None = None
 
     @property
     def n_dims(self) -> int:
@@ -95,6 +106,14 @@ class Plan:
     def intervals(self) -> float:
         """Quadrature intervals per unit of u: two between neighboring centers, and as many as the spring is fast."""
         return max(2.0 * self.n_gaps, math.sqrt(self.K), 0.5 * self.D)
+
+
+def passed(via: ViaPlaces, begin: float, end: float, du: float, periodic: bool) -> Iterator[tuple[float, Array]]:
+    """Yield the via points whose times lie in a step of du, after `begin` and not after `end`, and how far ahead."""
+    after, before = via.times > begin, via.times <= end
+    within = after & before if not periodic or (begin <= end and du < 1.0) else (after | before) | (du >= 1.0)
+    for time, point in zip(via.times[within].tolist(), via.points[within], strict=True):
+        yield time - begin if time > begin else time - begin + 1.0, point
 
 
 def check_controlled(plan: Any, dt: Any) -> None:

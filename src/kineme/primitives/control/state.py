@@ -25,6 +25,7 @@ class Status(Flag):
     STATE_KEPT = auto()
     AMPLITUDE_REJECTED = auto()
     PERIOD_REJECTED = auto()
+    VIA_POINT_MISSED = auto()
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -56,6 +57,9 @@ MESSAGES = {
     Status.STATE_KEPT: "the step led out of the range of numbers; the last good state was kept",
     Status.AMPLITUDE_REJECTED: "expected the amplitude as a finite number; the last good one stays",
     Status.PERIOD_REJECTED: "expected the period in seconds, above 0 and not too short for dt; the last good one stays",
+    Status.VIA_POINT_MISSED: (
+        "the movement passed a via point farther away than 1 % of its extent; via_missed says how far"
+    ),
 }
 
 REJECTED = (
@@ -84,6 +88,9 @@ class State(NamedTuple):
         In the unit of the demonstration, per second and per second squared.
     goal : ndarray of shape (d,)
         The goal in force, of a rhythm the baseline; on the way to a new one where the controller filters goals.
+    via_missed : float
+        Distance from the via point whose time passed in this step, the largest of several; 0 where none did. Of poses
+        that of the positions.
     status : Status
     """
 
@@ -93,4 +100,5 @@ class State(NamedTuple):
     velocity: Array
     acceleration: Array
     goal: Array
+    via_missed: float
     status: Status

@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
-from kineme.primitives.control.plan import Plan
+from kineme.primitives.control.plan import Plan, ViaPlaces
 from kineme.primitives.discrete.learned import Learned
 from kineme.primitives.discrete.modulate import modulated
 from kineme.primitives.discrete.own_primitives import own_primitives
 from kineme.primitives.discrete.rollout import Rollout, rollout
-from kineme.primitives.discrete.via_points import ViaLike
+from kineme.primitives.discrete.via_points import ViaLike, ViaPoints, via_points
 from kineme.validation import Array, check_number
 
 _SETTLED = 1e-3  # of the demonstration's largest extent
+_MISSED = 1e-2  # the same: farther from a via point is said
 
 
 def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
@@ -39,11 +40,13 @@ def plan_of(  # noqa: PLR0913, PLR0917 - one parameter per option
         duration,
         one_vector("velocity", velocity, d),
     )
-    return plan_along(modulated(movement, via, one_vector("end_velocity", end_velocity, d), position_limits))
+    asked = None if via is None else via_points(via, d)
+    movement = modulated(movement, asked, one_vector("end_velocity", end_velocity, d), position_limits)
+    return plan_along(movement, d, asked)
 
 
-def plan_along(movement: Rollout) -> Plan:
-    """The plan of one generated movement."""
+def plan_along(movement: Rollout, n_positions: int, via: ViaPoints | None) -> Plan:
+    """The plan of one generated movement through via points, with that many positions, others behind them."""
     check_one(len(movement))
     primitive = movement.primitives if movement.change is None else own_primitives(movement)
     dmp, d = primitive.dmp, primitive.n_dims
@@ -65,5 +68,11 @@ def plan_along(movement: Rollout) -> Plan:
         state=np.vstack((np.zeros(d), movement.velocities_at_start[0] * tau)),
         duration=tau,
         settle=_SETTLED * float(extents.max()),
-        n_positions=d,
+        n_positions=n_positions,
+        via=None if via is None else _places(via, x0, n_positions, _MISSED * float(extents.max())),
     )
+
+
+def _places(via: ViaPoints, origin: Array, n_positions: int, tolerance: float) -> ViaPlaces:
+    columns = slice(0, n_positions or None)
+    return ViaPlaces(via.times, via.points[0, :, columns] - origin[columns], tolerance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -268,8 +268,8 @@ class PosePrimitives(Batch):
             check_number("duration", duration, above=0.0)
         movement, references = self._asked_for(start, goal, duration, velocity)
         check_one(len(movement))
-        movement = modulated(movement, *changes_in_tangent(movement, references, via, end_velocity, position_limits))
-        plan = replace(plan_along(movement), n_positions=self.n_positions)
+        changes = changes_in_tangent(movement, references, via, end_velocity, position_limits)
+        plan = plan_along(modulated(movement, *changes), self.n_positions, changes[0])
         options = Options(feedback, phase_stopping, goal_filter, velocity_limit, acceleration_limit, avoidance, settle)
         return PoseController(plan, dt, options, references[0])
 

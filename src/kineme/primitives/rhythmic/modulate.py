@@ -18,7 +18,7 @@ from kineme.primitives.discrete.changes import loose_changes
 from kineme.primitives.discrete.extrapolation import Changed, warn_changed, warn_far
 from kineme.primitives.discrete.per_movement import broadcast_length
 from kineme.primitives.discrete.rollout import Change
-from kineme.primitives.discrete.via_points import Span, ViaLike, via_points
+from kineme.primitives.discrete.via_points import Span, ViaLike, ViaPoints, via_points
 from kineme.primitives.rhythmic.harmonics import as_real, waves
 from kineme.primitives.rhythmic.operators import even_phases, limit_cycle
 from kineme.primitives.rhythmic.rollout import RhythmicRollout
@@ -35,7 +35,7 @@ PHASES = Span(
 _PER_BASIS = 4  # phases of a change for each basis function
 
 
-def modulated(movement: RhythmicRollout, via: ViaLike | None) -> RhythmicRollout:
+def modulated(movement: RhythmicRollout, via: ViaLike | ViaPoints | None) -> RhythmicRollout:
     """The movement on the limit cycle that passes the via points; see `RhythmicPrimitives.rollout`.
 
     Raises
@@ -46,7 +46,7 @@ def modulated(movement: RhythmicRollout, via: ViaLike | None) -> RhythmicRollout
     if via is None:
         return movement
     dmp = movement.primitives.dmp
-    asked = via_points(via, movement.baselines.shape[1], span=PHASES)
+    asked = via if isinstance(via, ViaPoints) else via_points(via, movement.baselines.shape[1], span=PHASES)
     n = broadcast_length(len(movement), {"via": asked.points}, "movements")
     movement = movement if len(movement) == n else movement[np.zeros(n, dtype=np.intp)]
     if not movement.ratio.all():

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kineme.primitives.control.options import check_one, one_vector
-from kineme.primitives.control.plan import Plan
-from kineme.primitives.discrete.via_points import ViaLike
+from kineme.primitives.control.plan import Plan, ViaPlaces
+from kineme.primitives.discrete.via_points import ViaLike, via_points
 from kineme.primitives.rhythmic.learned import RhythmicLearned
-from kineme.primitives.rhythmic.modulate import modulated
+from kineme.primitives.rhythmic.modulate import PHASES, modulated
 from kineme.primitives.rhythmic.rollout import rollout
 from kineme.validation import Array
 
+_MISSED = 1e-2  # of the extent: farther from a via point is said
 _LONGEST_STEP = 1000.0  # periods in one step: the forcing is followed all the way
 
 
@@ -26,10 +27,12 @@ def plan_of(
     check_one(len(primitive))
     d, dmp = primitive.n_dims, primitive.dmp
     vectors = {name: one_vector(name, options[name], d) for name in ("baseline", "start", "velocity")}
-    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), via)
+    asked = None if via is None else via_points(via, d, span=PHASES)
+    movement = modulated(rollout(primitive, options | vectors, 1.0, None, n_samples=2), asked)
     check_one(len(movement))
     origin, tau = movement.baselines[0].copy(), float(movement.periods[0])
     gain, ones, weights = float(movement.ratio[0]), np.ones(d), primitive.scaled_weights[0]
+    size = 2.0 * abs(gain) * float(primitive.amplitudes[0])
     if movement.change is not None:
         weights = weights + movement.change[0] / gain  # a new amplitude scales the whole cycle
 
@@ -52,5 +55,6 @@ def plan_of(
         begin=float(movement.phases[0] / (2 * np.pi) % 1.0),
         periodic=True,
         longest_step=_LONGEST_STEP,
+        via=None if asked is None else ViaPlaces(asked.times, asked.points[0] - origin, _MISSED * size),
     )
     return plan, gain
