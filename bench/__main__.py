@@ -19,6 +19,7 @@ SUBJECTS = (
     "rhythm",
     "control",
     "arms",
+    "arm_timing",
     "modulation",
     "via_points",
     "joining",
