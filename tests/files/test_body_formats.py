@@ -181,16 +181,17 @@ def rotations(tmp_path_factory):
     path = tmp_path_factory.mktemp("rotations") / "a.c3d"
     content.write(str(path))
     np.testing.assert_allclose(ezc3d.c3d(str(path))["data"]["rotations"], poses, atol=1e-5)
-    data = bytearray(path.read_bytes())
+    with_point = path.read_bytes()
+    data = bytearray(with_point)
     data[2:4] = b"\0\0"  # of the points in the header
     used = data.index(b"USED", 512)
     assert data[used + 4 : used + 10] == b"\x07\0\x02\0\x01\0"
     data[used + 8] = 0
-    return bytes(data), poses
+    return bytes(data), poses, with_point
 
 
 def test_c3d_with_rotations_alone_is_poses_of_segments(rotations):
-    data, poses = rotations
+    data, poses, _ = rotations
     found = read(data, "a.c3d")
     assert [one.name for one in found.demonstrations.channels if one.kind == "orientation"] == [
         "pelvis.orientation",
@@ -205,9 +206,32 @@ def test_c3d_with_rotations_alone_is_poses_of_segments(rotations):
 
 
 def test_unknown_rotations_of_c3d_are_gaps_and_a_truncated_file_says_so(rotations):
-    data, poses = rotations
+    data, poses, _ = rotations
     start = data.index(np.asarray(poses[:, :, 0, 5].T, np.float32).tobytes())
     lost = data[: start + 64] + np.float32(-1).tobytes() + data[start + 68 :]
     assert read(lost, "a.c3d").sources[0].filled == 1
     with pytest.raises(DataError, match="expected 24 samples of 2 rotations in a C3D file, got fewer"):
         read(data[:-600], "a.c3d")
+
+
+def test_rotations_beside_points_of_c3d_are_left_aside_unless_they_are_chosen(rotations):
+    _, poses, data = rotations
+    found = read(data, "a.c3d")
+    assert found.detected[0][0].columns == ("A.x", "A.y", "A.z")
+    assert "pelvis.orientation.w" in found.detected[0][0].ignored
+    both = read(data, "a.c3d", columns=["A", "thigh"])
+    assert [one.name for one in both.demonstrations.channels if one.kind == "orientation"] == ["thigh.orientation"]
+    np.testing.assert_allclose(both.demonstrations.recorded[:, 3:6], poses[:3, 3, 1].T, atol=1e-4)
+
+
+def test_more_than_255_points_of_c3d_have_their_names(tmp_path):
+    pytest.importorskip("c3d", reason="the package c3d reads C3D")
+    ezc3d = pytest.importorskip("ezc3d", reason="ezc3d writes the file")
+    content, names = ezc3d.c3d(), tuple(f"M{k:03d}" for k in range(300))
+    content["parameters"]["POINT"]["RATE"]["value"] = [60]
+    content["parameters"]["POINT"]["LABELS"]["value"] = names
+    content["data"]["points"] = np.ones((4, 300, N))
+    content["data"]["points"][0] = np.arange(300)[:, None] + T
+    content.write(str(tmp_path / "a.c3d"))
+    (movement,) = read((tmp_path / "a.c3d").read_bytes(), "a.c3d", columns=["M299", "M254"]).demonstrations
+    np.testing.assert_allclose(movement.recorded[:, [0, 3]], np.column_stack([299 + T, 254 + T]), atol=1e-4)

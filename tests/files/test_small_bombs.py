@@ -73,6 +73,18 @@ def test_samples_that_were_never_written_are_not_read(child, fill, tmp_path):
     assert "the others were never written" in outcome.what
 
 
+def test_zeros_that_are_packed_are_not_expanded(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["fps"] = 100.0
+        packed = {"chunks": (2**20,), "compression": "gzip", "compression_opts": 1}
+        file.create_dataset("x", data=np.zeros(2**23 + 1), **packed)
+        file.create_dataset("y", data=np.zeros(2**23 + 1), **packed)
+    assert (tmp_path / "a.h5").stat().st_size < MIB
+    with pytest.raises(kineme.KinemeError, match="nearly all of which are alike"):
+        kineme.read_recordings(tmp_path / "a.h5")
+
+
 def test_a_data_set_that_is_written_in_parts_of_little_is_read(tmp_path):
     h5py = pytest.importorskip("h5py")
     t = np.arange(20_000) / 100

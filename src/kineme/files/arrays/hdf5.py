@@ -19,6 +19,7 @@ from kineme.movements.tables.parsed import Parsed
 
 _SMALL, _CHUNKS = 2**20, 1000  # bytes and chunks that need not be written
 _EXPANDED = 1100  # times as many bytes gzip, which packs best, gives at most
+_LARGE, _PACKED = 2**26, 200  # bytes from which on packing is looked at; times as many as movements pack to at most
 _DEEPEST, _MOST = 12, 1_000_000  # groups within groups; groups and data sets in all
 _UNITS = frozenset({"unit", "units"})  # attributes
 _ATTRIBUTES = frozenset({"label", "task"}) | RATE_NAMES | STEP_NAMES
@@ -95,7 +96,7 @@ class _Stored:
     Raises
     ------
     DataError
-        On reading: samples that were never written, or that expand by more than gzip can.
+        On reading: samples that were never written, or that expand by more than gzip can, or than movements do.
     """
 
     def __init__(self, stored: Any, unit: Any) -> None:
@@ -114,6 +115,12 @@ class _Stored:
             raise DataError(
                 f"expected {n_bytes:,} bytes of samples in the data set {self._stored.name}, got {n_stored:,} in the "
                 "file: the others were never written; write a data set of what was recorded"
+            )
+        if n_bytes > _LARGE and n_bytes > _PACKED * n_stored:
+            raise DataError(
+                f"expected samples that move in the data set {self._stored.name}, got {n_bytes:,} bytes from "
+                f"{n_stored:,} in the file, nearly all of which are alike; write a data set of what was recorded, or a "
+                "shorter one"
             )
         return self._stored[rows]
 

@@ -22,11 +22,14 @@ from kineme.movements.tables.parsed import no_lines
 from kineme.movements.tables.table import Table
 
 _STAMP = "time [s]"
+_MOST_LABELS = 260  # parameters of labels, of 255 each
 _OFF = 1e-2  # of a matrix that counts as a rotation, from orthonormal
 
 
 def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
     """The positions of all points over time, of a file without points the poses of all segments; what is lost is NaN.
+
+    Poses of segments beside points are left aside unless columns name them.
 
     Raises
     ------
@@ -45,12 +48,19 @@ def read_c3d_table(data: bytes, layout: Layout) -> tuple[Table, Roles]:
             warnings.simplefilter("ignore")  # of frames that are missing, which are counted below
             reader = c3d.Reader(io.BytesIO(data))
             names, values, units, rate = _content(reader, data)
+            n_points = len(names)
+            if int(reader.point_used) > 0 and (segments := _beside(reader, data, rate, len(values), units[0])):
+                names, values = [*names, *segments[0]], np.hstack([values, segments[1]])
+                units = [*units, *segments[2]]
     except DataError:
         raise
     except Exception as error:  # the package raises much on damaged files, even names that it did not assign
         raise DataError(f"expected a C3D file, got a truncated or damaged one ({error})") from error
     heads = (_STAMP, *names)
-    roles = choose_roles(heads, ("number",) * len(heads), layout)
+    kinds = ("number",) * (n_points + 1) + ("text" if layout.coordinates is None else "number",) * (
+        len(names) - n_points
+    )
+    roles = choose_roles(heads, kinds, layout)
     columns = [np.arange(len(values)) / rate, *values.T]
     return Table(heads, columns, len(values), no_lines, measured_in=("s", *units)), roles
 
@@ -69,9 +79,30 @@ def _content(reader: Any, data: bytes) -> tuple[list[str], Any, list[str], float
         )
     check_expanded(40 * count * n_frames)
     points = _points(reader, data, count, n_frames)
-    names = without_common_subject(_names(reader.point_labels, count, "point"))
+    names = without_common_subject(_names(_labels(reader, "POINT"), count, "point"))
     heads = [f"{name}.{axis}" for name in names for axis in "xyz"]
     return heads, points.reshape(n_frames, -1), [length] * len(heads), rate
+
+
+def _beside(
+    reader: Any, data: bytes, rate: float, n_frames: int, length: str
+) -> tuple[list[str], Any, list[str]] | None:
+    """The poses of segments beside points, as `_content`; None where there are none of the same rate."""
+    used = reader.get("ROTATION:USED")
+    if used is None or used.int16_value < 1:
+        return None
+    names, values, units, same = _rotations(reader, data, n_frames, length)
+    return (names, values, units) if same == rate and len(values) == n_frames else None
+
+
+def _labels(reader: Any, group: str) -> list[str]:
+    """All labels of points or rotations; of more than 255 the others are in LABELS2, LABELS3 and so on."""
+    labels: list[str] = []
+    for name in ("LABELS", *(f"LABELS{k}" for k in range(2, _MOST_LABELS))):
+        if (parameter := reader.get(f"{group}:{name}")) is None:
+            break
+        labels += np.ravel(parameter.string_array).tolist()
+    return labels
 
 
 def _names(labels: Any, count: int, what: str) -> list[str]:
@@ -82,7 +113,7 @@ def _names(labels: Any, count: int, what: str) -> list[str]:
 
 def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[list[str], Any, list[str], float]:
     """Positions and orientations of segments, as `_content`; NaN where a matrix is unknown or no rotation."""
-    said = {name: reader.get(f"ROTATION:{name}") for name in ("USED", "DATA_START", "RATIO", "RATE", "LABELS")}
+    said = {name: reader.get(f"ROTATION:{name}") for name in ("USED", "DATA_START", "RATIO", "RATE")}
     count, block = (0 if said[name] is None else said[name].int16_value for name in ("USED", "DATA_START"))
     ratio = 1 if said["RATIO"] is None else max(1, said["RATIO"].int16_value)
     rate = float(reader.point_rate) * ratio
@@ -106,8 +137,10 @@ def _rotations(reader: Any, data: bytes, n_frames: int, length: str) -> tuple[li
 
         values[known, :3] = poses[known, :3, 3]
         values[known, 3:] = Rotation.from_matrix(turns[known]).as_quat(scalar_first=True)
-    labels = [] if said["LABELS"] is None else np.ravel(said["LABELS"].string_array).tolist()
-    names = [name.removesuffix("_4X4") for name in without_common_subject(_names(labels, count, "segment"))]
+    names = [
+        name.removesuffix("_4X4")
+        for name in without_common_subject(_names(_labels(reader, "ROTATION"), count, "segment"))
+    ]
     ends = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
     heads = [f"{name}.{end}" for name in names for end in ends]
     return heads, values.reshape(n_samples, -1), [*[length] * 3, *[""] * 4] * count, rate

@@ -20,6 +20,7 @@ SPACES = ("auto", "tip", "joints")
 #: What a caller may say of joints whose unit the file does not say -> that unit.
 JOINT_UNITS = {"deg": "deg", "rad": "rad", "percent": "-100..100"}
 DRIVERS = ".pos"  # names of LeRobot's drivers end in it: shoulder_pan.pos
+_SIDES = ("left", "right")  # what names of two arms begin with
 _USUAL = {"length": "m, cm, mm, in, ft", "angle": "rad, deg"}
 _KINDS = {"tip": ("position",), "joints": ("angle", "position")}
 
@@ -85,15 +86,30 @@ def roles_of(channels: Channels | None, n_columns: int, space: str, robot: Robot
 def joints_among(names: Sequence[str], robot: Robot) -> list[int] | None:
     """Which of the columns is each joint of an arm, by its name; None unless every joint has exactly one.
 
-    Units, what stands before the name of the joint as that of a feature or a topic, and the ``.pos`` of LeRobot's
-    drivers are no part of it.
+    Units, what stands before the name of the joint as that of a feature or a topic, the ``.pos`` of LeRobot's drivers,
+    and the side of one arm of two, as ``left_elbow_flex``, are no part of it.
+
+    Raises
+    ------
+    TrajectoryError
+        Every joint is there for both sides.
     """
     plain = [split_head(name)[0].removesuffix(DRIVERS) for name in names]
-    places = [
-        [k for k, name in enumerate(plain) if name == joint or name.endswith((f".{joint}", f"/{joint}"))]
-        for joint in robot.joints
-    ]
-    return [one[0] for one in places] if all(len(one) == 1 for one in places) else None
+    places = [_places(plain, joint) for joint in robot.joints]
+    if all(len(one) == 1 for one in places):
+        return [one[0] for one in places]
+    sides = {side: [_places(plain, f"{side}_{joint}") for joint in robot.joints] for side in _SIDES}
+    sides = {side: columns for side, columns in sides.items() if all(len(one) == 1 for one in columns)}
+    if len(sides) > 1:
+        raise TrajectoryError(
+            f"expected the joints of one arm, got those of two, {' and '.join(sides)}; choose one with columns=, in "
+            f"the shell --columns '{next(iter(sides))}_*'"
+        )
+    return next(([one[0] for one in columns] for columns in sides.values()), None)
+
+
+def _places(names: Sequence[str], joint: str) -> list[int]:
+    return [k for k, name in enumerate(names) if name == joint or name.endswith((f".{joint}", f"/{joint}"))]
 
 
 def scales_of(roles: Roles, robot: Robot | None, joint_units: str | None = None) -> Scales:
