@@ -32,6 +32,7 @@ SUBJECTS = (
     "one_shot",
     "pauses",
     "open_set",
+    "certainty",
     "outliers",
     "defaults",
     "library",

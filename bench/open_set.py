@@ -76,6 +76,7 @@ class Asked(NamedTuple):
     truth: NDArray[np.intp]
     novelty: tuple[NDArray[np.float64], NDArray[np.float64]]
     rejected: tuple[float, float]
+    exponent: float
 
 
 def measure(quick: bool) -> list[Row]:
@@ -142,7 +143,14 @@ def ask(one: Recordings, split: Split, grouped: bool) -> Asked:
         logs.append(similar)
         novelty.append(recognizer.calibration.scores(found).min(axis=1))
         rejected.append(float(np.mean(p <= ERROR_RATE)) if len(p) else math.nan)
-    return Asked(logs[0].argmax(axis=1) == truth, logs[0], truth, (novelty[0], novelty[1]), (rejected[0], rejected[1]))
+    return Asked(
+        logs[0].argmax(axis=1) == truth,
+        logs[0],
+        truth,
+        (novelty[0], novelty[1]),
+        (rejected[0], rejected[1]),
+        recognizer.calibration.exponent,
+    )
 
 
 def open_set_rows(what: str, asked: list[Asked], n_shown: int) -> list[Row]:
@@ -173,8 +181,10 @@ def reliability_rows(draws: int) -> list[Row]:
     for one in sets:
         for others in (False, True) if len(np.unique(one.people)) > 1 else (False,):
             found = [ask(one, s, others) for n in (1, 2, 4) for s in splits(one, n, others, draws, 1.0)]
-            logs, right = [one.similar for one in found], np.concatenate([one.right for one in found])
-            confidence = np.concatenate([class_probabilities(each).max(axis=1) for each in logs])
+            right = np.concatenate([one.right for one in found])
+            confidence = np.concatenate(
+                [class_probabilities(each.similar, each.exponent).max(axis=1) for each in found]
+            )
             fitted.append(exponent(found))
             details = reliability(confidence, right) | {"accuracy": float(right.mean()), "exponent": fitted[-1]}
             what = f"{_where(one, others)}: expected calibration error"

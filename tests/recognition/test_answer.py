@@ -98,11 +98,11 @@ def test_a_stranger_is_unknown_and_the_answer_says_what_it_is_most_like():
 
 @pytest.mark.parametrize("classifier", ["nearest", "auto"])
 @any_seed
-def test_confidence_is_the_share_of_the_class_by_distances_to_the_power_of_fifteen(seed, classifier):
+def test_confidence_is_the_share_of_the_class_by_distances_to_the_power_fitted(seed, classifier):
     demos, asked = draw_shapes([4] * 6, seed=seed), draw_shapes([1] * 6, seed=seed, spread=0.4)[2]
     recognizer = Recognizer(classifier=classifier).fit(demos)
     answer = recognizer.recognize(asked, error_rate=0.04)
-    shares = np.sqrt(-2 * recognizer.decision_function([asked])[0]) ** -15.0
+    shares = np.sqrt(-2 * recognizer.decision_function([asked])[0]) ** -recognizer.calibration().exponent
     if answer.label is not None:
         expected = shares[list(answer.p_values).index(answer.label)] / shares.sum()
         assert answer.confidence == pytest.approx(expected, abs=1.1e-4)
@@ -120,8 +120,10 @@ def test_an_answer_says_its_rule_and_what_it_promises():
     assert [one.rule for one in answers] == ["class", "class", "pooled"]
     once = Recognizer().fit(draw_shapes([1] * 25)).recognize(demos[0])
     assert once.rule == "guess"
-    assert {RULES[one.rule] for one in [*answers, once]} == set(RULES.values())
-    for one in [*answers, once]:
+    strange = recognizer.recognize(draw_shapes([25, 25, 4], seed=1, spread=0.3)[28])  # near one class, novel to all
+    assert (strange.rule, strange.certainty) == ("strangers", "looks like")
+    assert {RULES[one.rule] for one in [*answers, once, strange]} == set(RULES.values())
+    for one in [*answers, once, strange]:
         assert one.promise == RULES[one.rule]
         assert f"rule={one.rule!r}" in repr(one)
         assert one.promise.count(".") == 1  # one sentence

@@ -106,7 +106,10 @@ def test_without_groups_what_is_much_nearer_to_one_class_than_to_the_next_is_kno
 
     def known(away, to_next, by=calibration):
         logs = -0.5 * np.array([[away, to_next, 50, 50, 50]]) ** 2
-        return by.known_p_values(logs, 0.05)[0] > 0.05
+        is_known = by.known_p_values(logs, 0.05)[0] > 0.05
+        only_by_strangers = is_known and shown.known_p_values(logs, 0.05)[0] <= 0.05
+        assert (by.rules(logs, 0.05) == ["strangers"]) == (only_by_strangers and n_shown > 2)  # else they are guesses
+        return is_known
 
     far = 0.9 * typical
     assert known(0.999 * far, 50)
@@ -114,6 +117,7 @@ def test_without_groups_what_is_much_nearer_to_one_class_than_to_the_next_is_kno
     near = 0.8 * typical
     assert known(near, 1.501 * near)
     assert known(near, 1.499 * near) == known(near, 1.499 * near, shown)
+    known(near, 50, shown)
     if n_shown == 24:
         assert not known(near, 50, shown)
 

@@ -21,7 +21,7 @@ from kineme.output.table import Table, data_frame, to_html
 from kineme.recognition.certainty import Certainty, certainty, in_words
 from kineme.recognition.classifiers import Classifier, NearestEach
 from kineme.recognition.confidence import class_probabilities
-from kineme.recognition.conformal import RULES, Calibration
+from kineme.recognition.conformal import GUESSES, RULES, Calibration
 from kineme.recognition.transform import Transform, map_onto
 from kineme.validation import Array
 
@@ -73,7 +73,7 @@ class Answer:
     p_values : mapping from label to float
         Share of the members of the class that would be as far from their nearest demonstration, or farther; see
         `Calibration`.
-    rule : {"class", "pooled", "guess"}
+    rule : {"class", "pooled", "strangers", "guess"}
         Which demonstrations `p_known` was calibrated on; `promise` says what follows.
     calibrated : bool
         Whether there are enough demonstrations for every class that the error rate is kept, see `Calibration`: for
@@ -110,9 +110,9 @@ class Answer:
     def certainty(self) -> Certainty:
         """How sure the answer is: "sure", "probably", "looks like", or "new" if it is unknown.
 
-        Nothing is more than "looks like" where the rule is "guess", whatever the confidence.
+        Nothing is more than "looks like" where the rule is "strangers" or "guess", whatever the confidence.
         """
-        return certainty(self.confidence, is_new=self.label is None, is_guess=self.rule == "guess")
+        return certainty(self.confidence, is_new=self.label is None, is_guess=self.rule in GUESSES)
 
     @property
     def in_words(self) -> str:

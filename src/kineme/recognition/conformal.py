@@ -45,11 +45,15 @@ _CALIBRATED = 100  # demonstrations of a class that calibrate it, at most, evenl
 #: Rule by which a movement is called known or unknown -> what it promises.
 RULES = {
     "class": "Of known movements most like this class, by people who showed some, about the error rate or less are "
-    "called unknown; by other people, only if groups told apart who showed what.",
+    "called unknown; by other people, on average, only if groups told apart who showed what.",
     "pooled": "Of known movements of all classes together, by people who showed some, about the error rate or less are "
-    "called unknown; by other people, only if groups told apart who showed what.",
+    "called unknown; by other people, on average, only if groups told apart who showed what.",
+    "strangers": "More novel than about the error rate of the movements that were shown, but much nearer to one class "
+    "than to the next, as movements by other people are: a guess, unless groups tell who showed what.",
     "guess": "Too few demonstrations tell the error rate: any share of known movements may be called unknown.",
 }
+#: Rules that promise nothing.
+GUESSES = ("strangers", "guess")
 
 
 def check_error_rate(error_rate: float) -> None:
@@ -149,6 +153,9 @@ class Calibration:
 
     def known_p_values(self, nearest: Array, error_rate: float) -> Array:
         """P-values (n,) of all known classes together: unknown is what has one of at most `error_rate`."""
+        return np.maximum(self._by_those_shown(nearest, error_rate), self._by_strangers(nearest))
+
+    def _by_those_shown(self, nearest: Array, error_rate: float) -> Array:
         scores = self.scores(nearest)
         like = scores.argmin(axis=1)
         novelty = scores[np.arange(len(scores)), like]
@@ -160,7 +167,7 @@ class Calibration:
                 result[like == c] = _shares(chosen[1], own)
             else:
                 result[like == c] = law(own / max(few.mean(), LEAST)) if len(few) else broad_law(own)
-        return np.maximum(result, self._by_strangers(nearest))
+        return result
 
     def _by_strangers(self, nearest: Array) -> Array:
         """P-values (n,) if somebody else made the movements; 0 where groups tell how much people differ."""
@@ -173,10 +180,16 @@ class Calibration:
         return broad_law(away[:, 0] / np.maximum(reaching(reach), LEAST))
 
     def rules(self, nearest: Array, error_rate: float) -> list[str]:
-        """The rule of each movement's `known_p_values`: "class", "pooled" or "guess", see `RULES`."""
+        """The rule of each movement's `known_p_values`: "class", "pooled", "strangers" or "guess", see `RULES`."""
         counted = self._counting(error_rate)[1]
         chosen = [counted[c] for c in self.scores(nearest).argmin(axis=1)]
-        return ["guess" if one is None else one[0] for one in chosen]
+        by_strangers = (self._by_those_shown(nearest, error_rate) <= error_rate) & (
+            self._by_strangers(nearest) > error_rate
+        )
+        return [
+            "guess" if scores is None else "strangers" if strange else scores[0]
+            for scores, strange in zip(chosen, by_strangers.tolist(), strict=True)
+        ]
 
     def calibrated(self, error_rate: float) -> NDArray[np.bool_]:
         """Whether p-values of each class keep `error_rate`, shape (C,); elsewhere they are a guess.

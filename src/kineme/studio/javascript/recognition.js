@@ -43,7 +43,7 @@ const SHARES = {
  * @property {number} pKnown
  * @property {Object<string, number>} pValues
  * @property {Object<string, number>} probabilities of each class if it is one of them
- * @property {string} rule class, pooled or guess
+ * @property {string} rule class, pooled, strangers or guess
  * @property {boolean} calibrated
  * @property {"sure"|"probably"|"looks like"|"new"} certainty
  * @property {string[]} ranked
@@ -195,10 +195,12 @@ function pValues(known, nearest, errorRate) {
   const all = counted(known, "novelties", like, errorRate);
   const mean = all.pooled.reduce((sum, one) => sum + one, 0) / all.pooled.length;
   const guess = all.pooled.length ? law(scores[like] / Math.max(mean, LEAST)) : broadLaw(scores[like]);
+  const shown = all.scores ? shareAbove(all.scores, scores[like]) : guess;
+  const strangers = byStrangers(known, away);
   return {
     each,
-    known: Math.max(all.scores ? shareAbove(all.scores, scores[like]) : guess, byStrangers(known, away)),
-    rule: all.rule,
+    known: Math.max(shown, strangers),
+    rule: all.scores && shown <= errorRate && strangers > errorRate ? "strangers" : all.rule,
     calibrated: found.every((one) => one.scores !== null),
   };
 }
@@ -240,7 +242,7 @@ export function recognize(known, one, errorRate = 0.05) {
     pValues: Object.fromEntries(classes.map((name, c) => [name, p.each[c]])),
     probabilities: Object.fromEntries(classes.map((name, c) => [name, odds[c]])),
     rule: p.rule,
-    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: p.rule === "guess" }),
+    certainty: certainty(known.header.certainty, odds[shown], { isNew: !isKnown, isGuess: p.rule === "guess" || p.rule === "strangers" }),
     calibrated: p.calibrated,
     ranked: ranked.map((c) => classes[c]),
     nearest,
