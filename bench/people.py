@@ -16,6 +16,7 @@ import kineme
 from bench.by_person import FOLDER
 
 Indices = NDArray[np.intp]
+RATE = 100.0  # [Hz], of recordings without time stamps
 
 
 class Recorded(NamedTuple):
@@ -40,7 +41,10 @@ def recorded(name: str) -> Recorded | None:
     with np.load(path) as z:
         ends, labels, people = z["offsets"][1:-1], z["labels"].astype(str), z["people"].astype(str)
         arrays = [one.astype(float) for one in np.split(z["positions"], ends)]
-        times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
+        if "times" in z:
+            times = [one.astype(float) - float(one[0]) for one in np.split(z["times"], ends)]
+        else:
+            times = [np.arange(len(one)) / RATE for one in arrays]
     return Recorded(kineme.Demonstrations.from_arrays(arrays, labels, times), labels, people)
 
 

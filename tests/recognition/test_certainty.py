@@ -124,3 +124,37 @@ def test_what_is_sure_is_right(strokes):
     assert np.mean(of_known_kinds["sure"]) >= 0.99
     assert np.mean(every["sure"]) >= 0.93
     assert np.mean(every["sure"]) > np.mean(every["probably"]) > np.mean(every["looks like"])
+
+
+def test_of_new_people_about_the_error_rate_is_unknown_where_groups_tell_people_apart(strokes):
+    """What `Answer.promise` says of other people, on average over draws."""
+    rejected, calibrated = [], []
+    for seed in range(6):
+        recognizer, known, asked = taught(strokes, 5, seed)
+        members = asked[np.isin(strokes[1][asked], known)][:100]
+        answers = recognizer.recognize(strokes[0][members])
+        rejected.append(np.mean([one.label is None for one in answers]))
+        calibrated += [one.calibrated for one in answers]
+    assert all(calibrated)
+    assert 0.005 <= np.mean(rejected) <= 0.1
+
+
+def test_of_one_person_alone_movements_by_others_look_like_what_they_are(strokes):
+    """Nothing promises this: the rule of what is rescued is "strangers", and of foreign movements most stay unknown."""
+    demos, labels, people = strokes
+    kinds = np.unique(labels)
+    rescued, foreign = [], []
+    for person in np.unique(people)[:3]:
+        own, rng = people == person, np.random.default_rng(0)
+        known = rng.permutation(kinds)[: len(kinds) // 2]
+        shown = np.concatenate([np.flatnonzero(own & (labels == kind))[:4] for kind in known])
+        recognizer = kineme.Recognizer().fit(demos[shown], labels[shown])
+        theirs = rng.permutation(np.flatnonzero(~own))[:150]
+        for answer, label in zip(recognizer.recognize(demos[theirs]), labels[theirs], strict=True):
+            if label in known:
+                rescued.append(answer.label == label)
+            else:
+                foreign.append(answer.label is None)
+            assert answer.certainty == "looks like" or answer.rule != "strangers"
+    assert np.mean(rescued) >= 0.78
+    assert np.mean(foreign) >= 0.85
