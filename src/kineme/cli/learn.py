@@ -87,13 +87,13 @@ def _notes(recordings: Any) -> list[str]:
     """What a person should know of how recordings were read, before they rely on what is learned."""
     from kineme.files.column_order import notes_on_aside, notes_on_order
     from kineme.files.inspection.extents import notes_on_extents, notes_on_sizes
-    from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
+    from kineme.files.inspection.gaps import notes_on_gaps, notes_on_sampling
     from kineme.movements.channels.column_match import columns_recorded
 
     demos = recordings.demonstrations
     aside = notes_on_aside(how for how, _ in recordings.detected)
     ordered = notes_on_order((how for how, _ in recordings.detected), columns_recorded(demos.channels or ()))
-    repaired = [*notes_on_gaps(recordings), *notes_on_pauses(recordings)]
+    repaired = [*notes_on_gaps(recordings), *notes_on_sampling(recordings)]
     return [*recordings.notes, *aside, *ordered, *repaired, *notes_on_sizes(demos), *notes_on_extents(demos)]
 
 

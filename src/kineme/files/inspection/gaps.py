@@ -10,6 +10,7 @@ from kineme.files.problem import note_on_missing
 from kineme.output.text import counted
 
 _NAMED = 6  # numbers that stand for no value in a note
+_RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
 _PAUSE = 1.0  # s without samples from which on a movement may be several
 
 
@@ -33,16 +34,20 @@ def notes_on_gaps(recordings: Recordings) -> list[str]:
     return notes + note_on_missing(recordings.problems)
 
 
-def notes_on_pauses(recordings: Recordings) -> list[str]:
-    """Say that there are no samples for so long that a movement may be several, one after the other."""
-    sampling = sampling_of(recordings.demonstrations)
+def notes_on_sampling(recordings: Recordings) -> list[str]:
+    """Say that the rate is unusual, and that there are no samples for so long that a movement may be several."""
+    sampling, notes = sampling_of(recordings.demonstrations), []
+    rate = float(np.median(sampling.rates))
+    if not _RATES[0] <= rate <= _RATES[1]:
+        notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")
     paused = (sampling.gaps > 0) & (sampling.longest > _PAUSE)
     if not paused.any():
-        return []
+        return notes
     first = int(np.flatnonzero(paused)[0])
     longest = sampling.longest[paused].max()
     return [
+        *notes,
         f"{counted(int(paused.sum()), 'movement')} without samples for up to {longest:.3g} s, the first "
         f"{recordings.short_names[first]}; if these are several movements, say which column tells them apart, "
-        "--movement, in Python movement=, or cut them by kineme segment"
+        "--movement, in Python movement=, or cut them by kineme segment",
     ]

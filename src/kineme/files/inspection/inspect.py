@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kineme.files.column_order import notes_on_aside, notes_on_order
 from kineme.files.inspection.duplicates import duplicates_among
 from kineme.files.inspection.extents import extents_of, notes_on_extents, notes_on_sizes
-from kineme.files.inspection.gaps import notes_on_gaps, notes_on_pauses
+from kineme.files.inspection.gaps import notes_on_gaps, notes_on_sampling
 from kineme.files.inspection.sampling import Sampling, sampling_of
 from kineme.files.merge_files import Recordings
 from kineme.files.problem import Problem
@@ -23,7 +23,6 @@ from kineme.movements.trajectories.demonstrations import Demonstrations
 from kineme.validation import Array
 
 _MANY, _NAMED = 7, 12  # columns from which on still ones are counted; channels that a note names
-_RATES = (2.0, 20_000.0)  # usual sampling rates of people and robots [Hz]
 
 
 class Range(NamedTuple):
@@ -102,7 +101,7 @@ def inspect(recordings: Recordings) -> Inspection:
         demos.channels,
         duplicates,
         recordings.problems,
-        tuple(_notes(recordings, labels, sampling)),
+        tuple(_notes(recordings, labels)),
     )
 
 
@@ -142,11 +141,8 @@ def _range(values: Array) -> Range:
     return Range(float(values.min()), float(np.median(values)), float(values.max()))
 
 
-def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: Sampling) -> list[str]:
+def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...]) -> list[str]:
     notes, demos = [*recordings.notes], recordings.demonstrations
-    rate = float(np.median(sampling.rates))
-    if not _RATES[0] <= rate <= _RATES[1]:
-        notes.append(f"{rate:.3g} samples per second are unusual; if the unit of time is another, give --units")
     guessed = sorted({str(how.units) for how, _ in recordings.detected if how.units_from in GUESSED})
     if len(guessed) > 1:
         notes.append(f"time counts in {' here, in '.join(guessed)} there, to judge by its size; give --units")
@@ -162,7 +158,7 @@ def _notes(recordings: Recordings, labels: tuple[LabelSummary, ...], sampling: S
     unlabeled = sum(one.movements for one in labels if one.label is None)
     if 0 < unlabeled < len(recordings):
         notes.append(f"{unlabeled} movements have no label: their files lie in no folder of their own")
-    notes += notes_on_gaps(recordings) + notes_on_pauses(recordings) + notes_on_sizes(demos)
+    notes += notes_on_gaps(recordings) + notes_on_sampling(recordings) + notes_on_sizes(demos)
     return notes + notes_on_extents(demos) + _notes_on_channels(demos)
 
 
