@@ -63,8 +63,9 @@ def test_a_number_that_stands_for_no_value_is_missing_and_said(tmp_path, sentine
     assert read.sources[0].filled == 4
 
 
-def test_a_number_within_reach_of_the_others_is_a_value(tmp_path):
-    x = np.where(U > 0.9, 999, 2000 * U)
+@pytest.mark.parametrize("reach", [600, 2000])
+def test_a_number_within_reach_of_the_others_is_a_value(tmp_path, reach):
+    x = np.where(U > 0.9, 999, reach * U)
     read = kineme.read_recordings(_written(tmp_path / "a.csv", ["y"], {"x": x, "z": np.full(T, 999)}))
     np.testing.assert_allclose(read.demonstrations.positions[:, 1:], np.column_stack([x, np.full(T, 999)]))
     assert notes_on_gaps(read) == []

@@ -13,7 +13,6 @@ import numpy as np
 from kineme.errors import DataError
 from kineme.files.arrays.tree_movements import tree_movements
 from kineme.files.arrays.trees import GROUPS, RATE_NAMES, STEP_NAMES
-from kineme.movements.tables.columns import is_time
 from kineme.movements.tables.layout import Layout
 from kineme.movements.tables.parsed import Parsed
 
@@ -73,7 +72,7 @@ def _tree(group: Any, h5py: Any, counted: list[int], depth: int = 0, unit: Any =
             if one.shape == ():
                 tree[name] = _single(one[()])
             elif one.shape and one.dtype.kind in "biuf":
-                tree[name] = _Stored(one, _unit_in(one) or ("" if is_time(name) else unit))
+                tree[name] = _Stored(one, _unit_in(one) or unit)
     return tree
 
 
