@@ -7,15 +7,15 @@ people showed nothing. The letters of LASA's names by another hand, and others, 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import kineme
 from bench.by_person import FOLDER
+from bench.people import Recorded, recorded
 from bench.rows import Row
-from kineme.experiments.evaluation.data import load_data
 
 SHOWN = (1, 3, 5)
 DRAWS = 3
@@ -43,14 +43,15 @@ def measure(quick: bool) -> list[Row]:
         answered = list(_answered(file.stem, 1 if quick else DRAWS))
         for word in WORDS:
             rows += _rows(file.stem, word, [one for one in answered if one.answer.certainty == word])
-    letters = FOLDER / "letters2d.npz"
-    return rows + _strangers(str(letters)) if letters.is_file() else rows
+    letters = recorded("letters2d.npz")
+    return rows if letters is None else rows + _strangers(letters)
 
 
 def _answered(name: str, draws: int) -> Iterator[Answered]:
-    data = load_data(str(FOLDER / f"{name}.npz"))
-    demos, people = data.demonstrations, data.people
-    labels = np.asarray(demos.labels).astype(str)
+    data = recorded(f"{name}.npz")
+    assert data is not None
+    demos, labels = data.demos, data.labels
+    people = data.people if len(np.unique(data.people)) > 1 else None
     for n_shown in SHOWN:
         for draw in range(draws):
             rng = np.random.default_rng([draw, n_shown])
@@ -66,12 +67,12 @@ def _answered(name: str, draws: int) -> Iterator[Answered]:
                     yield Answered(answer, labels[k], labels[k] in known)
 
 
-def _new_people(people: NDArray[np.object_] | None, n: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+def _new_people(people: NDArray[Any] | None, n: int, rng: np.random.Generator) -> NDArray[np.bool_]:
     """Whether each movement is by one of the third of the people who show nothing; of one person, four in ten."""
     if people is None:
         return rng.random(n) < 0.4
-    everyone = np.unique(people.astype(str))
-    return np.isin(people.astype(str), rng.choice(everyone, max(1, len(everyone) // 3), replace=False))
+    everyone = np.unique(people)
+    return np.isin(people, rng.choice(everyone, max(1, len(everyone) // 3), replace=False))
 
 
 def _shown(
@@ -97,15 +98,13 @@ def _rows(name: str, word: str, answered: list[Answered]) -> list[Row]:
     return [Row(f"{name}, {word}: right", "%", 100 * float(np.mean(right)), details=details)]
 
 
-def _strangers(letters: str) -> list[Row]:
+def _strangers(letters: Recorded) -> list[Row]:
     """Letters by one hand, asked of the shapes that another hand drew."""
-    data = load_data(letters)
-    labels = np.asarray(data.demonstrations.labels).astype(str)
-    same = np.flatnonzero(np.isin(labels, list(NAMES)))
-    foreign = np.flatnonzero(~np.isin(labels, [*NAMES, *ALIKE]))
+    same = np.flatnonzero(np.isin(letters.labels, list(NAMES)))
+    foreign = np.flatnonzero(~np.isin(letters.labels, [*NAMES, *ALIKE]))
     recognizer = kineme.Recognizer().fit(kineme.load_lasa())
     unknown = [
-        100 * float(np.mean([one is None for one in recognizer.predict_known(data.demonstrations[which])]))
+        100 * float(np.mean([one is None for one in recognizer.predict_known(letters.demos[which])]))
         for which in (same, foreign)
     ]
     return [

@@ -267,10 +267,13 @@ TABLE = {
 }
 
 
+def _results(subject):
+    return json.loads((ROOT / "bench" / "results" / f"{subject}.json").read_text())["rows"]
+
+
 def test_the_page_shows_what_was_measured():
     """docs/guide/recognition.md against bench/results/open_set.json."""
-    rows = json.loads((ROOT / "bench" / "results" / "open_set.json").read_text())["rows"]
-    measured = {row["what"]: row["ours"] for row in rows}
+    measured = {row["what"]: row["ours"] for row in _results("open_set")}
     page = " ".join((ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8").split())
     for name, title in TABLE.items():
         found = [[measured.get(f"{name}, {n} shown: {what}") for what in SHOWN] for n in (1, 2, 4, 8)]
@@ -280,6 +283,18 @@ def test_the_page_shows_what_was_measured():
             assert cell[0] is None or cell[0] <= (8.0 if k else 15.0)
     errors = [measured[f"{name}: expected calibration error"] for name in (*list(TABLE)[2:], "LASA, severely")]
     assert "expected calibration error is {:.3f}, {:.3f} and {:.3f}".format(*errors) in page
+
+
+def test_the_page_shows_how_often_words_are_right():
+    """docs/guide/recognition.md against bench/results/certainty.json."""
+    rows = {row["what"]: row for row in _results("certainty")}
+    page = (ROOT / "docs" / "guide" / "recognition.md").read_text(encoding="utf-8")
+    for name in ("gestures3d", "letters2d", "strokes2d", "multistrokes2d", "words2d", "signs2d", "exercises6d"):
+        for word in ("sure", "probably", "looks like"):
+            row = rows.get(f"{name}, {word}: right")
+            assert row is None or f"{row['ours'] / 100:.3f} ({row['details']['n']}), " in page
+    strangers = [rows[what]["ours"] for what in rows if "letters" in what and "LASA" in what]
+    assert "{:.0f} %\nare called unknown instead of 92 %, and {:.0f} % of other".format(*strangers) in page
 
 
 def test_an_error_rate_does_not_depend_on_the_one_that_was_asked_for_before():
