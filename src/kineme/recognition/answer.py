@@ -69,7 +69,8 @@ class Answer:
     probabilities : mapping from label to float
         Probability of each class if the movement is of a known one, see `class_probabilities`; they sum to 1.
     p_known : float
-        Share of movements of known classes that would be as novel or more, see `Calibration`.
+        Share of movements of known classes that would be as novel or more; without groups at least what it would be if
+        somebody else made the movement, see `Calibration`.
     p_values : mapping from label to float
         Share of the members of the class that would be as far from their nearest demonstration, or farther; see
         `Calibration`.
