@@ -46,7 +46,6 @@ EXEMPT = {
     "primitives.base_rollout.BaseRollout.channels": "of columns",
     "primitives.base_rollout.BaseRollout.rate_names": "of columns",
     "movements.channels.column_match.Columns.are_nameless": "of columns",
-    "movements.channels.column_match.Columns.may_be": "of columns",
     "movements.channels.column_match.Columns.names": "of columns",
     "movements.channels.column_match.Columns.rotations": "of columns",
     "movements.channels.column_match.columns_like": "orders columns of one array",
