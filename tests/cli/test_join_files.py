@@ -89,6 +89,20 @@ def test_samples_are_those_of_the_densest_file_and_the_others_are_interpolated(f
     np.testing.assert_allclose(np.unwrap(recorded[:, 10], period=360), 170 + 20 * (t - BEGIN), atol=1e-4)
 
 
+def test_a_quaternion_that_is_no_rotation_stays_none_in_a_joined_recording(tmp_path):
+    record(tmp_path / "one")
+    (tmp_path / "one" / "Metadata.csv").unlink()
+    t = clock(25, 0.1, 1.9)
+    q = turned(t).as_quat()
+    q[20] *= 0.5
+    table(tmp_path / "one" / "Orientation.csv", ["qx", "qy", "qz", "qw"], t, q.tolist())
+    with pytest.raises(kineme.DataError, match=r"the first that is none: one: expected unit quaternions"):
+        kineme.read_recordings(tmp_path, join_files=True)
+    read = kineme.read_recordings(tmp_path, join_files=True, skip="sample")
+    assert len(read) == 1
+    assert read.problems[-1].samples == 7  # those between the samples before and after it
+
+
 def test_files_that_last_elsewhere_are_problems_and_files_alone_stay_as_they_are(tmp_path):
     record(tmp_path / "wave" / "one")
     later = clock(50, 100, 102)

@@ -199,6 +199,18 @@ def test_angles_orientations_and_switches_are_filled_as_what_they_are():
     np.testing.assert_array_equal(filled[55:, 5], 1.0)
 
 
+@pytest.mark.parametrize("low", [-180, 0])
+def test_an_angle_that_only_its_wraps_tell_stays_one_where_gaps_are_filled(low):
+    t = np.arange(400) / 100
+    a = 170 + 200 * t
+    wrapped = (a - low) % 360 + low
+    crossing = int(np.flatnonzero(np.abs(np.diff(wrapped)) > 180)[1])
+    for gap in (slice(crossing + 20, crossing + 24), slice(crossing - 1, crossing + 3)):
+        demos = read(table(t, np.column_stack([with_gap(wrapped, gap), t]), ("c", "x"))).demonstrations
+        assert [(one.kind, one.period) for one in demos.channels] == [("angle", 360.0), ("position", None)]
+        np.testing.assert_allclose(demos.recorded[:, 0], a - a[0] + wrapped[0], atol=1e-9)
+
+
 def test_gaps_are_filled_up_to_the_limit_alone_whatever_the_rate():
     t = np.cumsum(np.r_[0, np.tile([0.01, 0.03], 100)])
     x = np.column_stack([np.sin(3 * t), np.cos(2 * t)])

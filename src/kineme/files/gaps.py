@@ -141,13 +141,15 @@ def _span_of_all(missing: Flags, skip: str) -> slice:
 
 
 def _channels(block: Block, columns: Sequence[str], layout: Layout, complete: Flags) -> Channels:
-    """What the columns are, by the samples in which no value is missing."""
-    lengths = np.diff(np.concatenate(([0], np.cumsum(complete)))[block.offsets])
-    if lengths.sum() < MIN_SAMPLES:
+    """What the columns are, by the samples in which no value is missing; a step across a gap tells nothing."""
+    if np.count_nonzero(complete) < MIN_SAMPLES:
         return tuple(Channel(name, "position", (name,)) for name in columns)
     kinds = layout.kinds if isinstance(layout.kinds, Mapping) else {}
     given = {key: kind for key, kind in kinds.items() if {name.strip() for name in key.split(",")} <= {*columns}}
-    offsets = np.concatenate(([0], np.cumsum(lengths[lengths > 0])))
+    begins = complete & ~np.append(False, complete[:-1])
+    firsts = block.offsets[:-1][np.diff(block.offsets) > 0]
+    begins[firsts] = complete[firsts]
+    offsets = np.append(np.flatnonzero(begins[complete]), np.count_nonzero(complete))
     return find_channels(columns, block.positions[complete], offsets, given)
 
 
@@ -182,12 +184,25 @@ def _between(channel: Channel, known: tuple[Array, Array], times: Array) -> Arra
         return np.asarray(turned[:, np.argsort(order)])
     if channel.kind == "angle":
         period = period_of_channel(channel, values[:, 0])
-        values = without_wraps(values[:, 0], np.array([0, len(values)]), period)[:, None]
+        unwrapped = without_wraps(values[:, 0], np.array([0, len(values)]), period)[:, None]
+        between = _smooth(stamps, unwrapped, times)
+        return between if np.array_equal(unwrapped, values) else _wrapped(between, values, period)
+    return _smooth(stamps, values, times)
+
+
+def _smooth(stamps: Array, values: Array, times: Array) -> Array:
+    """Values (m, c) at m times on the curve through those (n, c) at stamps (n,)."""
     if len(stamps) < 3:
         return np.interp(times, stamps, values[:, 0])[:, None]
     from scipy.interpolate import Akima1DInterpolator
 
     return np.asarray(Akima1DInterpolator(stamps, values)(times))
+
+
+def _wrapped(angles: Array, recorded: Array, period: float) -> Array:
+    """Angles in the turn that the recorded ones lie in, from 0 or from minus half a turn on: that tells an angle."""
+    low = 0.0 if recorded.min() >= 0.0 else -period / 2
+    return np.asarray(low + (angles - low) % period)
 
 
 class Missing(NamedTuple):

@@ -223,7 +223,8 @@ def _values_at(at: Array, times: Array, columns: Array, channels: Channels) -> A
         if channel.kind == "orientation":
             to_last = 0 if channel.order == "xyzw" else -1
             turned = interpolated(at, times, np.roll(columns[:, where], to_last, axis=1))
-            values[:, where] = np.roll(turned, -to_last, axis=1)
+            norms = np.interp(at, times, np.linalg.norm(columns[:, where], axis=1))  # what is no rotation stays none
+            values[:, where] = norms[:, None] * np.roll(turned, -to_last, axis=1)
         elif channel.kind == "discrete":
             values[:, where] = columns[before, where]
         else:
