@@ -181,8 +181,8 @@ def merge_files(
     full, channels, odd_channels = with_channels(full, kinds or {}, skip, by_number)
     reported += odd_channels
     if not any(len(_block(one).labels) for one in full):
-        first = next((one for one in reported if not one.samples), reported[0])
-        raise DataError(f"expected recordings in {where}, found none; the first that is none: {first}")
+        none = next((one for one in reported if not one.samples), reported[0])
+        raise DataError(f"expected recordings in {where}, found none; the first that is none: {none}")
     sources = tuple(
         Source(one.path, one.sha256, one.size, one.mtime, place, label, person or one.person, *repair)
         for one in full

@@ -164,9 +164,12 @@ class Answer:
         SpecificationError
             One of the two alone, another number of dimensions, or demonstrations of another recognizer.
         """
-        from kineme.recognition.answer_figure import draw_answer
+        from kineme.recognition.answer_figure import Example, Shares, draw_answer
 
-        return draw_answer(self, movement, demonstrations)
+        classes = {label: self.probabilities[label] for label in self.ranked}
+        shares = Shares(self.in_words, classes, self.label, self.responsibilities)
+        shown = self.ranked[0] if self.label is None else self.label
+        return draw_answer(shares, Example(self.nearest[0].index, shown, self.transform), movement, demonstrations)
 
     def _repr_html_(self) -> str:
         """Show the first ten classes in a notebook; names are escaped."""
