@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import BPoly
+from scipy.interpolate import BPoly, PPoly
 
 import kineme
 from arm_samples import simple_arm, stroke
 from kineme.errors import TrajectoryError
 from kineme.robots import InfeasibleError, JointTrajectory, load, move, preflight
 from kineme.robots.checks.along import along
-from kineme.robots.execution.between import between, extreme
+from kineme.robots.execution.between import _bernstein, between, dense_times, extreme
 from soaking import examples
 
 pytest.importorskip("pinocchio", reason="the extra robot is not installed")
@@ -62,6 +62,13 @@ def test_an_extreme_between_samples_is_that_of_five_hundred_instants_in_each_gap
         largest = np.abs(values / limits).max()
         made = extreme(trajectory, order, limits, centers if order == 0 else 0.0)
         assert largest * (1 - 1e-9) <= abs(made.share) <= largest * 1.001
+
+
+def test_coefficients_that_bound_a_polynomial_are_those_of_scipy():
+    for degree in range(1, 6):
+        powers = np.random.default_rng(degree).normal(size=degree + 1)
+        bounding = BPoly.from_power_basis(PPoly(powers[::-1, None], [0.0, 1.0])).c[:, 0]
+        np.testing.assert_allclose(_bernstein(degree) @ powers, bounding, atol=1e-12)
 
 
 @pytest.mark.parametrize(("share", "passes"), [(1.0005, True), (1.0015, False)])
@@ -125,6 +132,16 @@ def test_a_joint_that_is_too_fast_between_two_samples_at_which_it_stands_is_seen
     there[0] += 0.8 * robot.velocity[0]  # in a second: 1.5 times the limit in the middle
     failed = preflight(robot, sent(robot, [0.0, 1.0], np.array([robot.rest, there]))).failed
     assert {"velocity between samples"} == {check.what for check in failed if check.what.startswith("velocity")}
+
+
+def test_between_two_postures_that_are_looked_at_no_joint_moves_far_and_a_jump_costs_no_more_than_its_speed():
+    robot = _robot("panda")
+    there = robot.rest + np.linspace(0.2, 0.8, 7) * robot.velocity
+    slow = sent(robot, [0.0, 1.0, 3.0], np.array([robot.rest, there, robot.rest]))
+    seen = between(slow, dense_times(robot, slow)).positions
+    assert 0.02 < np.abs(np.diff(seen, axis=0)).max() < 0.05 * 1.9  # the speed in the middle is 1.875 times the mean
+    jump = sent(robot, [0.0, 1.0], np.array([robot.rest, robot.rest + 1e9]))
+    assert len(dense_times(robot, jump)) <= 1 + np.ceil(robot.velocity.max() / 0.05)
 
 
 def test_a_learned_movement_begins_and_ends_at_a_stand_at_every_rate():

@@ -45,10 +45,13 @@ def test_steps_below_three_quarters_of_a_period_are_motion():
         ([0.0, 0.0, 325.0, 325.0], None),
         ([0.0, 1.0, 340.0, 341.0], None),
         ([0.0, 350.0, 170.0, 0.0], None),
+        ([350.0, 260.0, 220.0, 125.0, 85.0, 10.0, 345.0], None),  # so sparse that it may as well turn the other way
+        ([100.0, 60.0, 50.0, 20.0, 340.0, 330.0], None),  # not through the whole range
+        ([40.0, 30.0, 18.0, 8.0, 346.0, 336.0], None),  # by 22 degrees, where others are of 10 to 12
     ],
 )
 def test_only_a_jump_through_the_whole_range_shows_a_period(angles, period):
-    assert wrap_period(np.array(angles), np.array([0, 4])) == period
+    assert wrap_period(np.array(angles), np.array([0, len(angles)])) == period
 
 
 K = np.arange(100)
